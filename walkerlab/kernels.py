@@ -1,0 +1,123 @@
+"""How physics becomes machine code: compiled functions, bodies chosen by type, and where the code is cached.
+
+Numba's own cache does not notice that a called function in another file changed, so the cache folder is keyed by
+a digest of every source file of the package: an edited function can never run stale.
+"""
+
+import functools
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+KEPT_GENERATIONS = 3
+FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def sources_digest() -> str:
+    """Digest (hex) of every source file of the package, in the order of their names."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def cache_root() -> Path:
+    """The folder of all compiled code: $WALKERLAB_CACHE, else the user's cache folder, else a temporary one."""
+    chosen = os.environ.get("WALKERLAB_CACHE")
+    candidates = [Path(chosen)] if chosen else []
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
+    candidates.append(Path(home) / "walkerlab")
+    for folder in candidates:
+        if _writable(folder):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _open_cache() -> Path:
+    """The folder of this state of the sources; older generations beyond a few are removed."""
+    root = cache_root()
+    folder = root / f"kernels-{sources_digest()[:16]}-py{sys.version_info.major}{sys.version_info.minor}"
+    folder.mkdir(exist_ok=True)
+    os.utime(folder)
+    generations = sorted(root.glob("kernels-*"), key=_age, reverse=True)
+    for old in generations[KEPT_GENERATIONS:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return folder
+
+
+def _age(folder: Path) -> float:
+    try:
+        return folder.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+CACHE_FOLDER = _open_cache()
+
+import numba  # noqa: E402  (the cache folder is set before anything is compiled)
+from numba.extending import overload  # noqa: E402
+
+numba.config.CACHE_DIR = str(CACHE_FOLDER)
+
+
+def kernel(function: F) -> F:
+    """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    return cast(F, numba.njit(cache=True, **FLAGS)(function))
+
+
+def inlined(function: F) -> F:
+    """Compile `function` into the kernels that call it; it has no entry of its own in the cache."""
+    return cast(F, numba.njit(**FLAGS)(function))
+
+
+class ByType:
+    """A function whose body is chosen by the type of its first argument, in Python and in compiled code alike."""
+
+    def __init__(self, declaration: Callable[..., Any]) -> None:
+        """Take name and documentation from `declaration`, whose own body never runs."""
+        functools.update_wrapper(self, declaration)
+        self._bodies: dict[type, Callable[..., Any]] = {}
+
+    def __call__(self, chooser: Any, *rest: Any) -> Any:
+        """Run the body for the type of `chooser`."""
+        return self._bodies[type(chooser)](chooser, *rest)
+
+    def case(self, chosen: type) -> Callable[[F], F]:
+        """Register the decorated function as the body for first arguments of type `chosen`."""
+
+        def register(body: F) -> F:
+            self._bodies[chosen] = body
+            return body
+
+        return register
+
+
+def by_type(declaration: Callable[..., Any]) -> ByType:
+    """Declare a function that has one body per type of its first argument (a NamedTuple class).
+
+    A variant that a scene does not have compiles to nothing: the choice is made while compiling.
+    """
+    chosen = ByType(declaration)
+
+    def choose(*arguments: Any) -> Callable[..., Any] | None:
+        return chosen._bodies.get(getattr(arguments[0], "instance_class", type(None)))
+
+    overload(chosen, strict=False, jit_options=FLAGS)(choose)
+    return chosen
