@@ -1,0 +1,1 @@
+"""The walkers and the ground under them, as scalar compilable functions."""
