@@ -1,0 +1,230 @@
+"""What a stage hands over to be stored: labelled arrays in groups, and a summary; no file, no HDF5."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Attribute = str | int | float | bool
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
+"""Names of groups, variables, dimensions and attributes: what HDF5, netCDF and xarray all take unquoted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A labelled array.
+
+    values     float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
+    dims       one name for each axis; a variable named like its only dimension is that dimension's coordinate
+    units      'rad', 'N', ...; '1' for a pure number, '' for text
+    long_name  what it is, in words, for axes and tables
+    timing     measured run times: stored, but no part of the content's digest
+    missing    NaN is allowed, and marks a gap
+
+    Raises ValueError or TypeError for what cannot be stored faithfully.
+    """
+
+    values: NDArray[Any]
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    timing: bool = False
+    missing: bool = False
+
+    def __post_init__(self) -> None:
+        """Bring the values to one of the four types there are, and check the labels against them."""
+        values = canonical(self.values)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "dims", tuple(self.dims))
+        if values.ndim != len(self.dims) or len(set(self.dims)) != len(self.dims):
+            raise ValueError(f"{self.long_name!r}: shape {values.shape} does not go with dimensions {self.dims}")
+        if values.dtype.kind == "f" and not self.missing and not np.isfinite(values).all():
+            raise ValueError(f"{self.long_name!r} holds values that are not finite; leave out what was not computed")
+        check_text(self.units, self.long_name)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Variables that share dimensions, with plain attributes; one dataset for xarray."""
+
+    variables: Mapping[str, Variable]
+    attrs: Mapping[str, Attribute] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the names and attributes, and that a dimension has one length."""
+        object.__setattr__(self, "attrs", {name: plain(value) for name, value in self.attrs.items()})
+        for name in (*self.variables, *self.attrs, *self.sizes):
+            check_name(name)
+        for name, variable in self.variables.items():
+            if name in self.sizes and variable.dims != (name,):
+                raise ValueError(f"{name!r} is a dimension and a variable with other dimensions, {variable.dims}")
+        for name, value in self.attrs.items():
+            if not isinstance(value, Attribute):
+                raise TypeError(f"attribute {name!r} must be text, a bool or a number, not {value!r}")
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension; ValueError if two variables differ on it."""
+        sizes: dict[str, int] = {}
+        for name, variable in self.variables.items():
+            for dim, size in zip(variable.dims, variable.values.shape, strict=True):
+                if sizes.setdefault(dim, size) != size:
+                    raise ValueError(f"{name!r} has {size} along {dim!r}, others have {sizes[dim]}")
+        return sizes
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The values of a variable."""
+        return self.variables[name].values
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """Everything that a stage stores.
+
+    groups   by path, such as 'corrected/gaits'
+    summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
+    timed    further top-level keys of the summary that follow from timings, such as 'best'
+
+    Raises ValueError or TypeError for a summary that is not JSON or not finite, and for clashing names.
+    """
+
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    timed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Bring the summary to plain JSON types and check the paths."""
+        object.__setattr__(self, "summary", {key: plain(value) for key, value in self.summary.items()})
+        object.__setattr__(self, "timed", tuple(sorted(self.timed)))
+        check_text(*self.summary, *self.timed)
+        for path in self.groups:
+            parts = path.split("/")
+            for depth, part in enumerate(parts):
+                check_name(part)
+                parent = self.groups.get("/".join(parts[:depth]))
+                if parent is not None and (part in parent.variables or part in parent.sizes):
+                    raise ValueError(f"{path!r} is a group, and {part!r} a variable or dimension beside it")
+
+    def __getitem__(self, path: str) -> Group:
+        """The group at a path."""
+        return self.groups[path]
+
+    def digest(self) -> str:
+        """The sha256 of all that is determined by the inputs: timings are left out."""
+        return self._digest(timings=False)
+
+    def digest_with_timings(self) -> str:
+        """The sha256 of all there is."""
+        return self._digest(timings=True)
+
+    def _digest(self, timings: bool) -> str:
+        digest = hashlib.sha256()
+        for part in self._parts(timings):
+            digest.update(len(part).to_bytes(8, "little"))
+            digest.update(part)
+        return digest.hexdigest()
+
+    def _parts(self, timings: bool) -> Iterator[bytes]:
+        summary = self.summary if timings else untimed(self.summary, self.timed)
+        yield canonical_json([summary, self.timed]).encode()
+        for path, group in sorted(self.groups.items()):
+            yield canonical_json([path, dict(group.attrs)]).encode()
+            for name, variable in sorted(group.variables.items()):
+                if timings or not variable.timing:
+                    yield from variable_parts(name, variable)
+
+
+def variable_parts(name: str, variable: Variable) -> Iterator[bytes]:
+    """The bytes that stand for a variable in a digest: its labels, then its values in C order, little-endian."""
+    values = variable.values
+    label = [name, variable.dims, values.shape, values.dtype.kind, variable.units, variable.long_name]
+    yield canonical_json([*label, variable.timing, variable.missing]).encode()
+    if values.dtype.kind == "O":
+        yield canonical_json(values.ravel().tolist()).encode()
+    else:
+        yield values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+
+
+def canonical(values: ArrayLike) -> NDArray[Any]:
+    """A frozen copy as float64, int64, bool or an object array of str; TypeError for any other type."""
+    array: NDArray[Any] = np.asarray(values)
+    result: NDArray[Any]
+    kind = array.dtype.kind
+    if kind == "f":
+        result = array.astype(np.float64, order="C", casting="safe")
+    elif kind in "iu":
+        result = array.astype(np.int64, order="C", casting="safe")
+    elif kind == "b":
+        result = array.astype(np.bool_, order="C")
+    elif kind in "UTO" and all(isinstance(item, str) for item in array.ravel().tolist()):
+        result = array.astype(object, order="C")
+        check_text(*result.ravel().tolist())
+    else:
+        raise TypeError(f"cannot store values of type {array.dtype}: float, integer, bool or text only")
+    result.setflags(write=False)
+    return result
+
+
+def check_text(*texts: str) -> None:
+    """Raise ValueError for text that HDF5 would cut short or cannot encode."""
+    for text in texts:
+        if "\0" in text:
+            raise ValueError(f"text with a NUL character cannot be stored: {text[:40]!r}")
+        text.encode()
+
+
+def check_name(name: str) -> None:
+    """Raise ValueError for a name that not every reader of the file would take."""
+    if not NAME.fullmatch(name):
+        raise ValueError(f"not a name that can be stored: {name!r}")
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types; ValueError if a number is not finite, TypeError if it is no JSON."""
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        check_text(*value)
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, str):
+        check_text(value)
+        return str(value)
+    if value is None or isinstance(value, bool | int):
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return float(value)
+    if isinstance(value, float):
+        raise ValueError(f"not a finite number: {value}")
+    raise TypeError(f"not a JSON value: {value!r}")
+
+
+def untimed(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The summary without its timings, at any depth."""
+    return {key: _untimed(value) for key, value in summary.items() if key not in timed and not is_timing(key)}
+
+
+def _untimed(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return untimed(value)
+    return [_untimed(item) for item in value] if isinstance(value, list) else value
+
+
+def is_timing(key: str) -> bool:
+    """Whether a summary's key names a measured run time."""
+    return key == "wall_s" or key.endswith("_wall_s")
+
+
+def canonical_json(value: Any) -> str:
+    """JSON text that is the same for equal values: sorted keys, no spaces, shortest exact numbers."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
