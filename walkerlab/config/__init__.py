@@ -1,0 +1,1 @@
+"""Config: schema, loader with positions, layers, reference."""

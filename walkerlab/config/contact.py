@@ -1,0 +1,188 @@
+"""The contact block: numbers as ADAMS dialogs show them (N, mm, s) or in SI, and their conversion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from walkerlab.config.fields import Block, key
+
+MM_PER_M: Final = 1000.0
+
+LENGTH_BOUNDS_M: Final = (1e-12, 10.0)
+STICTION_BOUNDS_M_S: Final = (1e-7, 10.0)
+FRICTION_VELOCITY_BOUNDS_M_S: Final = (1e-7, 1000.0)
+
+_ADAMS = "ADAMS/View default; not given in the paper"
+_FIG_4B = "Fig. 4b, read in ADAMS units (science notes, section 3)"
+
+
+@dataclass(frozen=True)
+class ContactSI:
+    """The force laws of the contact in SI units, whatever the units of the config."""
+
+    stiffness_N_per_m_e: float  # noqa: N815 (a unit's capital)
+    exponent: float
+    damping_N_s_m: float  # noqa: N815
+    full_damping_penetration_m: float
+    stiction_velocity_m_s: float
+    friction_velocity_m_s: float
+    static_friction: float
+    dynamic_friction: float
+
+
+def _pitch_kind(value: Any) -> str:
+    return "word" if isinstance(value, str) else "number"
+
+
+PadPitch = Annotated[
+    Annotated[Literal["rigid", "own"], Tag("word")] | Annotated[float, Field(ge=1e-6, le=1e4), Tag("number")],
+    Discriminator(_pitch_kind),
+]
+
+
+class Contact(Block):
+    """Contact of feet and ground: normal force, friction, terrain."""
+
+    units: Annotated[
+        Literal["adams", "si"],
+        key("", "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s", "Fig. 4b"),
+    ] = "adams"
+    stiffness: Annotated[
+        float, key("N/mm^e | N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
+    ] = 1.0e5
+    exponent: Annotated[float, key("1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)] = 2.2
+    damping: Annotated[float, key("N s/mm | N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)] = (
+        90.0
+    )
+    full_damping_penetration: Annotated[
+        float, key("mm | m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0)
+    ] = 0.1
+    friction: Annotated[
+        Literal["coulomb", "none"],
+        key("", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", "Fig. 4b"),
+    ] = "coulomb"
+    static_friction: Annotated[
+        float, key("1", "coefficient at stiction_velocity, the largest", "Fig. 4b", ge=0.0, le=100.0)
+    ] = 0.9
+    dynamic_friction: Annotated[
+        float,
+        key(
+            "1",
+            "coefficient beyond friction_velocity",
+            "Fig. 4b",
+            bounds="0 to 100, not above static_friction",
+            ge=0.0,
+            le=100.0,
+        ),
+    ] = 0.7
+    stiction_velocity: Annotated[
+        float,
+        key("mm/s | m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0),
+    ] = 100.0
+    friction_velocity: Annotated[
+        float,
+        key(
+            "mm/s | m/s",
+            "slip velocity from which on friction is dynamic",
+            _ADAMS,
+            bounds="above stiction_velocity, up to 1000 m/s",
+            gt=0.0,
+        ),
+    ] = 1000.0
+    terrain: Annotated[
+        Literal["checkerboard", "after-mid-swing"],
+        key(
+            "",
+            "checkerboard: a lane of raised pads per leg; "
+            "after-mid-swing: a swing foot touches only once it has passed the stance foot",
+            "section 3",
+        ),
+    ] = "checkerboard"
+    pad_pitch: Annotated[
+        PadPitch,
+        key(
+            "m",
+            "pitch of the pads: step length of the rigid or the contact (own) gait, or a number, in m in any units",
+            "section 3",
+            bounds="rigid, own, or 1e-6 to 1e4",
+        ),
+    ] = "rigid"
+    stance: Annotated[
+        Literal["free", "pinned"],
+        key("", "pinned: a revolute joint at the first stance foot until the first heel strike", "section 3"),
+    ] = "free"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_quantities_in_si(cls, data: Any) -> Any:
+        """A key left out means the same physical quantity in either units."""
+        if not isinstance(data, dict) or data.get("units") != "si":
+            return data
+        exponent = data.get("exponent", 2.2)
+        power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
+        quantities = {
+            "stiffness": 1.0e5 * MM_PER_M**power,
+            "damping": 90.0 * MM_PER_M,
+            "full_damping_penetration": 1.0e-4,
+            "stiction_velocity": 0.1,
+            "friction_velocity": 1.0,
+        }
+        return quantities | data
+
+    @field_validator("full_damping_penetration")
+    @classmethod
+    def _penetration_within_bounds(cls, value: float, info: ValidationInfo) -> float:
+        return _within(value, LENGTH_BOUNDS_M, "m", info)
+
+    @field_validator("stiction_velocity")
+    @classmethod
+    def _stiction_velocity_within_bounds(cls, value: float, info: ValidationInfo) -> float:
+        return _within(value, STICTION_BOUNDS_M_S, "m/s", info)
+
+    @field_validator("friction_velocity")
+    @classmethod
+    def _friction_velocity_above_stiction(cls, value: float, info: ValidationInfo) -> float:
+        stiction = info.data.get("stiction_velocity")
+        if stiction is not None and value <= stiction:
+            raise PydanticCustomError("order", "must exceed stiction_velocity, {least}", {"least": f"{stiction:g}"})
+        return _within(value, FRICTION_VELOCITY_BOUNDS_M_S, "m/s", info)
+
+    @field_validator("dynamic_friction")
+    @classmethod
+    def _dynamic_not_above_static(cls, value: float, info: ValidationInfo) -> float:
+        static = info.data.get("static_friction")
+        if static is not None and value > static:
+            raise PydanticCustomError("order", "must not exceed static_friction, {static}", {"static": f"{static:g}"})
+        return value
+
+    def in_si(self) -> ContactSI:
+        """The force laws in SI units."""
+        scale = MM_PER_M if self.units == "adams" else 1.0
+        return ContactSI(
+            stiffness_N_per_m_e=self.stiffness * scale**self.exponent,
+            exponent=self.exponent,
+            damping_N_s_m=self.damping * scale,
+            full_damping_penetration_m=self.full_damping_penetration / scale,
+            stiction_velocity_m_s=self.stiction_velocity / scale,
+            friction_velocity_m_s=self.friction_velocity / scale,
+            static_friction=self.static_friction,
+            dynamic_friction=self.dynamic_friction,
+        )
+
+
+def _within(value: float, bounds_si: tuple[float, float], unit: str, info: ValidationInfo) -> float:
+    """Refuse a length or velocity outside its bounds, which are the same physical ones in either units."""
+    adams = info.data.get("units", "adams") == "adams"
+    scale, prefix = (MM_PER_M, "m") if adams else (1.0, "")
+    low, high = (bound * scale for bound in bounds_si)
+    if low <= value <= high:
+        return value
+    raise PydanticCustomError(
+        "bounds",
+        "must be from {low} to {high} {unit}, as `units: {units}` has it",
+        {"low": f"{low:g}", "high": f"{high:g}", "unit": prefix + unit, "units": "adams" if adams else "si"},
+    )

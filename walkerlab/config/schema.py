@@ -1,0 +1,212 @@
+"""The config's keys: types, units, bounds, defaults, meaning and source. The defaults are the paper's."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Final, Literal, get_args
+
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from walkerlab.config.contact import Contact, ContactSI
+from walkerlab.config.fields import Block, key
+
+__all__ = [
+    "METHODS",
+    "OUTPUTS",
+    "CompassWalker",
+    "Config",
+    "Contact",
+    "ContactSI",
+    "ContactSolver",
+    "Equations",
+    "Method",
+    "Output",
+    "RigidSolver",
+    "SlopeDeg",
+    "SolverSettings",
+    "Solvers",
+    "State",
+]
+
+Equations = Literal["corrected", "as-printed"]
+Output = Literal["states", "energies", "forces"]
+Method = Literal["dop853", "radau5", "scipy-rk45", "scipy-dop853", "scipy-lsoda", "scipy-radau", "scipy-bdf"]
+
+OUTPUTS: Final[tuple[Output, ...]] = get_args(Output)
+METHODS: Final[tuple[Method, ...]] = get_args(Method)
+
+RIGHT_ANGLE: Final = math.pi / 2
+
+SlopeDeg = Annotated[
+    float,
+    key("deg", "slope in degrees; one of slope_rad and slope_deg in a file", "section 2", gt=-90.0, lt=90.0),
+]
+
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
+Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
+State = tuple[Angle, Angle, Rate, Rate]
+
+
+def _start_kind(value: Any) -> str:
+    return "state" if isinstance(value, list | tuple) else "word"
+
+
+Start = Annotated[
+    Annotated[Literal["fixed-point"], Tag("word")] | Annotated[State, Field(strict=False), Tag("state")],
+    Discriminator(_start_kind),
+]
+
+
+def _middle_of_the_leg(data: dict[str, Any]) -> float:
+    return float(data.get("leg_length_m", 1.0)) / 2
+
+
+class CompassWalker(Block):
+    """Two straight legs, each with a mass on it, and a mass at the hip."""
+
+    type: Annotated[Literal["compass"], key("", "kind of walker", "Fig. 1")] = "compass"
+    leg_length_m: Annotated[float, key("m", "L, from foot to hip", "Table 1", ge=1e-3, le=1e3)] = 1.0
+    foot_to_mass_m: Annotated[
+        float,
+        key(
+            "m",
+            "a, from foot to leg mass; b = L - a is the rest",
+            "Table 1: 'middle of the legs', L/2 when left out",
+            bounds="between 0 and leg_length_m, both excluded",
+            gt=0.0,
+        ),
+    ] = Field(default_factory=_middle_of_the_leg)
+    leg_mass_kg: Annotated[float, key("kg", "m, mass of one leg", "Table 1", ge=1e-6, le=1e6)] = 5.0
+    hip_mass_kg: Annotated[float, key("kg", "M_H, mass at the hip", "Table 1", ge=0.0, le=1e6)] = 10.0
+    leg_inertia_kg_m2: Annotated[
+        float,
+        key("kg m^2", "inertia of one leg about its own centre of mass", "the paper has point masses", ge=0.0, le=1e9),
+    ] = 0.0
+    foot_radius_m: Annotated[
+        float,
+        key(
+            "m",
+            "radius of the ball foot of the physical model, 0 is a point; its centre is L - r from the hip",
+            "chosen small; not given in the paper",
+            bounds="from 0 to below leg_length_m / 2",
+            ge=0.0,
+        ),
+    ] = 0.001
+
+    @field_validator("foot_to_mass_m")
+    @classmethod
+    def _mass_lies_on_the_leg(cls, value: float, info: ValidationInfo) -> float:
+        length = info.data.get("leg_length_m")
+        if length is None or value < length:
+            return value
+        if value == length:
+            reason = (
+                "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
+                "must be below leg_length_m, {length}"
+            )
+        else:
+            reason = "must be below leg_length_m, {length}"
+        raise PydanticCustomError("off-leg", reason, {"length": f"{length:g}"})
+
+    @field_validator("foot_radius_m")
+    @classmethod
+    def _foot_is_smaller_than_half_a_leg(cls, value: float, info: ValidationInfo) -> float:
+        length = info.data.get("leg_length_m")
+        if length is not None and value >= length / 2:
+            raise PydanticCustomError("foot", "must be below half of leg_length_m, {half}", {"half": f"{length / 2:g}"})
+        return value
+
+    @property
+    def mass_to_hip_m(self) -> float:
+        """b = L - a, m."""
+        return self.leg_length_m - self.foot_to_mass_m
+
+    @property
+    def total_mass_kg(self) -> float:
+        """Two legs and the hip, kg."""
+        return 2 * self.leg_mass_kg + self.hip_mass_kg
+
+
+_TOLERANCE = "the measured error against run time"
+
+
+class SolverSettings(Block):
+    """How one model is integrated."""
+
+    method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "dop853"
+    rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-10
+    atol: Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _TOLERANCE, gt=0.0, le=1.0)] = 1.0e-12
+
+
+class RigidSolver(SolverSettings):
+    """How the rigid model is integrated."""
+
+
+class ContactSolver(SolverSettings):
+    """How the physical model is integrated."""
+
+    method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "radau5"
+    rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-7
+    atol: Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _TOLERANCE, gt=0.0, le=1.0)] = 1.0e-9
+
+
+class Solvers(Block):
+    """Solver settings of each model."""
+
+    rigid: RigidSolver = RigidSolver()
+    contact: ContactSolver = ContactSolver()
+
+
+class Config(Block):
+    """A scene and what is to be computed of it."""
+
+    name: Annotated[
+        str,
+        key(
+            "",
+            "name of the run folder; the file's own name when left out",
+            "this project",
+            bounds="1 to 64 letters, digits, '.', '_' or '-', a letter or digit at both ends",
+        ),
+        Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,62}[A-Za-z0-9])?$"),
+    ] = "paper"
+    walker: CompassWalker = CompassWalker()
+    gravity_m_s2: Annotated[float, key("m/s^2", "g", "standard gravity, rounded", ge=1e-6, le=1e4)] = 9.81
+    slope_rad: Annotated[
+        float,
+        key(
+            "rad",
+            "slope, positive where it descends in the walking direction",
+            "the paper's x_p sums to -2 * 0.0174",
+            gt=-RIGHT_ANGLE,
+            lt=RIGHT_ANGLE,
+        ),
+    ] = 0.0174
+    equations: Annotated[
+        Equations,
+        key("", "corrected, or as-printed: Appendix A as the paper prints it", "science notes, section 2"),
+    ] = "corrected"
+    start: Annotated[
+        Start,
+        key(
+            "rad, rad, rad/s, rad/s",
+            "fixed-point, or [theta_1, theta_2, dtheta_1, dtheta_2]; "
+            "theta_1 is replaced so that both feet stand on the slope",
+            "eq. 11",
+            bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
+        ),
+    ] = "fixed-point"
+    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", "section 4", ge=1, le=10_000)] = 5
+    contact: Contact | None = None
+    solver: Solvers = Solvers()
+    outputs: Annotated[
+        tuple[Output, ...],
+        key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
+    ] = OUTPUTS
+    seed: Annotated[int, key("1", "seed of everything that is drawn at random", "this project", ge=0, le=2**32 - 1)] = 0
+
+    @field_validator("outputs")
+    @classmethod
+    def _outputs_once_and_in_order(cls, value: tuple[Output, ...]) -> tuple[Output, ...]:
+        return tuple(output for output in OUTPUTS if output in value)

@@ -1,0 +1,59 @@
+"""What can go wrong for a user, each with the exit code of the command line; everything else is a bug."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class WalkerlabError(Exception):
+    """A failure that the user can act on.
+
+    message  what happened, in words
+    advice   what to do next; empty if there is nothing to advise
+    """
+
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, message: str, advice: str = "") -> None:
+        """Say what happened and, where there is something to do, what to do next."""
+        super().__init__(message)
+        self.message = message
+        self.advice = advice
+
+
+class ConfigError(WalkerlabError):
+    """The config (file, `extends`, `--set`) is not usable; nothing was run."""
+
+    exit_code = 3
+
+
+class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)
+    """The computation has no answer: no gait found, solver failed, budget exhausted.
+
+    partial  what was computed until then (a `store.content.Content`), or None
+    """
+
+    exit_code = 4
+
+    def __init__(self, message: str, advice: str = "", partial: object | None = None) -> None:
+        """Say what happened and hand over what there is."""
+        super().__init__(message, advice)
+        self.partial = partial
+
+
+class StorageError(WalkerlabError):
+    """A result could not be stored: full disk, read-only folder."""
+
+    exit_code = 4
+
+
+class StaleError(WalkerlabError):
+    """An artifact is stale or missing (`status --check`)."""
+
+    exit_code = 5
+
+
+class LockedError(WalkerlabError):
+    """Another process holds the run folder (`--no-wait`)."""
+
+    exit_code = 6
