@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import types
+from collections.abc import Iterator
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
+
+from walkerlab.config.numbers import short
 
 
 class Block(BaseModel):
@@ -30,3 +35,84 @@ def key(unit: str, meaning: str, source: str, *, bounds: str = "", sequence: boo
     if sequence:
         settings["strict"] = False
     return Field(**settings)
+
+
+def block_of(field: FieldInfo) -> type[Block] | None:
+    """The block that a key holds, or None if it holds a value."""
+    for candidate in (field.annotation, *get_args(field.annotation)):
+        if isinstance(candidate, type) and issubclass(candidate, Block):
+            return candidate
+    return None
+
+
+def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
+    """Path and field of every value in `block`, in the order of the schema."""
+    for name, field in block.model_fields.items():
+        inner = block_of(field)
+        if inner is None:
+            yield (*prefix, name), field
+        else:
+            yield from leaves(inner, (*prefix, name))
+
+
+def extra(field: FieldInfo, name: str) -> str:
+    """`unit`, `source` or `bounds` of a key as `key` was given it; empty if it was not."""
+    held = field.json_schema_extra
+    return str(held.get(name, "")) if isinstance(held, dict) else ""
+
+
+_KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", bool: "true | false"}
+_SIGNS: Final = (("ge", "from"), ("gt", "above"), ("le", "up to"), ("lt", "below"))
+
+
+def kind(annotation: Any) -> str:
+    """Type of a value in words: number, integer, text, word, list or a choice of them."""
+    if annotation in _KINDS:
+        return _KINDS[annotation]
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return kind(get_args(annotation)[0])
+    if origin is Literal:
+        return "word"
+    if origin is tuple:
+        return "list"
+    if origin in (Union, types.UnionType):
+        return " | ".join(dict.fromkeys(kind(part) for part in get_args(annotation)))
+    return "block"
+
+
+def words_of(field: FieldInfo) -> tuple[str, ...]:
+    """The words that a key allows, also inside a list or beside numbers; empty if it allows none."""
+    return tuple(_words(field.annotation))
+
+
+def _words(annotation: Any) -> Iterator[str]:
+    if get_origin(annotation) is Literal:
+        yield from (word for word in get_args(annotation) if isinstance(word, str))
+        return
+    for part in get_args(annotation):
+        yield from _words(part)
+
+
+def bounds_of(field: FieldInfo) -> str:
+    """What a key allows, in words and without its unit, e.g. `from 0.001 to 1000`; empty if there are no bounds."""
+    spoken = extra(field, "bounds")
+    if spoken:
+        return spoken
+    if get_origin(field.annotation) is Literal:
+        return " | ".join(words_of(field))
+    limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
+    if limits.keys() == {"ge", "le"}:
+        return f"from {short(limits['ge'])} to {short(limits['le'])}"
+    return ", ".join(f"{word} {short(limits[sign])}" for sign, word in _SIGNS if sign in limits)
+
+
+def allowed(field: FieldInfo) -> str:
+    """What a key allows, with kind and unit, for a message."""
+    if block_of(field) is not None:
+        return "a block of keys"
+    bounds, unit = bounds_of(field), extra(field, "unit")
+    if kind(field.annotation) == "word":
+        return bounds
+    text = f"{kind(field.annotation)}, {bounds}" if bounds else kind(field.annotation)
+    return f"{text} ({unit})" if unit not in ("", "1") else text

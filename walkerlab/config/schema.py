@@ -179,6 +179,7 @@ class Config(Block):
             "rad",
             "slope, positive where it descends in the walking direction",
             "the paper's x_p sums to -2 * 0.0174",
+            bounds="between -pi/2 and pi/2, both excluded",
             gt=-RIGHT_ANGLE,
             lt=RIGHT_ANGLE,
         ),
