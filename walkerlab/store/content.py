@@ -49,6 +49,8 @@ class Variable:
             raise ValueError(f"{self.long_name!r}: shape {values.shape} does not go with dimensions {self.dims}")
         if values.dtype.kind == "f" and not self.missing and not np.isfinite(values).all():
             raise ValueError(f"{self.long_name!r} holds values that are not finite; leave out what was not computed")
+        if values.dtype.kind == "O" and values.ndim > 1:
+            raise ValueError(f"{self.long_name!r}: text has at most one dimension")
         check_text(self.units, self.long_name)
 
 

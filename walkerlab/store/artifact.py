@@ -1,0 +1,181 @@
+"""A stage's result as one HDF5 file: written whole or not at all, accepted only if it is what it says it is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from walkerlab.store import hdf5
+from walkerlab.store.content import Content, canonical_json
+from walkerlab.store.files import read_bounded, write_atomically
+from walkerlab.store.key import SCHEMA_VERSION, Identity
+from walkerlab.store.provenance import Provenance
+
+LIMIT_BYTES = 1 << 30
+"""No artifact is larger: a file that says so is not read, and a result that would be is not stored."""
+
+
+class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
+    """A file is not an artifact that can be trusted; the text says why."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stored(Content):
+    """The content of an artifact as read back, with what it was determined by and where it comes from.
+
+    complete  False for the partial results of a stage that found no answer
+    seal      digest of everything in the file, provenance and timings included
+    """
+
+    identity: Identity
+    provenance: Provenance
+    complete: bool
+    seal: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a file is the artifact that a key asks for.
+
+    reason    in words; empty if accepted
+    artifact  what was read, also when it belongs to another key; None if missing or damaged
+    damaged   there is a file, and it is not to be trusted
+    """
+
+    accepted: bool
+    reason: str
+    artifact: Stored | None = None
+    damaged: bool = False
+
+
+def write(path: Path, content: Content, identity: Identity, provenance: Provenance, complete: bool = True) -> Stored:
+    """Store a result at `path`, replacing what is there in one step.
+
+    Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
+    """
+    root = root_attributes(content, identity, provenance, complete)
+    seal = sealed(root, content)
+    write_atomically(path, hdf5.image(content.groups, {**root, "seal": seal}))
+    return Stored(
+        groups=content.groups,
+        summary=content.summary,
+        timed=content.timed,
+        identity=identity,
+        provenance=provenance,
+        complete=complete,
+        seal=seal,
+    )
+
+
+def read(path: Path) -> Stored:
+    """The artifact at `path`.
+
+    Raises FileNotFoundError if there is none, and Damaged for whatever is not intact: cut short, altered, hostile.
+    """
+    try:
+        groups, root = hdf5.parse(read_bounded(path, LIMIT_BYTES))
+        return unsealed(groups, root)
+    except (FileNotFoundError, Damaged):
+        raise
+    except OSError as error:
+        raise Damaged(f"it cannot be read: {error.strerror or error}") from error
+    except Exception as error:
+        # Whatever a library makes of bytes that nobody vouches for is a finding about the file.
+        raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
+
+
+def check(path: Path, key: str) -> Verdict:
+    """Whether the file at `path` is intact and is the artifact for `key`; never raises for what the file may be."""
+    try:
+        artifact = read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return Verdict(False, "missing")
+    except Damaged as error:
+        return Verdict(False, f"damaged: {error}", damaged=True)
+    if artifact.identity.key != key:
+        return Verdict(False, "made for another key", artifact)
+    return Verdict(True, "", artifact)
+
+
+def root_attributes(
+    content: Content, identity: Identity, provenance: Provenance, complete: bool
+) -> dict[str, str | int | bool]:
+    """What stands at the root of the file: all but the arrays, and but the seal."""
+    root: dict[str, str | int | bool] = {
+        "stage": identity.stage,
+        "stage_key": identity.key,
+        "schema_version": identity.schema_version,
+        "config_slice": canonical_json(dict(identity.config_slice)),
+        "input_keys": canonical_json(dict(identity.input_keys)),
+        "code_digest": identity.code_digest,
+        "config": provenance.config,
+        "command_line": provenance.command_line,
+        "seed": provenance.seed,
+        "started_utc": provenance.started_utc,
+        "ended_utc": provenance.ended_utc,
+        "platform": provenance.platform,
+        "package_version": provenance.package_version,
+        "library_versions": canonical_json(dict(provenance.library_versions)),
+        "input_digests": canonical_json(dict(provenance.input_digests)),
+        "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
+        "summary_timed": canonical_json(content.timed),
+        "content_digest": content.digest(),
+        "complete": complete,
+    }
+    if provenance.git_commit is not None:
+        root["git_commit"] = provenance.git_commit
+    return root
+
+
+def unsealed(groups: Mapping[str, Any], root: Mapping[str, Any]) -> Stored:
+    """The artifact made of a file's parts; Damaged if they do not agree with their digests."""
+    if root.get("schema_version") != SCHEMA_VERSION:
+        raise Damaged(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
+    identity = Identity(
+        stage=root["stage"],
+        config_slice=json.loads(root["config_slice"]),
+        input_keys=json.loads(root["input_keys"]),
+        code_digest=root["code_digest"],
+    )
+    provenance = Provenance(
+        config=root["config"],
+        command_line=root["command_line"],
+        seed=root["seed"],
+        started_utc=root["started_utc"],
+        ended_utc=root["ended_utc"],
+        platform=root["platform"],
+        package_version=root["package_version"],
+        library_versions=json.loads(root["library_versions"]),
+        git_commit=root.get("git_commit"),
+        input_digests=json.loads(root["input_digests"]),
+    )
+    artifact = Stored(
+        groups=groups,
+        summary=json.loads(root["summary_json"]),
+        timed=tuple(json.loads(root["summary_timed"])),
+        identity=identity,
+        provenance=provenance,
+        complete=root["complete"],
+        seal=root["seal"],
+    )
+    if artifact.digest() != root["content_digest"]:
+        raise Damaged("its content does not have the digest that it was stored with")
+    if sealed({name: value for name, value in root.items() if name != "seal"}, artifact) != artifact.seal:
+        raise Damaged("its attributes or timings do not have the digest that they were stored with")
+    if identity.key != root["stage_key"]:
+        raise Damaged("its key is not that of the config, inputs and code it names")
+    return artifact
+
+
+def sealed(root: Mapping[str, Any], content: Content) -> str:
+    """The digest of everything in a file."""
+    return canonical_digest([dict(root), content.digest_with_timings()])
+
+
+def canonical_digest(value: Any) -> str:
+    """The sha256 of a JSON value."""
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()

@@ -1,0 +1,161 @@
+"""Digest of the code that a module runs: its source and that of all it imports from its own package."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import re
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+
+PACKAGE = __name__.partition(".")[0]
+
+# Found in the text rather than by importing: the digest must cost milliseconds and load no compiler. Full names in
+# quotes count too, since that is how a registry names what it imports late.
+COMMENT = re.compile(r"#[^\n]*")
+IMPORT = re.compile(
+    r"\bfrom[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
+    r"|\bimport[ \t]+(?P<modules>[\w., \t]+)"
+    r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
+)
+
+# The built-in configs reach a stage through the slice of the config that it reads, which is in its key already.
+INPUT_FOLDERS = ("config/builtin",)
+
+
+class Sources:
+    """The sources of packages as they are on the disk now; each file is read and scanned once."""
+
+    def __init__(self) -> None:
+        """Start with nothing read."""
+        self._modules: dict[str, Module | None] = {}
+
+    def code_digest(self, name: str) -> str:
+        """The sha256 over the sources of a module and of everything of its own package, or of this one, it imports.
+
+        Data files beside those modules (templates, tables) count as code. Raises ModuleNotFoundError if there is
+        no such module.
+        """
+        closure = self.closure(name)
+        files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
+        digest = hashlib.sha256()
+        for module in closure:
+            digest.update(f"{module.name}\0{len(module.text)}\0".encode() + module.text)
+        for label, path in sorted(files.items()):
+            data = path.read_bytes()
+            digest.update(f"{label}\0{len(data)}\0".encode() + data)
+        return digest.hexdigest()
+
+    def closure(self, name: str) -> list[Module]:
+        """The module and all it imports, by whatever way, from its own package and from this one; sorted by name."""
+        start = self.module(name)
+        if start is None:
+            raise ModuleNotFoundError(f"no module named {name!r}", name=name)
+        found = {name: start}
+        waiting = [start]
+        while waiting:
+            for other in waiting.pop().imports:
+                module = self.module(other)
+                if module is not None and other not in found:
+                    found[other] = module
+                    waiting.append(module)
+        return [found[key] for key in sorted(found)]
+
+    def module(self, name: str) -> Module | None:
+        """A module by its full name, or None if there is no file for it."""
+        if name not in self._modules:
+            self._modules[name] = self._find(name)
+        return self._modules[name]
+
+    def _find(self, name: str) -> Module | None:
+        parent, _, last = name.rpartition(".")
+        if not parent:
+            spec = importlib.util.find_spec(last)
+            path = None if spec is None or spec.origin is None else Path(spec.origin)
+            return Module(name, path) if path is not None and path.suffix == ".py" else None
+        package = self.module(parent)
+        if package is None or not package.is_package:
+            return None
+        folder = package.path.parent
+        for path in (folder / last / "__init__.py", folder / f"{last}.py"):
+            if path.is_file():
+                return Module(name, path)
+        return None
+
+
+class Module:
+    """A module's source file."""
+
+    def __init__(self, name: str, path: Path) -> None:
+        """Nothing is read yet."""
+        self.name = name
+        self.path = path
+        self.is_package = path.name == "__init__.py"
+
+    @cached_property
+    def text(self) -> bytes:
+        """The source."""
+        return self.path.read_bytes()
+
+    @cached_property
+    def imports(self) -> list[str]:
+        """Names that may be modules it imports, the packages above them and above itself included."""
+        names = {self.name, *self._imported(COMMENT.sub("", self.text.decode()).replace("\\\n", " "))}
+        own = {PACKAGE, self.name.partition(".")[0]}
+        return sorted({prefix for name in names if name.partition(".")[0] in own for prefix in prefixes(name)})
+
+    def _imported(self, text: str) -> Iterator[str]:
+        for found in IMPORT.finditer(text):
+            if found["quoted"]:
+                yield found["quoted"]
+            elif found["modules"]:
+                yield from first_words(found["modules"])
+            else:
+                origin = self._absolute(found["origin"])
+                yield origin
+                yield from (f"{origin}.{name}" for name in first_words(found["names"].strip("() \t\n")))
+
+    def _absolute(self, origin: str) -> str:
+        """The full name of what follows `from`, be it relative."""
+        name = origin.lstrip(".")
+        levels = len(origin) - len(name)
+        if not levels:
+            return name
+        parts = self.name.split(".")
+        above = parts[: len(parts) - levels + self.is_package]
+        return ".".join([*above, name] if name else above)
+
+    @cached_property
+    def data(self) -> list[Path]:
+        """Files of a package that are not Python, in its folder and in folders below that are no packages."""
+        return sorted(data_files(self.path.parent)) if self.is_package else []
+
+
+def data_files(folder: Path) -> Iterator[Path]:
+    """The files that a package's code may read: all but Python, caches, hidden files and built-in configs."""
+    for path in folder.iterdir():
+        if path.name.startswith((".", "__pycache__")) or path.as_posix().endswith(INPUT_FOLDERS):
+            continue
+        if path.is_dir():
+            if not (path / "__init__.py").exists():
+                yield from data_files(path)
+        elif path.suffix not in {".py", ".pyc", ".pyi", ".so", ".md"} and path.name != "py.typed":
+            yield path
+
+
+def first_words(listed: str) -> Iterator[str]:
+    """The names in 'a, b as c'."""
+    yield from (entry.split()[0] for entry in listed.split(",") if entry.strip())
+
+
+def prefixes(name: str) -> Iterator[str]:
+    """The name of a module and of each package above it."""
+    parts = name.split(".")
+    for end in range(1, len(parts) + 1):
+        yield ".".join(parts[:end])
+
+
+def code_digest(name: str) -> str:
+    """The digest of one module's code, read now; see `Sources.code_digest`."""
+    return Sources().code_digest(name)

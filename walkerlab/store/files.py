@@ -1,0 +1,110 @@
+"""Whole files, replaced in one step or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from walkerlab.errors import StorageError
+
+TEMPORARY = ".*.tmp"
+"""What the temporary files of writers look like; those found under the run folder's lock have no owner any more."""
+
+ADVICE = {
+    errno.ENOSPC: "Free some space, or choose another folder with --runs.",
+    errno.EDQUOT: "Free some of your quota, or choose another folder with --runs.",
+    errno.EFBIG: "The limit on file sizes (ulimit -f) is too small for this result.",
+    errno.EROFS: "Choose a folder that can be written with --runs.",
+    errno.EACCES: "Choose a folder that can be written with --runs.",
+    errno.EPERM: "Choose a folder that can be written with --runs.",
+    errno.ENOTDIR: "A file stands where a folder is needed; choose another folder with --runs.",
+    errno.EEXIST: "A file stands where a folder is needed; choose another folder with --runs.",
+    errno.EISDIR: "A folder stands where the result belongs; move it away.",
+    errno.ENAMETOOLONG: "Choose a shorter folder with --runs, or a shorter name in the config.",
+    errno.EIO: "The disk reports an error; choose another folder with --runs.",
+}
+
+
+@contextlib.contextmanager
+def storing(path: Path) -> Iterator[None]:
+    """Turn the operating system's refusals to store at `path` into StorageError; other errors pass."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in ADVICE:
+            raise
+        reason = error.strerror or str(error)
+        raise StorageError(f"{path} could not be stored: {reason}.", ADVICE[error.errno]) from error
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Put a file in place, complete and on the disk, or leave what was there untouched.
+
+    Raises StorageError if the system refuses (full disk, read-only folder, ...).
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    with storing(path):
+        try:
+            with temporary.open("xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+        sync_folder(path.parent)
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and its parents; StorageError if the system refuses."""
+    with storing(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def sync_folder(path: Path) -> None:
+    """Have a folder's entries on the disk, where the system has a call for it."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def read_bounded(path: Path, limit: int) -> bytes:
+    """The bytes of a regular file of at most `limit` bytes; ValueError for anything else, OSError if unreadable."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise ValueError("not a regular file")
+        if status.st_size > limit:
+            raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
+        return file.read(limit + 1)
+
+
+def file_digest(path: Path) -> str | None:
+    """The sha256 of a file's bytes, or None if there is no such file to read."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return None
+
+
+def remove_leftovers(folder: Path) -> list[Path]:
+    """Remove temporary files whose writers died, in a folder and below; to be called under its lock only."""
+    leftovers = sorted(path for path in folder.rglob(TEMPORARY) if path.is_file())
+    for path in leftovers:
+        with storing(path):
+            path.unlink(missing_ok=True)
+    return leftovers

@@ -1,0 +1,218 @@
+"""Content as the bytes of an HDF5 file that xarray opens, and back; made and read in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.store.content import Attribute, Group, Variable
+
+# What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
+BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
+TEXT = h5py.string_dtype()
+MOST_LEVELS = 16
+STRINGS_AT_ONCE = 64
+LEAST_BYTES = 32
+"""What a member of a group takes in a file at least: a bound on how many there can be, links in circles included."""
+
+
+def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
+    """The bytes of an HDF5 file with these groups, by path, and these root attributes.
+
+    Made in memory, so that a full disk is met by an ordinary write and not inside the HDF5 library.
+    """
+    # No file of that name is touched: the memory driver has no backing store.
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        for name, value in root.items():
+            file.attrs[name] = value
+        for path, group in sorted(content.items()):
+            write_group(file.require_group(path), group)
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def write_group(target: Any, group: Group) -> None:
+    """Write variables, the dimensions they share, and attributes into an open HDF5 group."""
+    for name, value in group.attrs.items():
+        target.attrs[name] = value
+    scales = {dim: write_dimension(target, dim, size, group) for dim, size in group.sizes.items()}
+    for name, variable in group.variables.items():
+        dataset = scales[name] if name in scales else write_variable(target, name, variable)
+        if name not in scales:
+            for axis, dim in enumerate(variable.dims):
+                dataset.dims[axis].attach_scale(scales[dim])
+
+
+def write_dimension(target: Any, name: str, size: int, group: Group) -> Any:
+    """Write a dimension, with its coordinate if there is one."""
+    if name in group.variables:
+        dataset = write_variable(target, name, group.variables[name])
+        dataset.make_scale(name)
+    else:
+        dataset = target.create_dataset(name, shape=(size,), dtype="i1")
+        dataset.make_scale(f"{BARE_DIMENSION}{size:10d}")
+    return dataset
+
+
+def write_variable(target: Any, name: str, variable: Variable) -> Any:
+    """Write one array with its labels."""
+    values, kind = variable.values, variable.values.dtype.kind
+    if kind == "O":
+        dataset = target.create_dataset(name, data=values, dtype=TEXT)
+    else:
+        # Truth values as bytes, marked as xarray marks them: netCDF has no such type.
+        dataset = target.create_dataset(name, data=values.astype({"f": "<f8", "i": "<i8", "b": "i1"}[kind]))
+    dataset.attrs["units"] = variable.units
+    dataset.attrs["long_name"] = variable.long_name
+    if kind == "b":
+        dataset.attrs["dtype"] = "bool"
+    for mark in ("timing", "missing"):
+        if getattr(variable, mark):
+            dataset.attrs[mark] = 1
+    return dataset
+
+
+def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
+    """The groups, by path, and the root attributes in the bytes of a file; for bytes that nobody vouches for.
+
+    Nothing is read that declares more than the file can hold. Raises ValueError for what `image` does not write,
+    and whatever the HDF5 library raises for what is no HDF5.
+    """
+    with h5py.File(h5py.h5f.open_file_image(data)) as file:
+        root = dict(read_attributes(file))
+        groups = dict(walk_groups(file, "", Budget(len(data))))
+    return groups, root
+
+
+class Budget:
+    """How many more bytes a file of this size can hold."""
+
+    def __init__(self, size: int) -> None:
+        """Start with the size of the file, in bytes."""
+        self.left = size
+
+    def spend(self, size: int) -> None:
+        """Raise ValueError once more is declared than there is."""
+        self.left -= size
+        if self.left < 0:
+            raise ValueError("it declares more data than the file holds")
+
+
+def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
+    """Every group below a group, by path; those that only lead to others are not named."""
+    if path.count("/") >= MOST_LEVELS:
+        raise ValueError("its groups are nested too deeply")
+    variables: dict[str, Variable] = {}
+    nested = False
+    for name in parent:
+        budget.spend(LEAST_BYTES)
+        if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"it holds a link, {name!r}")
+        member = parent[name]
+        if isinstance(member, h5py.Group):
+            nested = True
+            yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
+        elif not is_bare_dimension(member):
+            variables[name] = read_variable(name, member, budget)
+    if path:
+        attrs = dict(read_attributes(parent))
+        if variables or attrs or not nested:
+            yield path, Group(variables, attrs)
+    elif variables:
+        raise ValueError("it holds arrays outside any group")
+
+
+def is_bare_dimension(dataset: Any) -> bool:
+    """Whether a dataset stands for a dimension's length only."""
+    return "NAME" in dataset.attrs and read_text(dataset, "NAME").startswith(BARE_DIMENSION)
+
+
+def read_variable(name: str, dataset: Any, budget: Budget) -> Variable:
+    """One array with its labels."""
+    values = read_values(name, dataset, budget)
+    if read_text(dataset, "dtype", "") == "bool":
+        values = values.astype(np.bool_)
+    return Variable(
+        values,
+        dims=read_dims(name, dataset),
+        units=read_text(dataset, "units"),
+        long_name=read_text(dataset, "long_name"),
+        timing="timing" in dataset.attrs,
+        missing="missing" in dataset.attrs,
+    )
+
+
+def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
+    """The values of a dataset, once its declared size is known to be in the file."""
+    layout = dataset.id.get_create_plist()
+    if layout.get_layout() not in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT) or layout.get_external_count():
+        raise ValueError(f"the layout of {name!r} is not one that is written here")
+    if dataset.shape is None:
+        raise ValueError(f"{name!r} has no shape")
+    dtype = dataset.dtype
+    budget.spend(int(dataset.size) * int(dtype.itemsize))
+    if is_text(dtype):
+        return read_strings(dataset, budget)
+    if dtype not in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("i1")):
+        raise ValueError(f"{name!r} has type {dtype}, which is not written here")
+    return np.asarray(dataset[()])
+
+
+def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
+    """The strings of a dataset, a few at a time: many may point to one long text."""
+    if dataset.ndim == 0:
+        return np.array(dataset[()].decode(), dtype=object)
+    if dataset.ndim > 1:
+        raise ValueError("it holds text in more than one dimension, which is not written here")
+    values = np.empty(dataset.size, dtype=object)
+    for start in range(0, dataset.size, STRINGS_AT_ONCE):
+        texts = dataset[start : start + STRINGS_AT_ONCE]
+        budget.spend(sum(len(text) for text in texts))
+        values[start : start + STRINGS_AT_ONCE] = [text.decode() for text in texts]
+    return values
+
+
+def read_dims(name: str, dataset: Any) -> tuple[str, ...]:
+    """The names of a dataset's dimensions."""
+    if dataset.is_scale:
+        return (name,)
+    return tuple(axis[0].name.rpartition("/")[2] for axis in dataset.dims)
+
+
+def read_attributes(holder: Any) -> Iterator[tuple[str, Attribute]]:
+    """The attributes of a group, each one text or one number."""
+    for name in holder.attrs:
+        yield name, read_attribute(holder, name)
+
+
+def read_attribute(holder: Any, name: str) -> Attribute:
+    """One attribute in Python's own type; ValueError if it is of a type that is not written here."""
+    declared = holder.attrs.get_id(name)
+    known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
+    if declared.shape != () or not known:
+        raise ValueError(f"its attribute {name!r} is of a type that is not written here")
+    value = holder.attrs[name]
+    plain: Attribute = value if isinstance(value, str) else value.item()
+    return plain
+
+
+def read_text(holder: Any, name: str, default: str | None = None) -> str:
+    """A text attribute; `default`, if there is one, where it is absent."""
+    if default is not None and name not in holder.attrs:
+        return default
+    value = holder.attrs[name]
+    if isinstance(value, bytes):
+        return value.decode()
+    if not isinstance(value, str):
+        raise ValueError(f"its attribute {name!r} is no text")
+    return value
+
+
+def is_text(dtype: Any) -> bool:
+    """Whether a type in a file is text of any length."""
+    text = h5py.check_string_dtype(dtype)
+    return text is not None and text.length is None

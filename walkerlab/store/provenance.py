@@ -1,0 +1,105 @@
+"""Where a result comes from: software, machine, time, command; recorded, and no part of what determines it."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import platform
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import walkerlab
+
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
+"""The libraries whose versions are recorded: those that numbers and figures may depend on."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a result came about.
+
+    config         the resolved config, as YAML text
+    command_line   as typed
+    seed           of everything random
+    started_utc, ended_utc   ISO 8601
+    platform       operating system, processor, Python
+    package_version, library_versions
+    git_commit     of the source tree the package runs from, '-dirty' if it was changed; None if it is not in one
+    input_digests  digest of each input's content, by stage
+    """
+
+    config: str
+    command_line: str
+    seed: int
+    started_utc: str
+    ended_utc: str
+    platform: str
+    package_version: str
+    library_versions: Mapping[str, str]
+    git_commit: str | None = None
+    input_digests: Mapping[str, str] = field(default_factory=dict)
+
+    def until_now(self) -> Provenance:
+        """The same, ended now."""
+        return replace(self, ended_utc=utc_now())
+
+
+def begin(config: str, seed: int, input_digests: Mapping[str, str], command: Sequence[str] | None = None) -> Provenance:
+    """The provenance of a stage that starts now."""
+    now = utc_now()
+    return Provenance(
+        config=config,
+        command_line=shlex.join(sys.argv if command is None else command),
+        seed=seed,
+        started_utc=now,
+        ended_utc=now,
+        platform=f"{platform.platform()}, {platform.machine()}, {platform.python_implementation()} "
+        f"{platform.python_version()}",
+        package_version=walkerlab.__version__,
+        library_versions=library_versions(),
+        git_commit=git_commit(),
+        input_digests=dict(input_digests),
+    )
+
+
+def utc_now() -> str:
+    """The time, in ISO 8601 to the millisecond."""
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that are installed, from their metadata: none is imported."""
+    versions = {}
+    for name in LIBRARIES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def git_commit() -> str | None:
+    """The commit of the source tree that the package is run from, or None for an installed package or without git."""
+    root = Path(walkerlab.__file__).parent.parent
+    # Only the package's own repository: an environment inside somebody's checkout says nothing about this code.
+    if not (root / ".git").exists():
+        return None
+    commit = git(root, "rev-parse", "HEAD")
+    if commit is None:
+        return None
+    return f"{commit}-dirty" if git(root, "status", "--porcelain", "--", "walkerlab") else commit
+
+
+def git(root: Path, *arguments: str) -> str | None:
+    """What a git command prints, or None if it cannot be had."""
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
