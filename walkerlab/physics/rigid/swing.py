@@ -4,15 +4,21 @@ from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
 from walkerlab.physics.rigid.walker import RigidWalker, accelerations, swing_constants
-from walkerlab.physics.system import derivative, jacobian
+from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.physics.trigonometry import sine_cosine
 
 
+@blank.case(RigidWalker)
+def swing_blank(system: RigidWalker) -> State:
+    """Two angles and their velocities."""
+    return (0.0, 0.0, 0.0, 0.0)
+
+
 @derivative.case(RigidWalker)
-def swing_derivative(system: RigidWalker, t: float, y: Any, dy: Any) -> None:
+def swing_derivative(system: RigidWalker, t: float, y: State) -> State:
     """Swing phase (4), (A.58): y = (theta_1, theta_2, dtheta_1, dtheta_2)."""
-    dy[0], dy[1] = y[2], y[3]
-    dy[2], dy[3] = accelerations(system, y[0], y[1], y[2], y[3])
+    alpha_1, alpha_2 = accelerations(system, y[0], y[1], y[2], y[3])
+    return (y[2], y[3], alpha_1, alpha_2)
 
 
 @inlined
@@ -46,7 +52,7 @@ def acceleration_gradients(
 
 
 @jacobian.case(RigidWalker)
-def swing_jacobian(system: RigidWalker, t: float, y: Any, J: Any) -> None:
+def swing_jacobian(system: RigidWalker, t: float, y: State, J: Any) -> None:
     """Derivatives of the swing phase's right-hand side."""
     J[:, :] = 0.0
     J[0, 2] = 1.0
@@ -57,20 +63,37 @@ def swing_jacobian(system: RigidWalker, t: float, y: Any, J: Any) -> None:
         J[3, j] = row_2[j]
 
 
+VARIATION_BLANK = (0.0,) * 20
+
+
 class SwingVariation(NamedTuple):
     """The swing phase together with its derivative with respect to the state it started from."""
 
     walker: RigidWalker
 
 
+@blank.case(SwingVariation)
+def variation_blank(system: SwingVariation) -> State:
+    """The state and its 4 by 4 derivative Phi, row by row."""
+    return VARIATION_BLANK
+
+
+@inlined
+def rate_row(gradient: State, y: State) -> State:
+    """One row of J Phi."""
+    g0, g1, g2, g3 = gradient
+    return (
+        g0 * y[4] + g1 * y[8] + g2 * y[12] + g3 * y[16],
+        g0 * y[5] + g1 * y[9] + g2 * y[13] + g3 * y[17],
+        g0 * y[6] + g1 * y[10] + g2 * y[14] + g3 * y[18],
+        g0 * y[7] + g1 * y[11] + g2 * y[15] + g3 * y[19],
+    )
+
+
 @derivative.case(SwingVariation)
-def variation_derivative(system: SwingVariation, t: float, y: Any, dy: Any) -> None:
-    """Variational equations: y = (state, Phi row by row), dPhi/dt = J Phi, 20 numbers."""
+def variation_derivative(system: SwingVariation, t: float, y: State) -> State:
+    """Variational equations dPhi/dt = J Phi beside the swing phase."""
     walker = system.walker
-    dy[0], dy[1] = y[2], y[3]
-    dy[2], dy[3] = accelerations(walker, y[0], y[1], y[2], y[3])
+    alpha_1, alpha_2 = accelerations(walker, y[0], y[1], y[2], y[3])
     row_1, row_2 = acceleration_gradients(walker, y[0], y[1], y[2], y[3])
-    for j in range(4):
-        dy[4 + j], dy[8 + j] = y[12 + j], y[16 + j]
-        dy[12 + j] = row_1[0] * y[4 + j] + row_1[1] * y[8 + j] + row_1[2] * y[12 + j] + row_1[3] * y[16 + j]
-        dy[16 + j] = row_2[0] * y[4 + j] + row_2[1] * y[8 + j] + row_2[2] * y[12 + j] + row_2[3] * y[16 + j]
+    return (y[2], y[3], alpha_1, alpha_2) + y[12:20] + rate_row(row_1, y) + rate_row(row_2, y)

@@ -1,0 +1,1 @@
+"""Integrators: one method a file, one signature, one registry; events located on dense output."""

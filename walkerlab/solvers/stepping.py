@@ -1,0 +1,58 @@
+"""What a method is to the code that integrates with it: functions chosen by the type of the method.
+
+A method is a NamedTuple that owns its memory, so that nothing is allocated while it runs. All have these fields:
+
+rtol, atol   tolerances on the error of a step
+clock        (3,) start of the last step, its end, and the next step to try, s
+y_old, y     (n,) states at start and end of the last step
+counts       (5,) see the indices below
+"""
+
+from typing import Any
+
+from walkerlab.kernels import by_type
+from walkerlab.physics.system import State
+
+# indices into `clock`
+T_OLD, T, H_NEXT = 0, 1, 2
+# indices into `counts`
+RHS, ACCEPTED, REJECTED, JACOBIANS, BUDGET = 0, 1, 2, 3, 4
+COUNTS = 5
+# what `advance` says
+STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = 0, 1, 2
+SMALLEST_STEP = 1e-15
+
+
+@by_type
+def begin(method: Any, system: Any, t: float, y: State, h: float) -> None:
+    """Start, or start again after an event, from state y at time t (s); h = 0 lets the method choose its first step."""
+
+
+@by_type
+def advance(method: Any, system: Any, t_end: float) -> int:
+    """Take one accepted step, not beyond t_end (s); the state before it stays in `y_old`. Returns what became of it."""
+
+
+@by_type
+def shorten(method: Any, system: Any, fraction: float) -> None:
+    """Take the last step again with its length times `fraction`, from the same start: a step that ends at an event."""
+
+
+@by_type
+def prepare_dense(method: Any, system: Any) -> None:
+    """Make `interpolate` ready for the last step."""
+
+
+@by_type
+def interpolate(method: Any, system: Any, fraction: float) -> State:
+    """The state at `fraction` (0 to 1) of the last step."""
+
+
+@by_type
+def end_state(method: Any, system: Any) -> State:
+    """The state at the end of the last step."""
+
+
+@by_type
+def dense_degree(method: Any) -> int:
+    """Degree of the polynomial that `interpolate` evaluates."""
