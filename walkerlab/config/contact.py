@@ -52,14 +52,14 @@ class Contact(Block):
         key("", "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s", "Fig. 4b"),
     ] = "adams"
     stiffness: Annotated[
-        float, key("N/mm^e | N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
+        float, key("N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
     ] = 1.0e5
     exponent: Annotated[float, key("1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)] = 2.2
-    damping: Annotated[float, key("N s/mm | N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)] = (
-        90.0
-    )
+    damping: Annotated[
+        float, key("N s/mm or N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)
+    ] = 90.0
     full_damping_penetration: Annotated[
-        float, key("mm | m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0)
+        float, key("mm or m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0)
     ] = 0.1
     friction: Annotated[
         Literal["coulomb", "none"],
@@ -81,12 +81,12 @@ class Contact(Block):
     ] = 0.7
     stiction_velocity: Annotated[
         float,
-        key("mm/s | m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0),
+        key("mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0),
     ] = 100.0
     friction_velocity: Annotated[
         float,
         key(
-            "mm/s | m/s",
+            "mm/s or m/s",
             "slip velocity from which on friction is dynamic",
             _ADAMS,
             bounds="above stiction_velocity, up to 1000 m/s",

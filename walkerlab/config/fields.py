@@ -18,19 +18,28 @@ class Block(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
 
-def key(unit: str, meaning: str, source: str, *, bounds: str = "", sequence: bool = False, **limits: float) -> Any:
+def key(
+    unit: str,
+    meaning: str,
+    source: str,
+    *,
+    bounds: str = "",
+    default: str = "",
+    sequence: bool = False,
+    **limits: float,
+) -> Any:
     """Metadata of one key, to be put into `Annotated`.
 
     unit      as it is printed, "1" for pure numbers, "" where there is none
     meaning   one sentence
     source    where the default comes from
     bounds    what is allowed in words, where `limits` cannot say it
+    default   the default in words, where it follows from another key
     sequence  a YAML list is accepted for a tuple
     limits    gt, ge, lt, le as pydantic has them
     """
-    extra: dict[str, Any] = {"unit": unit, "source": source}
-    if bounds:
-        extra["bounds"] = bounds
+    words = {"unit": unit, "source": source, "bounds": bounds, "default": default}
+    extra: dict[str, Any] = {name: text for name, text in words.items() if text}
     settings: dict[str, Any] = {"description": meaning, "json_schema_extra": extra, **limits}
     if sequence:
         settings["strict"] = False
@@ -56,12 +65,12 @@ def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[t
 
 
 def extra(field: FieldInfo, name: str) -> str:
-    """`unit`, `source` or `bounds` of a key as `key` was given it; empty if it was not."""
+    """`unit`, `source`, `bounds` or `default` of a key as `key` was given it; empty if it was not."""
     held = field.json_schema_extra
     return str(held.get(name, "")) if isinstance(held, dict) else ""
 
 
-_KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", bool: "true | false"}
+_KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", bool: "true or false"}
 _SIGNS: Final = (("ge", "from"), ("gt", "above"), ("le", "up to"), ("lt", "below"))
 
 
@@ -77,7 +86,7 @@ def kind(annotation: Any) -> str:
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
-        return " | ".join(dict.fromkeys(kind(part) for part in get_args(annotation)))
+        return " or ".join(dict.fromkeys(kind(part) for part in get_args(annotation)))
     return "block"
 
 
@@ -100,7 +109,7 @@ def bounds_of(field: FieldInfo) -> str:
     if spoken:
         return spoken
     if get_origin(field.annotation) is Literal:
-        return " | ".join(words_of(field))
+        return ", ".join(words_of(field))
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
         return f"from {short(limits['ge'])} to {short(limits['le'])}"
@@ -110,9 +119,11 @@ def bounds_of(field: FieldInfo) -> str:
 def allowed(field: FieldInfo) -> str:
     """What a key allows, with kind and unit, for a message."""
     if block_of(field) is not None:
-        return "a block of keys"
-    bounds, unit = bounds_of(field), extra(field, "unit")
-    if kind(field.annotation) == "word":
-        return bounds
-    text = f"{kind(field.annotation)}, {bounds}" if bounds else kind(field.annotation)
-    return f"{text} ({unit})" if unit not in ("", "1") else text
+        optional = type(None) in get_args(field.annotation)
+        return "a block of keys, or null to leave it out" if optional else "a block of keys"
+    bounds, unit, what = bounds_of(field), extra(field, "unit"), kind(field.annotation)
+    if what == "word":
+        return f"one of {bounds}" if "," in bounds else bounds
+    if what in _KINDS.values():
+        bounds = f"{what}, {bounds}" if bounds else what
+    return f"{bounds} ({unit})" if unit not in ("", "1") else bounds

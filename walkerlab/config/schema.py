@@ -23,7 +23,7 @@ __all__ = [
     "Method",
     "Output",
     "RigidSolver",
-    "SlopeDeg",
+    "SlopeInDegrees",
     "SolverSettings",
     "Solvers",
     "State",
@@ -38,14 +38,27 @@ METHODS: Final[tuple[Method, ...]] = get_args(Method)
 
 RIGHT_ANGLE: Final = math.pi / 2
 
-SlopeDeg = Annotated[
-    float,
-    key("deg", "slope in degrees; one of slope_rad and slope_deg in a file", "section 2", gt=-90.0, lt=90.0),
-]
 
-Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
+class SlopeInDegrees(Block):
+    """The slope as a file or `--set` may give it instead of slope_rad; the resolved config has slope_rad only."""
+
+    slope_deg: Annotated[
+        float,
+        key(
+            "deg",
+            "slope in degrees; a file has one of slope_rad and slope_deg",
+            "this project",
+            bounds="between -90 and 90, both excluded",
+            gt=-90.0,
+            lt=90.0,
+        ),
+    ]
+
+
+SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
+StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
-State = tuple[Angle, Angle, Rate, Rate]
+State = tuple[SwingAngle, StanceAngle, Rate, Rate]
 
 
 def _start_kind(value: Any) -> str:
@@ -72,8 +85,9 @@ class CompassWalker(Block):
         key(
             "m",
             "a, from foot to leg mass; b = L - a is the rest",
-            "Table 1: 'middle of the legs', L/2 when left out",
+            "Table 1: 'middle of the legs'",
             bounds="between 0 and leg_length_m, both excluded",
+            default="leg_length_m / 2",
             gt=0.0,
         ),
     ] = Field(default_factory=_middle_of_the_leg)
@@ -165,11 +179,12 @@ class Config(Block):
         str,
         key(
             "",
-            "name of the run folder; the file's own name when left out",
+            "name of the run folder",
             "this project",
-            bounds="1 to 64 letters, digits, '.', '_' or '-', a letter or digit at both ends",
+            default="the file's own name",
+            bounds="1 to 64 letters, digits, '.', '_' or '-', no '-' or '.' in front and no '.' at the end",
         ),
-        Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,62}[A-Za-z0-9])?$"),
+        Field(pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$"),
     ] = "paper"
     walker: CompassWalker = CompassWalker()
     gravity_m_s2: Annotated[float, key("m/s^2", "g", "standard gravity, rounded", ge=1e-6, le=1e4)] = 9.81

@@ -1,0 +1,148 @@
+"""Config files: where they are, what they hold, and the built-in ones."""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from walkerlab.config.problems import Problem, nearest, refusal, shown
+from walkerlab.config.reader import MAX_CHARACTERS, read
+from walkerlab.config.tree import Mapping, Position, Scalar
+
+BUILTIN_FOLDER: Final = Path(__file__).parent / "builtin"
+SUFFIXES: Final = (".yaml", ".yml")
+MAX_EXTENDS: Final = 16
+SHOWN_PATH: Final = 240
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigFile:
+    """One config file.
+
+    path   of the file
+    label  as messages name it
+    """
+
+    path: Path
+    label: str
+
+    @property
+    def is_builtin(self) -> bool:
+        """Whether the file comes with the package."""
+        return self.path.parent == BUILTIN_FOLDER
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Names of the configs that come with the package."""
+    return tuple(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
+
+
+def builtin(name: str) -> ConfigFile:
+    """The config `name` that comes with the package."""
+    return ConfigFile(BUILTIN_FOLDER / f"{name}.yaml", f"built-in {name}.yaml")
+
+
+def find(path: Path) -> ConfigFile:
+    """The file of `--config`: a path, or else the name of a built-in config."""
+    if str(path) in builtin_names() and not path.is_file():
+        return builtin(str(path))
+    return ConfigFile(path, shown(str(path), SHOWN_PATH))
+
+
+def find_parent(name: str, child: ConfigFile) -> ConfigFile:
+    """The file of `extends: name` in `child`: the name of a built-in config, or a path from the child's folder."""
+    if name in builtin_names():
+        return builtin(name)
+    path = child.path.parent / name
+    return ConfigFile(path, shown(str(path), SHOWN_PATH))
+
+
+def read_layers(file: ConfigFile) -> list[Mapping]:
+    """The blocks of a file and of all it extends, the furthest ancestor first.
+
+    Raises ConfigError if one of them cannot be read, is not a block of keys, or extends itself.
+    """
+    layers: list[Mapping] = []
+    seen: list[str] = []
+    current: ConfigFile | None = file
+    asked: Position | None = None
+    while current is not None:
+        text = _text_of(current, asked)
+        identity = str(current.path.resolve())
+        if identity in seen:
+            raise refusal([Problem(asked, f"extends: {current.label} extends itself, through {len(seen)} file(s)")])
+        if len(seen) == MAX_EXTENDS:
+            raise refusal([Problem(asked, f"extends: more than {MAX_EXTENDS} files deep")])
+        seen.append(identity)
+        layer = _block_of(text, current)
+        layers.insert(0, layer.without("extends"))
+        current, asked = _parent_of(layer, current)
+    return layers
+
+
+def _parent_of(layer: Mapping, file: ConfigFile) -> tuple[ConfigFile | None, Position | None]:
+    extends = layer.entries.get("extends")
+    if extends is None:
+        return None, None
+    if isinstance(extends, Scalar) and isinstance(extends.value, str) and extends.value:
+        return find_parent(extends.value, file), extends.position
+    raise refusal([Problem(extends.position, "extends: is not the name of a config", _what_there_is())])
+
+
+def _what_there_is() -> str:
+    return f"a file, or one of {', '.join(builtin_names())}"
+
+
+def _block_of(text: str, file: ConfigFile) -> Mapping:
+    root = read(text, file.label)
+    if isinstance(root, Mapping):
+        return root
+    if root is None or (isinstance(root, Scalar) and root.value is None):
+        reason = "the file is empty"
+    else:
+        reason = f"the file holds a {'list' if not isinstance(root, Scalar) else 'single value'}"
+    start = root.position if root else Position(file.label, 1, 1)
+    raise refusal([Problem(start, reason, "a block of keys, e.g. `extends: paper`")])
+
+
+def _text_of(file: ConfigFile, asked: Position | None) -> str:
+    """Text of a file; `asked` is where its name stands, for the message if it cannot be read."""
+    try:
+        mode = file.path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
+            raise refusal([Problem(asked, f"config {file.label} is {what}", "a YAML file")])
+        with file.path.open("rb") as stream:
+            data = stream.read(4 * MAX_CHARACTERS + 1)
+    except FileNotFoundError:
+        problem = Problem(asked, f"there is no config {file.label}", _what_there_is(), _near(file))
+        raise refusal([problem]) from None
+    except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise refusal([Problem(asked, f"config {file.label} cannot be read: {reason.lower()}")]) from None
+    return _decoded(data, file)
+
+
+def _decoded(data: bytes, file: ConfigFile) -> str:
+    if len(data) > 4 * MAX_CHARACTERS:
+        start = Position(file.label, 1, 1)
+        raise refusal([Problem(start, f"longer than {MAX_CHARACTERS} characters: not a config")])
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8")) + 1
+        where = Position(file.label, before.count(b"\n") + 1, column)
+        raise refusal([Problem(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?")]) from None
+
+
+def _near(file: ConfigFile) -> str:
+    """What was perhaps meant by the name of a file that is not there."""
+    try:
+        beside = [str(path) for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
+    except (OSError, ValueError):
+        beside = []
+    found = nearest(str(file.path), beside) or nearest(file.path.stem, builtin_names())
+    return shown(found)

@@ -1,0 +1,117 @@
+"""Layers of a config: a file over what it extends, and `--set` over both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from walkerlab.config.problems import Problem, refusal, shown
+from walkerlab.config.reader import MAX_DEPTH, read
+from walkerlab.config.tree import Mapping, Node, Position, Scalar
+
+SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One `--set KEY=VALUE`.
+
+    path      parts of the dotted key
+    value     tree of the value
+    position  of the key
+    """
+
+    path: tuple[str, ...]
+    value: Node
+    position: Position
+
+
+def stacked(layers: Sequence[Mapping]) -> Mapping:
+    """One block of several, later ones over earlier ones; the name is the last layer's own.
+
+    Raises ConfigError if a layer has more than one slope key.
+    """
+    merged = layers[0]
+    _refuse_two_slopes(merged)
+    for layer in layers[1:]:
+        _refuse_two_slopes(layer)
+        lower = merged.without("name")
+        if any(name in layer.entries for name in SLOPE_KEYS):
+            lower = lower.without(*SLOPE_KEYS)
+        merged = _merged(lower, layer)
+    return merged
+
+
+def _merged(lower: Mapping, upper: Mapping) -> Mapping:
+    result = lower.without()
+    for name, node in upper.entries.items():
+        below = lower.entries.get(name)
+        if isinstance(below, Mapping) and isinstance(node, Mapping):
+            node = _merged(below, node)
+        result.put(name, node, upper.keys[name])
+    return result
+
+
+def _refuse_two_slopes(layer: Mapping) -> None:
+    given = [(layer.keys[name], name) for name in SLOPE_KEYS if name in layer.keys]
+    if len(given) < len(SLOPE_KEYS):
+        return
+    (there, first), (here, second) = sorted(given, key=lambda one: (one[0].line, one[0].column))
+    raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
+
+
+def parse_settings(texts: Sequence[str]) -> list[Setting]:
+    """The `--set` options.
+
+    Raises ConfigError if one is not KEY=VALUE with a YAML value.
+    """
+    return [_setting(text) for text in texts]
+
+
+def _setting(text: str) -> Setting:
+    key, equals, value = text.partition("=")
+    source = f"--set {shown(text)}"
+    start = Position(source, 1, 1)
+    path = tuple(part.strip() for part in key.split("."))
+    if not equals or not all(path):
+        raise refusal([Problem(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")])
+    if len(path) > MAX_DEPTH:
+        raise refusal([Problem(start, f"nested deeper than {MAX_DEPTH} levels")])
+    column = len(key) + 2
+    node = read(value, source, column)
+    return Setting(path, node or Scalar(Position(source, 1, column), None, ""), start)
+
+
+def strides_setting(strides: int) -> Setting:
+    """The `--strides` option."""
+    position = Position(f"--strides {strides}", 1, 1)
+    return Setting(("strides",), Scalar(position, strides, str(strides)), position)
+
+
+def with_settings(tree: Mapping, settings: Sequence[Setting]) -> Mapping:
+    """`tree` with each setting in its place, in order; a list or a block is replaced whole.
+
+    Raises ConfigError if a setting goes into something that is no block.
+    """
+    for setting in settings:
+        if setting.path[0] in SLOPE_KEYS:
+            tree = tree.without(*SLOPE_KEYS)
+        tree = _placed(tree, setting, 0)
+    return tree
+
+
+def _placed(block: Mapping, setting: Setting, depth: int) -> Mapping:
+    result = block.without()
+    name = setting.path[depth]
+    if depth == len(setting.path) - 1:
+        result.put(name, setting.value, setting.position)
+        return result
+    inner = block.entries.get(name)
+    if inner is None or (isinstance(inner, Scalar) and inner.value is None):
+        inner = Mapping(setting.position)
+    if not isinstance(inner, Mapping):
+        above, whole = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
+        raise refusal([Problem(setting.position, f"{shown(whole)}: {shown(above)} is a value, not a block of keys")])
+    result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
+    return result

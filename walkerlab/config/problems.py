@@ -1,0 +1,68 @@
+"""Problems with a config: where, which value, what is allowed, and the nearest key."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from walkerlab.config.tree import Mapping, Node, Position, Scalar
+from walkerlab.errors import ConfigError
+
+SHOWN_LENGTH = 60
+SHOWN_PROBLEMS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing wrong with a config.
+
+    position  where; None if it is nowhere in a text
+    text      what is wrong, with key and value
+    allowed   what would be right; empty if `text` says it
+    nearest   what was perhaps meant; empty if nothing is near
+    """
+
+    position: Position | None
+    text: str
+    allowed: str = ""
+    nearest: str = ""
+
+    def __str__(self) -> str:
+        """On one line."""
+        where = f"{self.position}: " if self.position else ""
+        meant = f"; did you mean {self.nearest}?" if self.nearest else ""
+        allowed = f"; allowed: {self.allowed}" if self.allowed else ""
+        return f"{where}{self.text}{meant}{allowed}"
+
+
+def refusal(problems: Sequence[Problem]) -> ConfigError:
+    """One error for all `problems`, one a line."""
+    lines = list(dict.fromkeys(str(problem) for problem in problems))
+    if len(lines) > SHOWN_PROBLEMS:
+        lines[SHOWN_PROBLEMS:] = [f"and {len(lines) - SHOWN_PROBLEMS} more"]
+    return ConfigError("\n".join(lines), "`walkerlab schema` lists every key with its unit, bounds and default")
+
+
+def nearest(word: str, candidates: Iterable[str]) -> str:
+    """The candidate most like `word`, empty if none is like it."""
+    spelled = {candidate.lower(): candidate for candidate in candidates}
+    found = difflib.get_close_matches(word[:SHOWN_LENGTH].lower(), spelled, n=1, cutoff=0.5)
+    return spelled[found[0]] if found else ""
+
+
+def shown(text: str, length: int = SHOWN_LENGTH) -> str:
+    """A text from outside, short and safe to print: control characters and lone surrogates are escaped."""
+    cut = text if len(text) <= length else f"{text[: length - 1]}…"
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in cut)
+
+
+def shown_value(node: Node) -> str:
+    """A value as the config has it, quoted if it is a text."""
+    if isinstance(node, Mapping):
+        return "a block" if node.entries else "an empty block"
+    if not isinstance(node, Scalar):
+        return f"[{', '.join(shown_value(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"
+    if node.value is None:
+        return "nothing" if not node.text else shown(node.text)
+    return f"'{shown(node.text)}'" if isinstance(node.value, str) else shown(node.text)

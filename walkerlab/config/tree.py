@@ -1,0 +1,68 @@
+"""What a config text says before it is typed: scalars, lists and blocks, each with its position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A place in a config text: its file or option, line and column, counted from 1."""
+
+    source: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        """As editors and terminals understand it: source:line:column."""
+        return f"{self.source}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A single value with its text as written."""
+
+    position: Position
+    value: str | int | float | bool | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A list."""
+
+    position: Position
+    items: list[Node] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """A block of keys; `keys` has the position of each key itself."""
+
+    position: Position
+    entries: dict[str, Node] = field(default_factory=dict)
+    keys: dict[str, Position] = field(default_factory=dict)
+
+    def put(self, name: str, node: Node, position: Position) -> None:
+        """Set a key; a later value takes the place of an earlier one."""
+        self.entries[name] = node
+        self.keys[name] = position
+
+    def without(self, *names: str) -> Mapping:
+        """The same block without some keys."""
+        kept = {name: node for name, node in self.entries.items() if name not in names}
+        return Mapping(self.position, kept, {name: self.keys[name] for name in kept})
+
+
+Node: TypeAlias = Scalar | Sequence | Mapping
+Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
+
+
+def plain(node: Node) -> Data:
+    """The values of a tree without their positions."""
+    if isinstance(node, Scalar):
+        return node.value
+    if isinstance(node, Sequence):
+        return [plain(item) for item in node.items]
+    return {name: plain(entry) for name, entry in node.entries.items()}

@@ -1,0 +1,134 @@
+"""A tree typed by the schema; whatever does not fit is reported with its position, all at once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from walkerlab.config.fields import Block, allowed, block_of, leaves, words_of
+from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
+from walkerlab.config.schema import Config, SlopeInDegrees
+from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence, plain
+
+_REASONS: Final = {
+    "float_type": "is not a number",
+    "int_type": "is not an integer",
+    "string_type": "is not a text",
+    "tuple_type": "is not a list",
+    "model_type": "is not a block of keys",
+    "finite_number": "is not finite",
+    "literal_error": "is not allowed",
+    "greater_than": "is out of bounds",
+    "greater_than_equal": "is out of bounds",
+    "less_than": "is out of bounds",
+    "less_than_equal": "is out of bounds",
+    "missing": "has too few values",
+    "too_long": "has too many values",
+    "string_pattern_mismatch": "is not safe as the name of a folder",
+}
+_FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
+
+
+def typed(tree: Mapping) -> Config:
+    """The config that a tree describes.
+
+    Raises ConfigError with every problem found.
+    """
+    problems: list[Problem] = []
+    data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
+    if "slope_deg" in data:
+        degrees = data.pop("slope_deg")
+        try:
+            data["slope_rad"] = math.radians(SlopeInDegrees(slope_deg=degrees).slope_deg)
+        except ValidationError as error:
+            problems += _problems(error, tree, SlopeInDegrees)
+    try:
+        config = Config.model_validate(data)
+    except ValidationError as error:
+        problems += _problems(error, tree, Config)
+    if problems:
+        raise refusal(sorted(problems, key=_place))
+    return config
+
+
+def _place(problem: Problem) -> tuple[str, int, int]:
+    where = problem.position
+    return (where.source, where.line, where.column) if where else ("", 0, 0)
+
+
+def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list[Problem]:
+    details = error.errors(include_url=False)
+    return [_problem(detail, tree, model) for detail in details if detail["type"] != _FOLLOWS_FROM_ANOTHER]
+
+
+def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem:
+    location = detail["loc"]
+    if detail["type"] == "extra_forbidden":
+        return _unknown_key(tuple(str(part) for part in location), tree)
+    path, field = _field_at(model, location)
+    node, position = _node_at(tree, location)
+    value = shown_value(node) if node else f"{detail['input']} (its default)"
+    text = f"{'.'.join(path)}: {value} {_REASONS.get(detail['type'], detail['msg'])}"
+    word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
+    meant = nearest(word, words_of(field)) if word else ""
+    return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant)
+
+
+def _unknown_key(path: tuple[str, ...], tree: Mapping) -> Problem:
+    block: type[Block] = Config
+    for name in path[:-1]:
+        block = block_of(block.model_fields[name]) or block
+    siblings = [*block.model_fields, *(SlopeInDegrees.model_fields if block is Config else ())]
+    node, position = _node_at(tree, path)
+    dotted = shown(".".join(path))
+    if path == ("extends",):
+        return Problem(position, "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
+    prefix = ".".join((*path[:-1], ""))
+    beside = nearest(path[-1], siblings)
+    meant = f"{prefix}{beside}" if beside else _elsewhere(path[-1])
+    value = f" ({shown_value(node)})" if node else ""
+    return Problem(position, f"{dotted}: unknown key{value}", ", ".join(siblings), meant)
+
+
+def _elsewhere(name: str) -> str:
+    """A key of another block that is like `name`, with its path."""
+    paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
+    found = nearest(name, paths)
+    return paths[found] if found else ""
+
+
+def _field_at(model: type[Block], location: tuple[int | str, ...]) -> tuple[list[str], FieldInfo]:
+    """Key and field that a location is in; what lies deeper (an item of a list, a kind of value) is left away."""
+    path = [str(location[0])]
+    field = model.model_fields[path[0]]
+    for part in location[1:]:
+        block = block_of(field)
+        if block is None:
+            break
+        path.append(str(part))
+        field = block.model_fields[str(part)]
+    return path, field
+
+
+def _node_at(tree: Mapping, location: tuple[int | str, ...]) -> tuple[Node | None, Position]:
+    """The value at a location and its position; for a key that is not in the tree None and the block it is missing in.
+
+    Parts of the location that are not in the tree, such as the kind of value pydantic tried, are passed over.
+    """
+    node: Node = tree
+    position = tree.position
+    for index, part in enumerate(location):
+        if isinstance(node, Mapping) and isinstance(part, str):
+            if part not in node.entries:
+                return None, position
+            position = node.keys[part]
+            node = node.entries[part]
+        elif isinstance(node, Sequence) and isinstance(part, int) and part < len(node.items):
+            node = node.items[part]
+        if not isinstance(node, Mapping) or index == len(location) - 1:
+            position = node.position
+    return node, position
