@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from walkerlab.config.canonical import canonical_json
 from walkerlab.store import hdf5
-from walkerlab.store.content import Content, canonical_json
+from walkerlab.store.content import Content, Group
 from walkerlab.store.files import read_bounded, write_atomically
 from walkerlab.store.key import SCHEMA_VERSION, Identity
 from walkerlab.store.provenance import Provenance
 
 LIMIT_BYTES = 1 << 30
-"""No artifact is larger: a file that says so is not read, and a result that would be is not stored."""
+"""No artifact is larger; a file that is, is not read."""
+
+# At the end of the file, after all that HDF5 knows of: a damaged file must be found out before the HDF5 library sees
+# it, which frees memory twice on some of them.
+SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
+SEAL_BYTES = 83
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
@@ -28,7 +35,7 @@ class Stored(Content):
     """The content of an artifact as read back, with what it was determined by and where it comes from.
 
     complete  False for the partial results of a stage that found no answer
-    seal      digest of everything in the file, provenance and timings included
+    seal      sha256 of the file, provenance and timings included
     """
 
     identity: Identity
@@ -57,9 +64,9 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
     Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
     """
-    root = root_attributes(content, identity, provenance, complete)
-    seal = sealed(root, content)
-    write_atomically(path, hdf5.image(content.groups, {**root, "seal": seal}))
+    image = hdf5.image(content.groups, root_attributes(content, identity, provenance, complete))
+    seal = hashlib.sha256(image).hexdigest()
+    write_atomically(path, image + f"\nwalkerlab sha256 {seal}\n".encode())
     return Stored(
         groups=content.groups,
         summary=content.summary,
@@ -77,8 +84,9 @@ def read(path: Path) -> Stored:
     Raises FileNotFoundError if there is none, and Damaged for whatever is not intact: cut short, altered, hostile.
     """
     try:
-        groups, root = hdf5.parse(read_bounded(path, LIMIT_BYTES))
-        return unsealed(groups, root)
+        image, seal = unsealed(read_bounded(path, LIMIT_BYTES))
+        groups, root = hdf5.parse(image)
+        return assembled(groups, root, seal)
     except (FileNotFoundError, Damaged):
         raise
     except OSError as error:
@@ -104,7 +112,7 @@ def check(path: Path, key: str) -> Verdict:
 def root_attributes(
     content: Content, identity: Identity, provenance: Provenance, complete: bool
 ) -> dict[str, str | int | bool]:
-    """What stands at the root of the file: all but the arrays, and but the seal."""
+    """What stands at the root of the file: all but the arrays."""
     root: dict[str, str | int | bool] = {
         "stage": identity.stage,
         "stage_key": identity.key,
@@ -131,8 +139,19 @@ def root_attributes(
     return root
 
 
-def unsealed(groups: Mapping[str, Any], root: Mapping[str, Any]) -> Stored:
-    """The artifact made of a file's parts; Damaged if they do not agree with their digests."""
+def unsealed(data: bytes) -> tuple[bytes, str]:
+    """The HDF5 part of a file's bytes, and its sha256; Damaged if that is not what the seal at the end says."""
+    image, end = data[:-SEAL_BYTES], data[-SEAL_BYTES:]
+    seal = SEAL.fullmatch(end)
+    if seal is None:
+        raise Damaged("it does not end with the seal of a finished artifact: cut short, or not written by walkerlab")
+    if hashlib.sha256(image).hexdigest().encode() != seal[1]:
+        raise Damaged("it was altered after it was finished")
+    return image, seal[1].decode()
+
+
+def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
+    """The artifact made of a file's parts; Damaged if they do not agree with its content digest and key."""
     if root.get("schema_version") != SCHEMA_VERSION:
         raise Damaged(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     identity = Identity(
@@ -160,22 +179,10 @@ def unsealed(groups: Mapping[str, Any], root: Mapping[str, Any]) -> Stored:
         identity=identity,
         provenance=provenance,
         complete=root["complete"],
-        seal=root["seal"],
+        seal=seal,
     )
     if artifact.digest() != root["content_digest"]:
         raise Damaged("its content does not have the digest that it was stored with")
-    if sealed({name: value for name, value in root.items() if name != "seal"}, artifact) != artifact.seal:
-        raise Damaged("its attributes or timings do not have the digest that they were stored with")
     if identity.key != root["stage_key"]:
         raise Damaged("its key is not that of the config, inputs and code it names")
     return artifact
-
-
-def sealed(root: Mapping[str, Any], content: Content) -> str:
-    """The digest of everything in a file."""
-    return canonical_digest([dict(root), content.digest_with_timings()])
-
-
-def canonical_digest(value: Any) -> str:
-    """The sha256 of a JSON value."""
-    return hashlib.sha256(canonical_json(value).encode()).hexdigest()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -12,6 +11,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from walkerlab.config.canonical import canonical_json
 
 Attribute = str | int | float | bool
 
@@ -122,26 +123,18 @@ class Content:
 
     def digest(self) -> str:
         """The sha256 of all that is determined by the inputs: timings are left out."""
-        return self._digest(timings=False)
-
-    def digest_with_timings(self) -> str:
-        """The sha256 of all there is."""
-        return self._digest(timings=True)
-
-    def _digest(self, timings: bool) -> str:
         digest = hashlib.sha256()
-        for part in self._parts(timings):
+        for part in self._parts():
             digest.update(len(part).to_bytes(8, "little"))
             digest.update(part)
         return digest.hexdigest()
 
-    def _parts(self, timings: bool) -> Iterator[bytes]:
-        summary = self.summary if timings else untimed(self.summary, self.timed)
-        yield canonical_json([summary, self.timed]).encode()
+    def _parts(self) -> Iterator[bytes]:
+        yield canonical_json([untimed(self.summary, self.timed), self.timed]).encode()
         for path, group in sorted(self.groups.items()):
             yield canonical_json([path, dict(group.attrs)]).encode()
             for name, variable in sorted(group.variables.items()):
-                if timings or not variable.timing:
+                if not variable.timing:
                     yield from variable_parts(name, variable)
 
 
@@ -225,8 +218,3 @@ def _untimed(value: Any) -> Any:
 def is_timing(key: str) -> bool:
     """Whether a summary's key names a measured run time."""
     return key == "wall_s" or key.endswith("_wall_s")
-
-
-def canonical_json(value: Any) -> str:
-    """JSON text that is the same for equal values: sorted keys, no spaces, shortest exact numbers."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

@@ -27,6 +27,7 @@ ADVICE = {
     errno.EEXIST: "A file stands where a folder is needed; choose another folder with --runs.",
     errno.EISDIR: "A folder stands where the result belongs; move it away.",
     errno.ENAMETOOLONG: "Choose a shorter folder with --runs, or a shorter name in the config.",
+    errno.ELOOP: "A symbolic link stands in the way; choose another folder with --runs.",
     errno.EIO: "The disk reports an error; choose another folder with --runs.",
 }
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from walkerlab.store.content import canonical_json
+from walkerlab.config.canonical import canonical_json
 
 SCHEMA_VERSION = 1
 """Of the artifacts' layout: raise it when files written before must not be read any more."""

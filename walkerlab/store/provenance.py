@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import datetime
 import importlib.metadata
+import io
 import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ruamel.yaml import YAML
+
 import walkerlab
+from walkerlab.config.schema import Config
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
 """The libraries whose versions are recorded: those that numbers and figures may depend on."""
@@ -48,13 +52,13 @@ class Provenance:
         return replace(self, ended_utc=utc_now())
 
 
-def begin(config: str, seed: int, input_digests: Mapping[str, str], command: Sequence[str] | None = None) -> Provenance:
-    """The provenance of a stage that starts now."""
+def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
+    """The provenance of a stage that starts now, in this process."""
     now = utc_now()
     return Provenance(
-        config=config,
-        command_line=shlex.join(sys.argv if command is None else command),
-        seed=seed,
+        config=resolved_yaml(config),
+        command_line=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        seed=config.seed,
         started_utc=now,
         ended_utc=now,
         platform=f"{platform.platform()}, {platform.machine()}, {platform.python_implementation()} "
@@ -64,6 +68,16 @@ def begin(config: str, seed: int, input_digests: Mapping[str, str], command: Seq
         git_commit=git_commit(),
         input_digests=dict(input_digests),
     )
+
+
+def resolved_yaml(config: Config) -> str:
+    """The config with all its defaults, as YAML text; a block that is left out is left out."""
+    text = io.StringIO()
+    writer = YAML(typ="safe", pure=True)
+    writer.default_flow_style = False
+    writer.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # typed as None alone
+    writer.dump(config.model_dump(mode="json", exclude_none=True), text)
+    return text.getvalue()
 
 
 def utc_now() -> str:

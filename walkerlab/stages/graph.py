@@ -1,0 +1,136 @@
+"""The pipeline on one page: every stage, what it reads of the config, and which results it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from walkerlab.config.schema import Config
+
+Inputs = Callable[[Config], tuple[str, ...]]
+
+
+def nothing(_config: Config) -> tuple[str, ...]:
+    """No results of other stages."""
+    return ()
+
+
+def results_of(*names: str) -> Inputs:
+    """The results of these stages, whatever the config."""
+    return lambda _config: names
+
+
+def gait_unless_start_is_given(config: Config) -> tuple[str, ...]:
+    """The fixed point, unless the config has a start state: so a slope without a gait can be walked too."""
+    return ("fixedpoint",) if config.start == "fixed-point" else ()
+
+
+def gait_for_start_or_pads(config: Config) -> tuple[str, ...]:
+    """The fixed point, if the start state or the pads' pitch is taken from it."""
+    pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
+    return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the pipeline.
+
+    name           as on the command line, and of its artifact
+    module         where its `run` is; imported only when it runs
+    purpose        one line for the user
+    reads          keys of the config that its result depends on; it is shown no others
+    inputs         the stages whose results it needs under a config, earlier in the table
+    if_current     the stages whose results it takes if they happen to be there and current
+    needs_contact  whether it is left out when the config has no contact block
+    draws          whether it writes files beside its artifact, from whatever results there are
+    walks          whether `--strides` means something to it
+    has_cells      whether it has independent cells for `--jobs`
+    """
+
+    name: str
+    module: str
+    purpose: str
+    reads: tuple[str, ...]
+    inputs: Inputs = nothing
+    if_current: tuple[str, ...] = ()
+    needs_contact: bool = False
+    draws: bool = False
+    walks: bool = False
+    has_cells: bool = False
+
+
+class Graph:
+    """Stages in an order in which they can run."""
+
+    def __init__(self, *stages: Stage) -> None:
+        """Keep the stages; ValueError if two have one name."""
+        self.stages = stages
+        self._by_name = {stage.name: stage for stage in stages}
+        if len(self._by_name) != len(stages):
+            raise ValueError("two stages have one name")
+
+    def __getitem__(self, name: str) -> Stage:
+        """The stage of a name; KeyError if there is none."""
+        return self._by_name[name]
+
+    def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """The target and all it needs under a config, in the order in which they run."""
+        needed = {target}
+        for stage in reversed(self.stages):
+            if stage.name in needed:
+                needed.update(stage.inputs(config))
+        return tuple(stage for stage in self.stages if stage.name in needed)
+
+
+MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
+
+PIPELINE = Graph(
+    Stage(
+        "fixedpoint",
+        "walkerlab.stages.fixedpoint",
+        "Find the periodic gait of the rigid model and its multipliers.",
+        reads=("walker", "gravity", "slope", "equations", "solver.rigid"),
+    ),
+    Stage(
+        "simulate",
+        "walkerlab.stages.simulate",
+        "Walk the rigid model.",
+        reads=(*MODEL, "solver.rigid"),
+        inputs=gait_unless_start_is_given,
+        walks=True,
+    ),
+    Stage(
+        "contact-sim",
+        "walkerlab.stages.contact_sim",
+        "Walk the physical model, with contact as ADAMS has it.",
+        reads=(*MODEL, "contact", "solver.contact"),
+        inputs=gait_for_start_or_pads,
+        needs_contact=True,
+        walks=True,
+    ),
+    Stage(
+        "compare",
+        "walkerlab.stages.compare",
+        "Compare both models with each other and with every number of the paper.",
+        reads=("walker", "gravity", "slope", "equations", "contact"),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim"),
+        needs_contact=True,
+    ),
+    Stage(
+        "plot",
+        "walkerlab.stages.plot",
+        "Draw the paper's figures from the stored results.",
+        reads=("name",),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
+        draws=True,
+    ),
+    Stage(
+        "report",
+        "walkerlab.stages.report",
+        "Write the report, one HTML file.",
+        reads=("name",),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "plot"),
+        draws=True,
+    ),
+)
+STAGES = PIPELINE.stages

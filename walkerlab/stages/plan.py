@@ -1,0 +1,176 @@
+"""What would happen, and why: for each stage whether its result is reused, made, or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from walkerlab.config.canonical import slice_of
+from walkerlab.config.schema import Config
+from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.store import artifact
+from walkerlab.store.artifact import Stored, Verdict
+from walkerlab.store.code import Sources
+from walkerlab.store.index import broken_file
+from walkerlab.store.key import Identity, changed_parts
+from walkerlab.store.runfolder import RunFolder
+
+Action = Literal["reuse", "run", "leave out"]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that was not computed, and why."""
+
+    what: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """What happens with one stage.
+
+    reason    why, in words
+    identity  what its result is determined by; None if it is left out
+    found     what is stored now, if it is intact: the result to reuse, or an outdated one
+    damaged   a file is stored that is not to be trusted
+    """
+
+    stage: Stage
+    action: Action
+    reason: str
+    identity: Identity | None = None
+    found: Stored | None = None
+    damaged: bool = False
+
+
+class Planner:
+    """Decides on stages one after another, knowing what became of those before."""
+
+    def __init__(self, config: Config, folder: RunFolder, graph: Graph = PIPELINE, force: bool = False) -> None:
+        """Begin with nothing decided; `force` has every stage run that is not left out."""
+        self.config = config
+        self.folder = folder
+        self.graph = graph
+        self.force = force
+        self.left_out: dict[str, str] = {}
+        self.results: dict[str, Stored] = {}
+        self._keys: dict[str, str] = {}
+        self._sources = Sources()
+
+    def plan(self, stages: Sequence[Stage]) -> tuple[Step, ...]:
+        """Decide on stages in the order in which they run, taking it that each goes as decided."""
+        steps = []
+        for stage in stages:
+            self.look_at_current(stage, stages)
+            step = self.decide(stage)
+            self.expect(step)
+            steps.append(step)
+        return tuple(steps)
+
+    def look_at_current(self, stage: Stage, planned: Sequence[Stage]) -> None:
+        """Take note of the results that a stage takes if they are current and that are not planned for themselves."""
+        for name in stage.if_current:
+            if self.graph[name] not in planned:
+                step = self.decide(self.graph[name])
+                if step.action == "reuse":
+                    self.expect(step)
+
+    def decide(self, stage: Stage) -> Step:
+        """What is to happen with a stage, given what became of its inputs."""
+        why = self._why_left_out(stage)
+        if why is not None:
+            return Step(stage, "leave out", why)
+        identity = Identity(
+            stage=stage.name,
+            config_slice=slice_of(self.config, stage.reads),
+            input_keys=self._input_keys(stage),
+            code_digest=self._sources.code_digest(stage.module),
+        )
+        verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
+        reason = "--force" if self.force else self._why_run(stage, identity, verdict)
+        action: Action = "run" if reason else "reuse"
+        return Step(stage, action, reason or "up to date", identity, verdict.artifact, verdict.damaged)
+
+    def expect(self, step: Step) -> None:
+        """Take it that a step goes as decided: what is to run will have a result."""
+        if step.identity is None:
+            self.left_out[step.stage.name] = step.reason
+        elif step.action == "reuse" and step.found is not None:
+            self.settle(step.stage, step.found)
+        else:
+            self._keys[step.stage.name] = step.identity.key
+
+    def settle(self, stage: Stage, result: Stored) -> None:
+        """Take note of a stage's result, which may be that there is no answer."""
+        self.results[stage.name] = result
+        if result.complete:
+            self._keys[stage.name] = result.identity.key
+        else:
+            self.left_out[stage.name] = no_answer(result)
+
+    def inputs(self, stage: Stage) -> dict[str, Stored]:
+        """The results that a stage gets: those it needs, and those it takes if they are there."""
+        wanted = (*stage.inputs(self.config), *stage.if_current)
+        return {name: self.results[name] for name in wanted if name in self.results and name not in self.left_out}
+
+    def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
+        """The results that a stage does without, and why."""
+        wanted = (*stage.inputs(self.config), *stage.if_current)
+        return tuple(LeftOut(name, self._why_absent(name)) for name in wanted if name not in self._keys)
+
+    def _why_absent(self, name: str) -> str:
+        return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
+
+    def _why_left_out(self, stage: Stage) -> str | None:
+        if stage.needs_contact and self.config.contact is None:
+            return "the config has no contact block"
+        if stage.draws:
+            return None
+        for name in stage.inputs(self.config):
+            if name in self.left_out:
+                return f"it needs {name}: {self.left_out[name]}"
+        return None
+
+    def _input_keys(self, stage: Stage) -> dict[str, str]:
+        """The keys of a stage's inputs; what a drawing says about those left out depends on why they are."""
+        given = {name: self._keys[name] for name in stage.inputs(self.config) if name in self._keys}
+        given |= {name: self._keys[name] for name in stage.if_current if name in self._keys}
+        return given | {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
+
+    def _why_run(self, stage: Stage, identity: Identity, verdict: Verdict) -> str | None:
+        found = verdict.artifact
+        if not verdict.accepted or found is None:
+            changes = changed_parts(found.identity, identity) if found is not None else []
+            return ", ".join(changes) or verdict.reason
+        broken = broken_file(self.folder.path, found)
+        if broken is not None:
+            return broken
+        for name, result in self.inputs(stage).items():
+            if found.provenance.input_digests.get(name) != input_digest(stage, result):
+                return f"input {name} was made anew"
+        return None
+
+
+def input_digest(stage: Stage, result: Stored) -> str:
+    """What a stage's result records of an input: numbers follow from its content, drawings also show its timings."""
+    return result.seal if stage.draws else result.digest()
+
+
+def no_answer(result: Stored) -> str:
+    """What the partial result of a stage says about there being no answer."""
+    said: dict[str, Any] = result.summary.get("no_answer", {})
+    return str(said.get("message", "no answer"))
+
+
+def plan(
+    config: Config, target: str, folder: RunFolder, force: bool = False, graph: Graph = PIPELINE
+) -> tuple[Step, ...]:
+    """What running a stage would do with it and with each stage that it needs, in that order; touches nothing."""
+    return Planner(config, folder, graph, force).plan(graph.needed_for(target, config))
+
+
+def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
+    """What running each stage there is would do; touches nothing."""
+    return Planner(config, folder, graph).plan(graph.stages)

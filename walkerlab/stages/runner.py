@@ -1,0 +1,229 @@
+"""Runs a stage and what it needs: reuses what is up to date, stores each result as soon as it is there."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from walkerlab.config.canonical import only
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, plan
+from walkerlab.stages.progress import Reporter, Silent
+from walkerlab.store import artifact, provenance
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Content
+from walkerlab.store.files import storing
+from walkerlab.store.runfolder import RunFolder
+
+__all__ = ["Done", "StageReport", "execute", "plan"]
+
+
+@dataclass(frozen=True)
+class Done:
+    """What was done with one stage: `action` as in `plan.Step`, `wall_s` the time it ran."""
+
+    stage: str
+    action: str
+    reason: str
+    wall_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class StageReport:
+    """How running a stage went.
+
+    run_dir    the run's folder
+    artifact   the file of its result; None if there is none
+    reused     whether the result was there already
+    wall_s     time of the whole, what it needs included
+    left_out   what was not computed on the way, and why
+    summary    of the result; empty if there is none
+    steps      what was done with each stage
+    no_answer  message and advice, if the computation has no answer or the drawing had to do without one
+    """
+
+    stage: str
+    run_dir: Path
+    artifact: Path | None
+    reused: bool
+    wall_s: float
+    left_out: tuple[LeftOut, ...]
+    summary: dict[str, Any]
+    steps: tuple[Done, ...]
+    no_answer: NoAnswer | None = None
+
+
+def execute(
+    config: Config,
+    target: str,
+    folder: RunFolder,
+    *,
+    force: bool = False,
+    wait: bool = True,
+    jobs: int = 1,
+    reporter: Reporter | None = None,
+    graph: Graph = PIPELINE,
+) -> StageReport:
+    """Have the result of a stage in its folder, running what is not up to date.
+
+    force  run the target and all it needs
+    wait   for another process that works in the folder, and reuse what it made
+    jobs   processes for stages with independent cells
+
+    Raises ConfigError if the config has not what the target needs, LockedError (only without `wait`), StorageError.
+    No answer is no exception here: see `StageReport.no_answer`.
+    """
+    started = time.perf_counter()
+    refuse_without_contact(graph[target], config)
+    stages = graph.needed_for(target, config)
+    planner = Planner(config, folder, graph, force)
+    steps = planner.plan(stages)
+    run = Run(planner, reporter or Silent(), jobs)
+    if any(step.action == "run" for step in steps):
+        with folder.locked(wait, run.reporter.note):
+            # Decided anew, stage by stage: another process may have worked here until now.
+            run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
+            run.carry_out(stages)
+    else:
+        for step in steps:
+            run.skip(step)
+    return run.report(graph[target], time.perf_counter() - started)
+
+
+def refuse_without_contact(stage: Stage, config: Config) -> None:
+    """Raise ConfigError if a stage is asked for that the config leaves out."""
+    if stage.needs_contact and config.contact is None:
+        raise ConfigError(
+            f"{stage.name} needs a contact block, and the config has none.",
+            "Add one to the config; `walkerlab schema` lists its keys.",
+        )
+
+
+class Run:
+    """One execution: what is known of the results, and what was done so far."""
+
+    def __init__(self, planner: Planner, reporter: Reporter, jobs: int) -> None:
+        """Nothing is done yet."""
+        self.planner = planner
+        self.folder = planner.folder
+        self.reporter = reporter
+        self.jobs = jobs
+        self.done: list[Done] = []
+
+    def carry_out(self, stages: Sequence[Stage]) -> None:
+        """Decide on one stage after another, and do it."""
+        for stage in stages:
+            self.planner.look_at_current(stage, stages)
+            step = self.planner.decide(stage)
+            if step.damaged:
+                self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
+            if step.action == "run":
+                self._run(step)
+            else:
+                self.planner.expect(step)
+                self.skip(step)
+
+    def skip(self, step: Step) -> None:
+        """Take note of a stage that does not run."""
+        self._record(Done(step.stage.name, step.action, step.reason))
+
+    def _record(self, done: Done) -> None:
+        self.done.append(done)
+        self.reporter.note(said_of(done))
+
+    def _run(self, step: Step) -> None:
+        started = time.perf_counter()
+        try:
+            result = self._result(step)
+        finally:
+            self.reporter.finish()
+        self.planner.settle(step.stage, result)
+        self._record(Done(step.stage.name, "run", step.reason, time.perf_counter() - started))
+
+    def _result(self, step: Step) -> Stored:
+        """Run a stage and store what it returns, or what it has got when it finds that there is no answer."""
+        stage, identity = step.stage, step.identity
+        assert identity is not None, "a stage that is left out does not run"
+        inputs = self.planner.inputs(stage)
+        begun = provenance.begin(self.config, {name: input_digest(stage, result) for name, result in inputs.items()})
+        complete = True
+        try:
+            content = self._call(stage, inputs)
+        except NoAnswer as error:
+            content, complete = unanswered(error), False
+        path = self.folder.artifact(stage.name)
+        return artifact.write(path, content, identity, begun.until_now(), complete)
+
+    def _call(self, stage: Stage, inputs: dict[str, Stored]) -> Content:
+        """Call a stage's `run` with what it declared and nothing else."""
+        # Imported now and not before: a stage brings its libraries and compiled code along.
+        run = importlib.import_module(stage.module).run
+        config = only(self.planner.config, stage.reads)
+        extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
+        if stage.draws:
+            extra |= {"folder": self.folder.path, "left_out": self.planner.missing_inputs(stage)}
+            with storing(self.folder.path):
+                content = run(config, inputs, self.reporter, **extra)
+        else:
+            content = run(config, inputs, self.reporter, **extra)
+        if not isinstance(content, Content):
+            raise TypeError(f"{stage.module}.run returned {type(content).__name__}, not Content")
+        return content
+
+    def report(self, target: Stage, wall_s: float) -> StageReport:
+        """How it went."""
+        result = self.planner.results.get(target.name)
+        summary = dict(result.summary) if result is not None else {}
+        return StageReport(
+            stage=target.name,
+            run_dir=self.folder.path,
+            artifact=self.folder.artifact(target.name) if result is not None else None,
+            reused=self.done[-1].action == "reuse",
+            wall_s=wall_s,
+            left_out=self._left_out(target, summary.pop("left_out", [])),
+            summary=summary,
+            steps=tuple(self.done),
+            no_answer=self._no_answer(summary.get("no_answer")),
+        )
+
+    def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
+        """Stages that were left out on the way, results that a drawing did without, and what the stage itself says."""
+        found = [LeftOut(done.stage, done.reason) for done in self.done if done.action == "leave out"]
+        found += self.planner.missing_inputs(target) if target.draws else ()
+        found += [LeftOut(str(entry["what"]), str(entry["why"])) for entry in by_stage]
+        return tuple(dict.fromkeys(found))
+
+    def _no_answer(self, said: dict[str, str] | None) -> NoAnswer | None:
+        """Whether the target, or something that it needs or has to do without, has no answer."""
+        if said is not None:
+            return NoAnswer(said["message"], said["advice"])
+        for done in self.done:
+            result = self.planner.results.get(done.stage)
+            if result is not None and not result.complete:
+                said = result.summary["no_answer"]
+                return NoAnswer(f"{done.stage}: {said['message']}", said["advice"])
+        return None
+
+
+def unanswered(error: NoAnswer) -> Content:
+    """What is stored of a stage without an answer: what it has got, and what it says."""
+    partial = error.partial if isinstance(error.partial, Content) else Content()
+    said = {"message": error.message, "advice": error.advice}
+    return replace(partial, summary={**partial.summary, "no_answer": said})
+
+
+def said_of(done: Done) -> str:
+    """One line about what was done with a stage."""
+    match done.action:
+        case "run":
+            return f"{done.stage}: ran in {done.wall_s:.2f} s ({done.reason})"
+        case "reuse":
+            return f"{done.stage}: reused"
+        case _:
+            return f"{done.stage}: left out, {done.reason}"

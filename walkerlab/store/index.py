@@ -1,0 +1,47 @@
+"""The files that a drawing stage has written, as a group of its artifact: names and digests."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.files import file_digest
+
+GROUP = "files"
+
+
+def index(folder: Path, files: Iterable[Path]) -> Group:
+    """The group that lists files below a run folder, to be stored at `GROUP`.
+
+    Raises ValueError for a file outside the folder and FileNotFoundError for one that is not there.
+    """
+    listed = sorted(files)
+    names = [path.relative_to(folder).as_posix() for path in listed]
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in listed]
+    return Group(
+        {
+            "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
+            "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file"),
+        }
+    )
+
+
+def indexed_files(content: Content) -> dict[str, str]:
+    """Digest of each listed file, by its path in the run folder; empty for a content without a list."""
+    group = content.groups.get(GROUP)
+    return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
+
+
+def broken_file(folder: Path, content: Content) -> str | None:
+    """What is wrong with the first listed file that is not as it was written, in words; None if all are."""
+    for name, digest in indexed_files(content).items():
+        found = file_digest(folder / PurePosixPath(name))
+        if found is None:
+            return f"{name} is missing"
+        if found != digest:
+            return f"{name} was altered"
+    return None
