@@ -31,7 +31,7 @@ from walkerlab.solvers.stepping import (
     end_state,
     interpolate,
     prepare_dense,
-    shorten,
+    rewind,
 )
 from walkerlab.solvers.vectors import combine, load, store
 
@@ -181,14 +181,12 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     return outcome
 
 
-@shorten.case(Dop853)
-def shorten_dop853(method: Dop853, system: Any, fraction: float) -> None:
-    """The step again with its length times `fraction`; its error can only have fallen."""
-    clock = method.clock
-    h = (clock[T] - clock[T_OLD]) * fraction
-    y, k1 = load(method.y_old, 0, blank(system)), load(method.stages, K1, blank(system))
-    try_step(method, system, clock[T_OLD], y, k1, h)
-    clock[T] = clock[T_OLD] + h
+@rewind.case(Dop853)
+def rewind_dop853(method: Dop853, system: Any) -> None:
+    """State and derivative of the step's start are its end again."""
+    store(load(method.y_old, 0, blank(system)), method.y, 0)
+    store(load(method.stages, K1, blank(system)), method.stages, K13)
+    method.clock[T] = method.clock[T_OLD]
 
 
 @prepare_dense.case(Dop853)

@@ -34,8 +34,8 @@ def advance(method: Any, system: Any, t_end: float) -> int:
 
 
 @by_type
-def shorten(method: Any, system: Any, fraction: float) -> None:
-    """Take the last step again with its length times `fraction`, from the same start: a step that ends at an event."""
+def rewind(method: Any, system: Any) -> None:
+    """Go back to the start of the last step, to take it again up to an event."""
 
 
 @by_type

@@ -63,18 +63,19 @@ def swing_jacobian(system: RigidWalker, t: float, y: State, J: Any) -> None:
         J[3, j] = row_2[j]
 
 
-VARIATION_BLANK = (0.0,) * 20
+DIRECTIONS = 3
+VARIATION_BLANK = (0.0,) * (4 + 4 * DIRECTIONS)
 
 
 class SwingVariation(NamedTuple):
-    """The swing phase together with its derivative with respect to the state it started from."""
+    """The swing phase together with how it changes along three directions of its starting state."""
 
     walker: RigidWalker
 
 
 @blank.case(SwingVariation)
 def variation_blank(system: SwingVariation) -> State:
-    """The state and its 4 by 4 derivative Phi, row by row."""
+    """The state and its derivative Phi (4, 3), row by row."""
     return VARIATION_BLANK
 
 
@@ -83,10 +84,9 @@ def rate_row(gradient: State, y: State) -> State:
     """One row of J Phi."""
     g0, g1, g2, g3 = gradient
     return (
-        g0 * y[4] + g1 * y[8] + g2 * y[12] + g3 * y[16],
-        g0 * y[5] + g1 * y[9] + g2 * y[13] + g3 * y[17],
-        g0 * y[6] + g1 * y[10] + g2 * y[14] + g3 * y[18],
-        g0 * y[7] + g1 * y[11] + g2 * y[15] + g3 * y[19],
+        g0 * y[4] + g1 * y[7] + g2 * y[10] + g3 * y[13],
+        g0 * y[5] + g1 * y[8] + g2 * y[11] + g3 * y[14],
+        g0 * y[6] + g1 * y[9] + g2 * y[12] + g3 * y[15],
     )
 
 
@@ -96,4 +96,4 @@ def variation_derivative(system: SwingVariation, t: float, y: State) -> State:
     walker = system.walker
     alpha_1, alpha_2 = accelerations(walker, y[0], y[1], y[2], y[3])
     row_1, row_2 = acceleration_gradients(walker, y[0], y[1], y[2], y[3])
-    return (y[2], y[3], alpha_1, alpha_2) + y[12:20] + rate_row(row_1, y) + rate_row(row_2, y)
+    return (y[2], y[3], alpha_1, alpha_2) + y[10:16] + rate_row(row_1, y) + rate_row(row_2, y)

@@ -1,0 +1,259 @@
+"""Walking with the rigid model: swing phases that end in heel strikes, observed or not.
+
+Compiled as a whole for the project's own methods; the same source runs in Python with a library's integrator.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from walkerlab.gait.outcome import Outcome
+from walkerlab.kernels import by_type, inlined, kernel
+from walkerlab.physics.rigid.heel_strike import feet_on_slope, impact
+from walkerlab.physics.rigid.walker import (
+    RigidWalker,
+    accelerations,
+    ground_reaction,
+    kinetic_energy,
+    potential_energy,
+    swing_foot_height,
+)
+from walkerlab.physics.system import State
+from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.stepping import (
+    H_NEXT,
+    OUT_OF_BUDGET,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    end_state,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
+
+LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
+FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
+HEEL_STRIKE, FALL = 0, 1  # signals of the finder
+SIGNALS = 2
+WALKED, FELL = int(Outcome.WALKED), int(Outcome.FELL)
+NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
+BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
+
+# indices into Observer.extremes
+MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT = 0, 1, 2, 3
+
+
+class Unobserved(NamedTuple):
+    """A walk of which only the heel strikes are wanted."""
+
+
+class Observer(NamedTuple):
+    """What is recorded of a walk besides its heel strikes."""
+
+    times: Any  # (samples,) s, rising
+    states: Any  # (samples, 4)
+    steps: Any  # (samples,) which step a sample belongs to
+    recorded: Any  # (1,) samples recorded so far
+    extremes: Any  # (4,) least normal force N, largest |T/N|, deepest scuff m, largest energy drift J
+    start_energy: Any  # (1,) J, at the start of the swing
+
+
+@by_type
+def observe_start(observer: Any, walker: RigidWalker, y: State) -> None:
+    """Take note of the start of a swing phase."""
+
+
+@by_type
+def observe(observer: Any, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+    """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
+
+
+@by_type
+def wants_dense(observer: Any) -> bool:
+    """Whether `observe` needs the dense output of every integration step."""
+
+
+@observe_start.case(Unobserved)
+def ignore_start(observer: Unobserved, walker: RigidWalker, y: State) -> None:
+    """Nothing."""
+
+
+@observe.case(Unobserved)
+def ignore(observer: Unobserved, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+    """Nothing."""
+
+
+@wants_dense.case(Unobserved)
+def without_dense(observer: Unobserved) -> bool:
+    """No."""
+    return False
+
+
+@observe_start.case(Observer)
+def record_start(observer: Observer, walker: RigidWalker, y: State) -> None:
+    """The energy that the swing phase must keep."""
+    observer.start_energy[0] = kinetic_energy(walker, y[0], y[1], y[2], y[3]) + potential_energy(walker, y[0], y[1])
+    record_extremes(observer, walker, y)
+
+
+@inlined
+def record_extremes(observer: Observer, walker: RigidWalker, y: State) -> None:
+    """Keep the worst of what the model assumes: section 3.1 of the paper."""
+    extremes = observer.extremes
+    along, normal = ground_reaction(walker, y[0], y[1], y[2], y[3])
+    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], normal)
+    if normal > 0.0:
+        extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], abs(along) / normal)
+    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], -swing_foot_height(walker, y[0], y[1]))
+    energy = kinetic_energy(walker, y[0], y[1], y[2], y[3]) + potential_energy(walker, y[0], y[1])
+    extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], abs(energy - observer.start_energy[0]))
+
+
+@observe.case(Observer)
+def record(observer: Observer, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+    """Samples that fall into the integration step, and extremes at eighths of it."""
+    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    t_end = t + fraction * h
+    for eighth in range(1, 9):
+        record_extremes(observer, walker, interpolate(method, system, 0.125 * eighth * fraction))
+    index = observer.recorded[0]
+    while index < observer.times.size and observer.times[index] <= t_end:
+        y = interpolate(method, system, (observer.times[index] - t) / h)
+        for i in range(4):
+            observer.states[index, i] = y[i]
+        observer.steps[index] = step
+        index += 1
+    observer.recorded[0] = index
+
+
+@wants_dense.case(Observer)
+def with_dense(observer: Observer) -> bool:
+    """Yes."""
+    return True
+
+
+@inlined
+def hip_above_fall(walker: RigidWalker, y: State) -> float:
+    """Height of the hip over the slope in leg lengths, less what counts as fallen."""
+    return math.cos(y[1] + walker.slope) - FALLEN_HIP
+
+
+@inlined
+def may_end(walker: RigidWalker, method: Any, y: State) -> bool:
+    """Whether the last step, which led to y, may hold a heel strike or a fall: false early in a swing.
+
+    A heel strike needs the swing leg ahead of the stance leg; twice the faster of the relative velocities at the
+    step's ends bounds how far the legs move apart within it.
+    """
+    if hip_above_fall(walker, y) < 0.0:
+        return True
+    old = method.y_old
+    h = method.clock[T] - method.clock[T_OLD]
+    reach = 2.0 * h * max(abs(old[2] - old[3]), abs(y[2] - y[3]))
+    return max(old[0] - old[1], y[0] - y[1]) + reach > 0.0
+
+
+@inlined
+def sample_signals(method: Any, system: Any, walker: RigidWalker, finder: CrossingFinder) -> None:
+    """Values of the heel-strike and the fall signal along the dense output."""
+    for j in range(finder.nodes.size):
+        y = interpolate(method, system, finder.nodes[j])
+        finder.values[HEEL_STRIKE, j] = feet_on_slope(walker, y[0], y[1])
+        finder.values[FALL, j] = hip_above_fall(walker, y)
+
+
+@inlined
+def heel_strike_in_step(method: Any, system: Any, finder: CrossingFinder, at_start: bool) -> float:
+    """Fraction of the last step at which the feet come down together with the swing leg ahead, or NO_CROSSING."""
+    fraction = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
+    while fraction <= 1.0:
+        y = interpolate(method, system, fraction)
+        if y[0] > y[1]:
+            return fraction
+        fraction = first_crossing(finder, HEEL_STRIKE, FALLING, fraction + 1e-12, at_start)
+    return NO_CROSSING
+
+
+@inlined
+def swing(
+    method: Any, system: Any, walker: RigidWalker, finder: CrossingFinder, observer: Any, t: float, y0: State, step: int
+) -> int:
+    """Integrate one swing phase up to and including the instant before its heel strike.
+
+    The first four numbers of the system's state are the walker's. On WALKED the method stands at the heel strike.
+    """
+    limit = t + LONGEST_SWING * math.sqrt(walker.leg_length / walker.gravity)
+    begin(method, system, t, y0, method.clock[H_NEXT])
+    observe_start(observer, walker, y0)
+    arriving, at_start = False, True
+    while method.clock[T] < limit:
+        status = advance(method, system, limit)
+        if status != STEP_DONE:
+            return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
+        if arriving:
+            continue
+        near = may_end(walker, method, end_state(method, system))
+        if near or wants_dense(observer):
+            prepare_dense(method, system)
+        strike, fall = NO_CROSSING, NO_CROSSING
+        if near:
+            sample_signals(method, system, walker, finder)
+            strike = heel_strike_in_step(method, system, finder, at_start)
+            fall = first_crossing(finder, FALL, FALLING, 0.0, False)
+        observe(observer, method, system, walker, min(1.0, strike, fall), step)
+        if fall < strike:
+            return FELL
+        if strike <= 1.0:
+            limit = method.clock[T_OLD] + strike * (method.clock[T] - method.clock[T_OLD])
+            rewind(method, system)
+            arriving = True
+        at_start = False
+    return WALKED if arriving else NO_HEEL_STRIKE
+
+
+@kernel
+def walk(
+    walker: RigidWalker,
+    method: Any,
+    finder: CrossingFinder,
+    observer: Any,
+    start: State,
+    strikes: Any,
+    before: Any,
+    after: Any,
+) -> tuple[int, int]:
+    """Walk until `strikes` is full or the walk ends.
+
+    start    state at time 0
+    strikes  (steps,) times of the heel strikes, s; written
+    before   (steps, 4) states just before them; written
+    after    (steps, 4) states just after them, roles changed; written
+
+    Returns the outcome's number and how many steps were taken.
+    """
+    t, y = 0.0, start
+    for step in range(strikes.size):
+        status = swing(method, walker, walker, finder, observer, t, y, step)
+        if status != WALKED:
+            return status, step
+        t, y = slide_onto_slope(walker, method.clock[T], end_state(method, walker))
+        strikes[step] = t
+        new = impact(walker, y[0], y[1], y[2], y[3])
+        for i in range(4):
+            before[step, i] = y[i]
+            after[step, i] = new[i]
+        y = new
+    return WALKED, strikes.size
+
+
+@inlined
+def slide_onto_slope(walker: RigidWalker, t: float, y: State) -> tuple[float, State]:
+    """Newton's last correction of the heel strike's time (s) and state: the guard is linear in the state."""
+    theta_1, theta_2, omega_1, omega_2 = y[0], y[1], y[2], y[3]
+    rate = omega_1 + omega_2
+    wait = -feet_on_slope(walker, theta_1, theta_2) / rate if rate != 0.0 else 0.0
+    alpha_1, alpha_2 = accelerations(walker, theta_1, theta_2, omega_1, omega_2)
+    late = (theta_1 + wait * omega_1, theta_2 + wait * omega_2, omega_1 + wait * alpha_1, omega_2 + wait * alpha_2)
+    return t + wait, late

@@ -1,0 +1,179 @@
+"""Where a signal crosses zero within a step: every crossing, also two or three between the step's ends.
+
+A signal is known on a step by its values along the dense output, as a polynomial. In Bernstein form a polynomial lies
+in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and halving isolates those
+there are. A sign check at the ends of a step misses double crossings.
+
+Definitions. A crossing is a change of sign; a signal that touches zero and turns back does not cross. A zero exactly
+at the start, where the event before left the signal, is divided out, so that it is neither found again nor hides a
+crossing right behind it. Of several signals that cross in one step, the caller takes the earliest.
+
+Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012), sections 3.4 and 5.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from walkerlab.kernels import inlined
+
+NO_CROSSING = 2.0
+FALLING, RISING = -1, 1
+NARROWEST = 2.0**-48
+DEPTH = 64
+
+
+class CrossingFinder(NamedTuple):
+    """Memory and matrices for signals sampled at `nodes` (fractions of a step)."""
+
+    nodes: Any  # (degree + 1,)
+    to_bernstein: Any  # (degree + 1, degree + 1), from values at the nodes to Bernstein coefficients
+    values: Any  # (signals, degree + 1), filled by the caller
+    stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
+    ends: Any  # (DEPTH, 2) where those pieces begin and end
+
+
+def new_crossing_finder(degree: int, signals: int = 1) -> CrossingFinder:
+    """A finder for `signals` signals on steps whose dense output has degree `degree`."""
+    size = degree + 1
+    nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
+    basis = np.zeros((size, size))
+    one = np.array([1.0])
+    for i in range(size):
+        binomial = np.prod([(degree - j) / (j + 1.0) for j in range(i)])
+        term = polynomial.polymul(one, polynomial.polypow([0.0, 1.0], i))
+        term = polynomial.polymul(term, polynomial.polypow([1.0, -1.0], degree - i))
+        basis[:, i] = binomial * polynomial.polyval(nodes, term)
+    nodes[-1] = 1.0
+    return CrossingFinder(
+        nodes, np.linalg.inv(basis), np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2))
+    )
+
+
+@inlined
+def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: float, zero_at_start: bool) -> float:
+    """Fraction of the step at which a signal first changes sign.
+
+    signal         row of `finder.values`
+    direction      FALLING, RISING, or 0 for both
+    after          fraction of the step before which crossings are passed over
+    zero_at_start  the signal is zero at the step's start: divide that zero out
+
+    Returns NO_CROSSING if there is none.
+    """
+    stack, ends = finder.stack, finder.ends
+    size = finder.nodes.size
+    if not spans_zero(finder, signal):
+        return NO_CROSSING
+    size = set_root_piece(finder, signal, zero_at_start)
+    top = 0
+    while top >= 0:
+        low, high = ends[top, 0], ends[top, 1]
+        signs = sign_changes(stack, top, size)
+        if high <= after or signs == 0:
+            top -= 1
+            continue
+        if (signs == 1 and low >= after) or high - low < NARROWEST:
+            top -= 1
+            rising = stack[top + 1, 0] < 0.0
+            turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
+            if turned and direction != (FALLING if rising else RISING):
+                return bisect(stack, top + 1, size, low, high)
+            continue
+        split(stack, top, size)
+        middle = 0.5 * (low + high)
+        ends[top, 0], ends[top, 1] = middle, high
+        ends[top + 1, 0], ends[top + 1, 1] = low, middle
+        top += 1
+    return NO_CROSSING
+
+
+@inlined
+def spans_zero(finder: CrossingFinder, signal: int) -> bool:
+    """Whether a signal could cross: false where it stays further from zero than its own variation could carry it."""
+    smallest, largest = finder.values[signal, 0], finder.values[signal, 0]
+    for i in range(1, finder.nodes.size):
+        smallest = min(smallest, finder.values[signal, i])
+        largest = max(largest, finder.values[signal, i])
+    room = 8.0 * (largest - smallest)
+    return smallest <= room and largest >= -room
+
+
+@inlined
+def set_root_piece(finder: CrossingFinder, signal: int, zero_at_start: bool) -> int:
+    """Coefficients of the whole step into the first place of the stack; returns how many there are."""
+    stack, size = finder.stack, finder.nodes.size
+    for i in range(size):
+        total = 0.0
+        for j in range(size):
+            total += finder.to_bernstein[i, j] * finder.values[signal, j]
+        stack[0, i] = total
+    finder.ends[0, 0], finder.ends[0, 1] = 0.0, 1.0
+    if not zero_at_start:
+        return size
+    degree = size - 1
+    for i in range(1, size):
+        stack[0, i - 1] = stack[0, i] * degree / i
+    return degree
+
+
+@inlined
+def sign_changes(stack: Any, piece: int, size: int) -> int:
+    """How often the coefficients of a piece change sign; zero counts as positive."""
+    changes = 0
+    for i in range(1, size):
+        if (stack[piece, i] < 0.0) != (stack[piece, i - 1] < 0.0):
+            changes += 1
+    return changes
+
+
+@inlined
+def split(stack: Any, piece: int, size: int) -> None:
+    """De Casteljau at the middle: the left half goes on top of the stack, the right half takes the piece's place."""
+    for i in range(size):
+        stack[piece + 1, i] = stack[piece, i]
+    for level in range(1, size):
+        stack[piece, size - level] = stack[piece + 1, size - 1]
+        for i in range(size - 1, level - 1, -1):
+            stack[piece + 1, i] = 0.5 * (stack[piece + 1, i - 1] + stack[piece + 1, i])
+    stack[piece, 0] = stack[piece + 1, size - 1]
+
+
+@inlined
+def bisect(stack: Any, piece: int, size: int, low: float, high: float) -> float:
+    """Fraction at which the only crossing of a piece lies: regula falsi (Illinois), kept inside its bracket."""
+    a, b = 0.0, 1.0
+    value_a, value_b = stack[piece, 0], stack[piece, size - 1]
+    side = 0
+    for _ in range(100):
+        if b - a < 1e-16 or value_a == value_b:
+            break
+        c = (a * value_b - b * value_a) / (value_b - value_a)
+        if not a < c < b:
+            break
+        value_c = evaluate(stack, piece, size, c)
+        if value_c == 0.0:
+            a, b = c, c
+        elif (value_c < 0.0) == (value_b < 0.0):
+            b, value_b = c, value_c
+            value_a = 0.5 * value_a if side == -1 else value_a
+            side = -1
+        else:
+            a, value_a = c, value_c
+            value_b = 0.5 * value_b if side == 1 else value_b
+            side = 1
+    return low + 0.5 * (a + b) * (high - low)
+
+
+@inlined
+def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
+    """Value of a piece at x (0 to 1): Bernstein form by nested products."""
+    degree = size - 1
+    u, power, binomial = 1.0 - x, 1.0, 1.0
+    total = stack[piece, 0] * u
+    for i in range(1, degree):
+        power *= x
+        binomial = binomial * (degree - i + 1) / i
+        total = (total + power * binomial * stack[piece, i]) * u
+    return total + power * x * stack[piece, degree]
