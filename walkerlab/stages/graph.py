@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from walkerlab.config.schema import Config
+# The table is also what the command line's help is made of, which loads no config and no pydantic.
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
 
-Inputs = Callable[[Config], tuple[str, ...]]
+Inputs = Callable[["Config"], tuple[str, ...]]
 
 
 def nothing(_config: Config) -> tuple[str, ...]:

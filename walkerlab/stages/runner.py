@@ -21,7 +21,7 @@ from walkerlab.store.content import Content
 from walkerlab.store.files import storing
 from walkerlab.store.runfolder import RunFolder
 
-__all__ = ["Done", "StageReport", "execute", "plan"]
+__all__ = ["Done", "StageReport", "execute", "plan", "preview"]
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,22 @@ def execute(
     return run.report(graph[target], time.perf_counter() - started)
 
 
+def preview(
+    config: Config, target: str, folder: RunFolder, *, force: bool = False, graph: Graph = PIPELINE
+) -> StageReport:
+    """What `execute` would do, as the report it would give before anything has run; touches nothing.
+
+    Raises ConfigError if the config has not what the target needs.
+    """
+    started = time.perf_counter()
+    refuse_without_contact(graph[target], config)
+    planner = Planner(config, folder, graph, force)
+    run = Run(planner, Silent(), jobs=1)
+    for step in planner.plan(graph.needed_for(target, config)):
+        run.skip(step)
+    return run.report(graph[target], time.perf_counter() - started)
+
+
 def refuse_without_contact(stage: Stage, config: Config) -> None:
     """Raise ConfigError if a stage is asked for that the config leaves out."""
     if stage.needs_contact and config.contact is None:
@@ -151,7 +167,8 @@ class Run:
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
         inputs = self.planner.inputs(stage)
-        begun = provenance.begin(self.config, {name: input_digest(stage, result) for name, result in inputs.items()})
+        digests = {name: input_digest(stage, result) for name, result in inputs.items()}
+        begun = provenance.begin(self.planner.config, digests)
         complete = True
         try:
             content = self._call(stage, inputs)

@@ -51,6 +51,8 @@ def write_atomically(path: Path, data: bytes) -> None:
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     with storing(path):
+        if not path.parent.is_dir():
+            raise StorageError(f"{path} could not be stored: its folder is not there any more.")
         try:
             with temporary.open("xb") as file:
                 file.write(data)

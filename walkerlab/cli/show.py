@@ -1,0 +1,89 @@
+"""`walkerlab show STAGE`: what is stored."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from walkerlab.cli.failures import print_json
+from walkerlab.cli.request import Request
+from walkerlab.cli.text import aligned, described_summary
+from walkerlab.errors import StaleError
+from walkerlab.stages.graph import Graph
+from walkerlab.stages.plan import survey
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Variable
+
+SHORT = 12
+"""Characters of a digest that are shown to people."""
+
+
+def print_stored(request: Request, graph: Graph, stage: str) -> None:
+    """Print a stage's artifact, current or not; StaleError if there is none that can be read."""
+    path = request.folder.artifact(stage)
+    step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
+    if step.found is None:
+        raise StaleError(f"there is no result to show, {path}: {step.reason}.", f"`walkerlab {stage}` makes it.")
+    if step.action != "reuse":
+        request.console.warn(f"{path} is not current: {step.reason}")
+    if request.as_json:
+        print_json(
+            {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}
+            | as_json(step.found)
+        )
+    else:
+        print("\n".join([f"{stage}: {path}", *lines(step.found)]))
+
+
+def as_json(stored: Stored) -> dict[str, Any]:
+    """All but the arrays' values."""
+    return {
+        "complete": stored.complete,
+        "summary": stored.summary,
+        "groups": {
+            path: {"attrs": dict(group.attrs), "variables": {n: labels(v) for n, v in group.variables.items()}}
+            for path, group in stored.groups.items()
+        },
+        "key": stored.identity.key,
+        "input_keys": dict(stored.identity.input_keys),
+        "code_digest": stored.identity.code_digest,
+        "content_digest": stored.digest(),
+        "provenance": asdict(stored.provenance),
+    }
+
+
+def labels(variable: Variable) -> dict[str, Any]:
+    """A variable without its values."""
+    return {
+        "dims": list(variable.dims),
+        "shape": list(variable.values.shape),
+        "units": variable.units,
+        "long_name": variable.long_name,
+    }
+
+
+def lines(stored: Stored) -> list[str]:
+    """Summary, arrays and provenance for people."""
+    result = ["summary", *described_summary(stored.summary)]
+    for path, group in stored.groups.items():
+        result.append(path)
+        result += [f"  {line}" for line in described_summary(group.attrs)]
+        result += [f"  {line}" for line in aligned([row(name, variable) for name, variable in group.variables.items()])]
+    where = stored.provenance
+    versions = {"walkerlab": where.package_version, **where.library_versions}
+    facts = {
+        "key": stored.identity.key[:SHORT],
+        "content": stored.digest()[:SHORT],
+        "made": f"{where.started_utc} to {where.ended_utc}",
+        "command": where.command_line,
+        "commit": where.git_commit,
+        "platform": where.platform,
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
+    }
+    return [*result, "provenance", *described_summary(facts)]
+
+
+def row(name: str, variable: Variable) -> list[str]:
+    """A variable as a row: name, dimensions with lengths, unit, what it is."""
+    sizes = ", ".join(f"{dim} {size}" for dim, size in zip(variable.dims, variable.values.shape, strict=True))
+    return [name, f"({sizes})", variable.units, variable.long_name]

@@ -1,0 +1,54 @@
+"""JSON values as aligned text for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+INDENT = "  "
+
+
+def described_summary(summary: Mapping[str, Any], indent: str = INDENT) -> Iterator[str]:
+    """One line a key; below it what is nested, rows of equal objects as a table."""
+    width = max((len(key) for key in summary), default=0)
+    for key, value in summary.items():
+        if isinstance(value, Mapping) and value:
+            yield f"{indent}{key}"
+            yield from described_summary(value, indent + INDENT)
+        elif is_rows(value):
+            yield f"{indent}{key}"
+            yield from (f"{indent}{INDENT}{line}" for line in table(value))
+        else:
+            yield f"{indent}{key:<{width}}  {in_words(value)}"
+
+
+def is_rows(value: Any) -> bool:
+    """Whether a value is a list of objects."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Objects as rows of a table, their keys as its head."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    return aligned([columns, *([in_words(row[key]) if key in row else "" for key in columns] for row in rows)])
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells in columns of equal width."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def in_words(value: Any) -> str:
+    """A value on one line."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    if isinstance(value, list):
+        return "  ".join(f"({in_words(item)})" if isinstance(item, list) else in_words(item) for item in value) or "-"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {in_words(item)}" for key, item in value.items()) or "-"
+    return str(value)
