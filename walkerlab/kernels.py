@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 
 KEPT_GENERATIONS = 3
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+# parts of a kernel are never entered from outside
+PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -72,7 +74,7 @@ def _age(folder: Path) -> float:
 CACHE_FOLDER = _open_cache()
 
 import numba  # noqa: E402  (the cache folder is set before anything is compiled)
-from numba.extending import overload  # noqa: E402
+from numba.extending import overload, register_jitable  # noqa: E402
 
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
@@ -83,8 +85,8 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile `function` into the kernels that call it; it has no entry of its own in the cache."""
-    return cast(F, numba.njit(**FLAGS)(function))
+    """Leave `function` as it is in Python, and compile it into the kernels that call it."""
+    return cast(F, register_jitable(**PART_FLAGS)(function))
 
 
 class ByType:
@@ -119,5 +121,5 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     def choose(*arguments: Any) -> Callable[..., Any] | None:
         return chosen._bodies.get(getattr(arguments[0], "instance_class", type(None)))
 
-    overload(chosen, strict=False, jit_options=FLAGS)(choose)
+    overload(chosen, strict=False, jit_options=PART_FLAGS)(choose)
     return chosen

@@ -17,7 +17,7 @@ from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.physics.system import State, derivative
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.stepping import BUDGET, H_NEXT, T, end_state
+from walkerlab.solvers.stepping import H_NEXT, T, clear_counts, end_state
 
 WALKED, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.NO_HEEL_STRIKE)
 SECTION = 3
@@ -99,7 +99,7 @@ def chain_rule(walker: RigidWalker, y: State, full: State, DP: Any, work: Any) -
 @kernel
 def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
     """`step_with_jacobian` for callers outside compiled code, with a fresh budget."""
-    shooting.method.counts[:BUDGET] = 0
+    clear_counts(shooting.method)
     return step_with_jacobian(shooting, z)
 
 
@@ -112,8 +112,8 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
     Returns the outcome's number of the step from z, its duration (s), the residual (largest component of P(z) - z)
     and the steps of walking it took.
     """
-    shooting.method.counts[:BUDGET] = 0
-    best, move, DP = z.copy(), z.copy(), shooting.DP.copy()
+    clear_counts(shooting.method)
+    best, move, DP = np.zeros(SECTION), np.zeros(SECTION), np.zeros((SECTION, SECTION))
     best_status, best_period, best_residual = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL
     scale, evaluations = 1.0, 0
     while evaluations < MOST_EVALUATIONS:
@@ -122,7 +122,7 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
         residual = residual_of(shooting, z, status)
         if residual < best_residual:
             best_status, best_period, best_residual = status, period, residual
-            best[:], DP[:, :] = z, shooting.DP
+            keep(z, shooting.DP, best, DP)
             scale = 1.0
             if residual <= tolerance or not newton_move(shooting, z, move):
                 break
@@ -132,8 +132,17 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
                 break
         for i in range(SECTION):
             z[i] = best[i] + scale * move[i]
-    z[:], shooting.DP[:, :] = best, DP
+    keep(best, DP, z, shooting.DP)
     return best_status, best_period, best_residual, evaluations
+
+
+@inlined
+def keep(z: Any, DP: Any, z_kept: Any, DP_kept: Any) -> None:
+    """Copy a state and the derivative there."""
+    for i in range(SECTION):
+        z_kept[i] = z[i]
+        for j in range(SECTION):
+            DP_kept[i, j] = DP[i, j]
 
 
 @inlined

@@ -33,7 +33,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.vectors import combine, load, store
+from walkerlab.solvers.vectors import combine, load, shifted, store
 
 SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
@@ -73,12 +73,6 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 
 @inlined
-def shifted(y: State, h: float, weights: State, stages: Any) -> State:
-    """State y + h sum of weights[j] stages[j]."""
-    return combine((1.0, h), (y, combine(weights, stages)))
-
-
-@inlined
 def try_step(method: Dop853, system: Any, t: float, y: State, k1: State, h: float) -> float:
     """The step from y over h into `method.y`; returns its error relative to the tolerance."""
     k2 = derivative(system, t + C[1] * h, shifted(y, h, A_2, (k1,)))
@@ -97,8 +91,14 @@ def try_step(method: Dop853, system: Any, t: float, y: State, k1: State, h: floa
     k13 = derivative(system, t + h, y_new)
     method.counts[RHS] += STAGES
     store(y_new, method.y, 0)
-    for row in range(len(used)):
-        store(used[row], method.stages, row)
+    store(k1, method.stages, K1)
+    store(k6, method.stages, K6)
+    store(k7, method.stages, K7)
+    store(k8, method.stages, K8)
+    store(k9, method.stages, K9)
+    store(k10, method.stages, K10)
+    store(k11, method.stages, K11)
+    store(k12, method.stages, K12)
     store(k13, method.stages, K13)
     return abs(h) * error_norm(method, y, y_new, combine(ERROR_5, used), combine(ERROR_3, used))
 

@@ -10,7 +10,7 @@ counts       (5,) see the indices below
 
 from typing import Any
 
-from walkerlab.kernels import by_type
+from walkerlab.kernels import by_type, inlined
 from walkerlab.physics.system import State
 
 # indices into `clock`
@@ -56,3 +56,10 @@ def end_state(method: Any, system: Any) -> State:
 @by_type
 def dense_degree(method: Any) -> int:
     """Degree of the polynomial that `interpolate` evaluates."""
+
+
+@inlined
+def clear_counts(method: Any) -> None:
+    """Start counting work anew; the budget stays."""
+    for i in range(BUDGET):
+        method.counts[i] = 0

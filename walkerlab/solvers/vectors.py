@@ -11,23 +11,42 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 
+def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
+    """Components of the sum of weights[j] vectors[j], as chains of fused multiply-adds."""
+    factors = cgutils.unpack_tuple(builder, weights)
+    columns = [cgutils.unpack_tuple(builder, vector) for vector in cgutils.unpack_tuple(builder, vectors)]
+    sums = []
+    for i in range(length):
+        total = builder.fmul(factors[0], columns[0][i])
+        for factor, column in zip(factors[1:], columns[1:], strict=True):
+            total = builder.fma(factor, column[i], total)
+        sums.append(total)
+    return sums
+
+
 @intrinsic
 def combine(context: Any, weights: Any, vectors: Any) -> Any:
     """Sum of weights[j] vectors[j], both tuples, as a tuple of the vectors' length."""
-    length = vectors.dtype.count
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        factors = cgutils.unpack_tuple(builder, arguments[0])
-        columns = [cgutils.unpack_tuple(builder, vector) for vector in cgutils.unpack_tuple(builder, arguments[1])]
-        sums = []
-        for i in range(length):
-            total = builder.fmul(factors[0], columns[0][i])
-            for factor, column in zip(factors[1:], columns[1:], strict=True):
-                total = builder.fma(factor, column[i], total)
-            sums.append(total)
+        sums = _sums(builder, arguments[0], arguments[1], vectors.dtype.count)
         return context.make_tuple(builder, signature.return_type, sums)
 
     return vectors.dtype(weights, vectors), generate
+
+
+@intrinsic
+def shifted(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
+    """The state y + h times the sum of weights[j] vectors[j]: a stage of a Runge-Kutta step."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        state, step, *rest = arguments
+        sums = _sums(builder, *rest, y.count)
+        start = cgutils.unpack_tuple(builder, state)
+        moved = [builder.fma(step, total, value) for total, value in zip(sums, start, strict=True)]
+        return context.make_tuple(builder, signature.return_type, moved)
+
+    return y(y, types.float64, weights, vectors), generate
 
 
 def _element(context: Any, builder: Any, array_type: Any, array: Any, row: Any, length: int, i: int) -> Any:

@@ -68,9 +68,9 @@ def impact_jacobian(
     r2 = -dA_12 * stance_after
     along_swing = (A_11 * r2 - A_12 * r1) * scale
     along_stance = (A_22 * r1 - A_12 * r2) * scale
-    J[:, :] = 0.0
-    J[0, 1] = 1.0
-    J[1, 0] = 1.0
+    for j in range(4):
+        J[0, j], J[1, j] = 0.0, 0.0
+    J[0, 1], J[1, 0] = 1.0, 1.0
     J[2, 0], J[2, 1] = -along_swing, along_swing
     J[3, 0], J[3, 1] = -along_stance, along_stance
     J[2, 2], J[2, 3] = -A_12 * B_11 * scale, (A_11 * B_22 - A_12 * B_12) * scale

@@ -54,13 +54,10 @@ def acceleration_gradients(
 @jacobian.case(RigidWalker)
 def swing_jacobian(system: RigidWalker, t: float, y: State, J: Any) -> None:
     """Derivatives of the swing phase's right-hand side."""
-    J[:, :] = 0.0
-    J[0, 2] = 1.0
-    J[1, 3] = 1.0
     row_1, row_2 = acceleration_gradients(system, y[0], y[1], y[2], y[3])
     for j in range(4):
-        J[2, j] = row_1[j]
-        J[3, j] = row_2[j]
+        J[0, j], J[1, j], J[2, j], J[3, j] = 0.0, 0.0, row_1[j], row_2[j]
+    J[0, 2], J[1, 3] = 1.0, 1.0
 
 
 DIRECTIONS = 3
