@@ -20,7 +20,7 @@ def print_status(request: Request, graph: Graph, check: bool) -> None:
     """Print the state of each stage; with `check`, typer.Exit(5) if one is stale, missing or damaged."""
     folder = request.folder
     steps = survey(request.resolved, folder, graph)
-    error = failing(steps)
+    error = failing(steps, graph.stages[-1].name)
     if request.as_json:
         rows = [
             {
@@ -52,10 +52,10 @@ def state_of(step: Step) -> str:
     return "missing" if step.found is None else "stale"
 
 
-def failing(steps: tuple[Step, ...]) -> StaleError | None:
+def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
     """What `--check` fails with, if it does."""
     counts = Counter(state for step in steps if (state := state_of(step)) in NOT_CURRENT)
     if not counts:
         return None
     spoken = ", ".join(f"{number} {state}" for state, number in counts.items())
-    return StaleError(f"not every result is current: {spoken}.", "`walkerlab report` makes all of them.")
+    return StaleError(f"not every result is current: {spoken}.", f"`walkerlab {last}` makes all of them.")

@@ -73,25 +73,13 @@ class Planner:
         """Take note of the results that a stage takes if they are current and that are not planned for themselves."""
         for name in stage.if_current:
             if self.graph[name] not in planned:
-                step = self.decide(self.graph[name])
+                step = self._judge(self.graph[name], force=False)
                 if step.action == "reuse":
                     self.expect(step)
 
     def decide(self, stage: Stage) -> Step:
         """What is to happen with a stage, given what became of its inputs."""
-        why = self._why_left_out(stage)
-        if why is not None:
-            return Step(stage, "leave out", why)
-        identity = Identity(
-            stage=stage.name,
-            config_slice=slice_of(self.config, stage.reads),
-            input_keys=self._input_keys(stage),
-            code_digest=self._sources.code_digest(stage.module),
-        )
-        verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
-        reason = "--force" if self.force else self._why_run(stage, identity, verdict)
-        action: Action = "run" if reason else "reuse"
-        return Step(stage, action, reason or "up to date", identity, verdict.artifact, verdict.damaged)
+        return self._judge(stage, self.force)
 
     def expect(self, step: Step) -> None:
         """Take it that a step goes as decided: what is to run will have a result."""
@@ -119,6 +107,23 @@ class Planner:
         """The results that a stage does without, and why."""
         wanted = (*stage.inputs(self.config), *stage.if_current)
         return tuple(LeftOut(name, self._why_absent(name)) for name in wanted if name not in self._keys)
+
+    def _judge(self, stage: Stage, force: bool) -> Step:
+        why = self._why_left_out(stage)
+        if why is not None:
+            return Step(stage, "leave out", why)
+        identity = Identity(
+            stage=stage.name,
+            config_slice=slice_of(self.config, stage.reads),
+            input_keys=self._input_keys(stage),
+            code_digest=self._sources.code_digest(stage.module),
+        )
+        verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
+        reason = "--force" if force else self._why_run(stage, identity, verdict)
+        if reason is None and verdict.artifact is not None:
+            kept = "up to date" if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
+            return Step(stage, "reuse", kept, identity, verdict.artifact)
+        return Step(stage, "run", reason or "--force", identity, verdict.artifact, verdict.damaged)
 
     def _why_absent(self, name: str) -> str:
         return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")

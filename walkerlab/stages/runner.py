@@ -13,7 +13,7 @@ from walkerlab.config.canonical import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, plan
+from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, no_answer, plan
 from walkerlab.stages.progress import Reporter, Silent
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
@@ -160,7 +160,8 @@ class Run:
         finally:
             self.reporter.finish()
         self.planner.settle(step.stage, result)
-        self._record(Done(step.stage.name, "run", step.reason, time.perf_counter() - started))
+        reason = step.reason if result.complete else f"no answer: {no_answer(result)}"
+        self._record(Done(step.stage.name, "run", reason, time.perf_counter() - started))
 
     def _result(self, step: Step) -> Stored:
         """Run a stage and store what it returns, or what it has got when it finds that there is no answer."""
@@ -211,8 +212,8 @@ class Run:
 
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
         """Stages that were left out on the way, results that a drawing did without, and what the stage itself says."""
-        found = [LeftOut(done.stage, done.reason) for done in self.done if done.action == "leave out"]
-        found += self.planner.missing_inputs(target) if target.draws else ()
+        found = list(self.planner.missing_inputs(target)) if target.draws else []
+        found += [LeftOut(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         found += [LeftOut(str(entry["what"]), str(entry["why"])) for entry in by_stage]
         return tuple(dict.fromkeys(found))
 
@@ -241,6 +242,6 @@ def said_of(done: Done) -> str:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s ({done.reason})"
         case "reuse":
-            return f"{done.stage}: reused"
+            return f"{done.stage}: reused ({done.reason})"
         case _:
-            return f"{done.stage}: left out, {done.reason}"
+            return f"{done.stage}: left out ({done.reason})"

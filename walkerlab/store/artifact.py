@@ -101,7 +101,7 @@ def check(path: Path, key: str) -> Verdict:
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
-        return Verdict(False, "missing")
+        return Verdict(False, "not there yet")
     except Damaged as error:
         return Verdict(False, f"damaged: {error}", damaged=True)
     if artifact.identity.key != key:

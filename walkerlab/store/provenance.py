@@ -57,7 +57,7 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
     now = utc_now()
     return Provenance(
         config=resolved_yaml(config),
-        command_line=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        command_line=shlex.join([program(), *sys.argv[1:]]),
         seed=config.seed,
         started_utc=now,
         ended_utc=now,
@@ -68,6 +68,12 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
         git_commit=git_commit(),
         input_digests=dict(input_digests),
     )
+
+
+def program() -> str:
+    """The name of the program that this process runs."""
+    name = Path(sys.argv[0]).name
+    return "walkerlab" if name == "__main__.py" else name
 
 
 def resolved_yaml(config: Config) -> str:

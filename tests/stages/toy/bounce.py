@@ -1,0 +1,7 @@
+"""How high, by the contact's stiffness."""
+
+from walkerlab.store.content import Content
+
+
+def run(config, inputs, progress):
+    return Content({}, {"height_m": inputs["drop"].summary["period_s"] / config.contact.stiffness})

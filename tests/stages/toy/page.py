@@ -1,0 +1,12 @@
+"""One page."""
+
+from walkerlab.store import index
+from walkerlab.store.content import Content
+from walkerlab.store.files import write_atomically
+
+
+def run(config, inputs, progress, folder, left_out):
+    page = folder / "report.html"
+    said = "".join(f"<p>{entry.what}: {entry.why}</p>" for entry in left_out)
+    write_atomically(page, f"<html>{sorted(inputs)}{said}</html>".encode())
+    return Content({index.GROUP: index.index(folder, [page])}, {"html": "report.html"})

@@ -1,0 +1,7 @@
+"""Free fall."""
+
+import math
+
+
+def fall_time(height: float, gravity: float) -> float:
+    return math.sqrt(2 * height / gravity)

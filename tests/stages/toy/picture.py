@@ -1,0 +1,12 @@
+"""One figure, that names what it was drawn from."""
+
+from walkerlab.store import index
+from walkerlab.store.content import Content
+from walkerlab.store.files import make_folder, write_atomically
+
+
+def run(config, inputs, progress, folder, left_out):
+    make_folder(folder / "figures")
+    figure = folder / "figures" / "figure-01.svg"
+    write_atomically(figure, f"<svg>{sorted(inputs)} without {[entry.what for entry in left_out]}</svg>".encode())
+    return Content({index.GROUP: index.index(folder, [figure])}, {"figures": ["figures/figure-01.svg"]})
