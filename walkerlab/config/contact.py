@@ -16,8 +16,9 @@ LENGTH_BOUNDS_M: Final = (1e-12, 10.0)
 STICTION_BOUNDS_M_S: Final = (1e-7, 10.0)
 FRICTION_VELOCITY_BOUNDS_M_S: Final = (1e-7, 1000.0)
 
-_ADAMS = "ADAMS/View default; not given in the paper"
-_FIG_4B = "Fig. 4b, read in ADAMS units (science notes, section 3)"
+_ADAMS = "ADAMS/View default, not given in the paper"
+_FIG_4B = "section 4 and Fig. 4b, unit not given"
+_SECTION_4 = "section 4"
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Contact(Block):
 
     units: Annotated[
         Literal["adams", "si"],
-        key("", "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s", "Fig. 4b"),
+        key("", "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s", _SECTION_4),
     ] = "adams"
     stiffness: Annotated[
         float, key("N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
@@ -63,17 +64,17 @@ class Contact(Block):
     ] = 0.1
     friction: Annotated[
         Literal["coulomb", "none"],
-        key("", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", "Fig. 4b"),
+        key("", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", _SECTION_4),
     ] = "coulomb"
     static_friction: Annotated[
-        float, key("1", "coefficient at stiction_velocity, the largest", "Fig. 4b", ge=0.0, le=100.0)
+        float, key("1", "coefficient at stiction_velocity, the largest", _SECTION_4, ge=0.0, le=100.0)
     ] = 0.9
     dynamic_friction: Annotated[
         float,
         key(
             "1",
             "coefficient beyond friction_velocity",
-            "Fig. 4b",
+            _SECTION_4,
             bounds="0 to 100, not above static_friction",
             ge=0.0,
             le=100.0,
@@ -99,7 +100,7 @@ class Contact(Block):
             "",
             "checkerboard: a lane of raised pads per leg; "
             "after-mid-swing: a swing foot touches only once it has passed the stance foot",
-            "section 3",
+            _SECTION_4,
         ),
     ] = "checkerboard"
     pad_pitch: Annotated[
@@ -107,13 +108,13 @@ class Contact(Block):
         key(
             "m",
             "pitch of the pads: step length of the rigid or the contact (own) gait, or a number, in m in any units",
-            "section 3",
+            _SECTION_4,
             bounds="rigid, own, or 1e-6 to 1e4",
         ),
     ] = "rigid"
     stance: Annotated[
         Literal["free", "pinned"],
-        key("", "pinned: a revolute joint at the first stance foot until the first heel strike", "section 3"),
+        key("", "pinned: a revolute joint at the first stance foot until the first heel strike", _SECTION_4),
     ] = "free"
 
     @model_validator(mode="before")

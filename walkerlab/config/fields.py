@@ -38,7 +38,7 @@ def key(
     sequence  a YAML list is accepted for a tuple
     limits    gt, ge, lt, le as pydantic has them
     """
-    words = {"unit": unit, "source": source, "bounds": bounds, "default": default}
+    words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default}
     extra: dict[str, Any] = {name: text for name, text in words.items() if text}
     settings: dict[str, Any] = {"description": meaning, "json_schema_extra": extra, **limits}
     if sequence:
@@ -65,7 +65,7 @@ def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[t
 
 
 def extra(field: FieldInfo, name: str) -> str:
-    """`unit`, `source`, `bounds` or `default` of a key as `key` was given it; empty if it was not."""
+    """`unit`, `source`, `bounds` or `default_in_words` of a key as `key` was given it; empty if it was not."""
     held = field.json_schema_extra
     return str(held.get(name, "")) if isinstance(held, dict) else ""
 

@@ -72,7 +72,7 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
         text = _text_of(current, asked)
         identity = str(current.path.resolve())
         if identity in seen:
-            raise refusal([Problem(asked, f"extends: {current.label} extends itself, through {len(seen)} file(s)")])
+            raise refusal([Problem(asked, f"extends: {current.label} extends itself")])
         if len(seen) == MAX_EXTENDS:
             raise refusal([Problem(asked, f"extends: more than {MAX_EXTENDS} files deep")])
         seen.append(identity)
@@ -141,8 +141,10 @@ def _decoded(data: bytes, file: ConfigFile) -> str:
 def _near(file: ConfigFile) -> str:
     """What was perhaps meant by the name of a file that is not there."""
     try:
-        beside = [str(path) for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
+        beside = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
     except (OSError, ValueError):
         beside = []
-    found = nearest(str(file.path), beside) or nearest(file.path.stem, builtin_names())
-    return shown(found)
+    found = nearest(file.path.name, beside)
+    if found:
+        return shown(str(file.path.with_name(found)), SHOWN_PATH)
+    return nearest(file.path.stem, builtin_names())

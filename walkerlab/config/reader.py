@@ -14,7 +14,7 @@ from typing import Any, Final
 from walkerlab.config.problems import Problem, refusal, shown
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
 
-MAX_CHARACTERS: Final = 128 * 1024
+MAX_CHARACTERS: Final = 64 * 1024
 MAX_DEPTH: Final = 12
 MAX_DIGITS: Final = 300
 

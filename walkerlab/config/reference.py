@@ -56,10 +56,9 @@ def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
 
 
 def _default(field: FieldInfo) -> str:
-    if field.is_required():
-        return "none"
-    if field.default_factory is not None:
-        return extra(field, "default")
+    spoken = extra(field, "default_in_words")
+    if spoken or field.is_required():
+        return spoken or "none"
     return _spelled(field.default)
 
 

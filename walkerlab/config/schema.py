@@ -85,7 +85,7 @@ class CompassWalker(Block):
         key(
             "m",
             "a, from foot to leg mass; b = L - a is the rest",
-            "Table 1: 'middle of the legs'",
+            "section 2: 'in the middle of the legs'",
             bounds="between 0 and leg_length_m, both excluded",
             default="leg_length_m / 2",
             gt=0.0,
@@ -95,14 +95,14 @@ class CompassWalker(Block):
     hip_mass_kg: Annotated[float, key("kg", "M_H, mass at the hip", "Table 1", ge=0.0, le=1e6)] = 10.0
     leg_inertia_kg_m2: Annotated[
         float,
-        key("kg m^2", "inertia of one leg about its own centre of mass", "the paper has point masses", ge=0.0, le=1e9),
+        key("kg m^2", "inertia of one leg about its own centre of mass", "section 4: point masses", ge=0.0, le=1e9),
     ] = 0.0
     foot_radius_m: Annotated[
         float,
         key(
             "m",
             "radius of the ball foot of the physical model, 0 is a point; its centre is L - r from the hip",
-            "chosen small; not given in the paper",
+            "section 4: 'beveled with a radius of 1 mm'",
             bounds="from 0 to below leg_length_m / 2",
             ge=0.0,
         ),
@@ -187,13 +187,13 @@ class Config(Block):
         Field(pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$"),
     ] = "paper"
     walker: CompassWalker = CompassWalker()
-    gravity_m_s2: Annotated[float, key("m/s^2", "g", "standard gravity, rounded", ge=1e-6, le=1e4)] = 9.81
+    gravity_m_s2: Annotated[float, key("m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)] = 9.81
     slope_rad: Annotated[
         float,
         key(
             "rad",
             "slope, positive where it descends in the walking direction",
-            "the paper's x_p sums to -2 * 0.0174",
+            "not stated; both feet of x_p (eq. 11) stand on it",
             bounds="between -pi/2 and pi/2, both excluded",
             gt=-RIGHT_ANGLE,
             lt=RIGHT_ANGLE,
@@ -201,7 +201,7 @@ class Config(Block):
     ] = 0.0174
     equations: Annotated[
         Equations,
-        key("", "corrected, or as-printed: Appendix A as the paper prints it", "science notes, section 2"),
+        key("", "corrected, or as-printed: Appendix A as the paper prints it", "Appendix A, eq. A.5: the sign of C_21"),
     ] = "corrected"
     start: Annotated[
         Start,
@@ -213,7 +213,7 @@ class Config(Block):
             bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
         ),
     ] = "fixed-point"
-    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", "section 4", ge=1, le=10_000)] = 5
+    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", "this project", ge=1, le=10_000)] = 5
     contact: Contact | None = None
     solver: Solvers = Solvers()
     outputs: Annotated[

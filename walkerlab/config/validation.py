@@ -30,6 +30,7 @@ _REASONS: Final = {
     "too_long": "has too many values",
     "string_pattern_mismatch": "is not safe as the name of a folder",
 }
+MAX_PROBLEMS: Final = 100
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -61,7 +62,7 @@ def _place(problem: Problem) -> tuple[str, int, int]:
 
 
 def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list[Problem]:
-    details = error.errors(include_url=False)
+    details = error.errors(include_url=False)[:MAX_PROBLEMS]
     return [_problem(detail, tree, model) for detail in details if detail["type"] != _FOLLOWS_FROM_ANOTHER]
 
 
@@ -80,23 +81,28 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
 
 def _unknown_key(path: tuple[str, ...], tree: Mapping) -> Problem:
     block: type[Block] = Config
-    for name in path[:-1]:
-        block = block_of(block.model_fields[name]) or block
-    siblings = [*block.model_fields, *(SlopeInDegrees.model_fields if block is Config else ())]
-    node, position = _node_at(tree, path)
-    dotted = shown(".".join(path))
+    for above in path[:-1]:
+        block = block_of(block.model_fields[above]) or block
+    name = path[-1]
+    parent, _ = _node_at(tree, path[:-1])
+    position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
+    node, _ = _node_at(tree, path)
     if path == ("extends",):
         return Problem(position, "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
-    prefix = ".".join((*path[:-1], ""))
-    beside = nearest(path[-1], siblings)
-    meant = f"{prefix}{beside}" if beside else _elsewhere(path[-1])
+    siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
+    beside = nearest(name, siblings) if "." not in name else ""
+    meant = ".".join((*path[:-1], beside)) if beside else _elsewhere(name)
     value = f" ({shown_value(node)})" if node else ""
-    return Problem(position, f"{dotted}: unknown key{value}", ", ".join(siblings), meant)
+    text = f"{shown('.'.join(path))}: unknown key{value}"
+    return Problem(position, text, ", ".join(siblings), meant)
 
 
 def _elsewhere(name: str) -> str:
     """A key of another block that is like `name`, with its path."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
+    if "." in name:
+        *blocks, last = nearest(name, paths.values()).split(".")
+        return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
     found = nearest(name, paths)
     return paths[found] if found else ""
 
@@ -121,14 +127,11 @@ def _node_at(tree: Mapping, location: tuple[int | str, ...]) -> tuple[Node | Non
     """
     node: Node = tree
     position = tree.position
-    for index, part in enumerate(location):
+    for part in location:
         if isinstance(node, Mapping) and isinstance(part, str):
             if part not in node.entries:
                 return None, position
-            position = node.keys[part]
-            node = node.entries[part]
+            position, node = node.keys[part], node.entries[part]
         elif isinstance(node, Sequence) and isinstance(part, int) and part < len(node.items):
             node = node.items[part]
-        if not isinstance(node, Mapping) or index == len(location) - 1:
-            position = node.position
-    return node, position
+    return node, node.position

@@ -1,0 +1,76 @@
+"""The configs that come with the package, their mirror in configs/, and the text of a resolved config."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
+from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.schema import METHODS, OUTPUTS, Config
+from walkerlab.config.writer import to_yaml
+
+MIRROR = Path(__file__).parents[2] / "configs"
+
+
+def test_the_built_in_configs_are_these() -> None:
+    assert builtin_names() == ("contact-si", "paper", "paper-as-printed", "rigid-only", "slope-3deg")
+
+
+@pytest.mark.skipif(not MIRROR.is_dir(), reason="the repository's configs/ are not beside the tests")
+def test_configs_in_the_repository_are_the_same_texts() -> None:
+    assert sorted(path.stem for path in MIRROR.glob("*.yaml")) == list(builtin_names())
+    for path in MIRROR.glob("*.yaml"):
+        assert path.read_bytes() == (BUILTIN_FOLDER / path.name).read_bytes()
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_a_built_in_config_runs_under_its_own_name(name: str) -> None:
+    loaded = load(Path(name))
+    assert (loaded.run_name, loaded.warnings) == (name, ())
+
+
+def test_as_printed_differs_from_the_paper_by_the_equations_only() -> None:
+    printed, paper = load(Path("paper-as-printed")).config, load().config
+    assert printed == paper.model_copy(update={"name": "paper-as-printed", "equations": "as-printed"})
+
+
+def test_the_wrong_units_are_the_papers_numbers_read_in_si() -> None:
+    contact = load(Path("contact-si")).config.contact
+    assert contact is not None
+    law = contact.in_si()
+    assert (law.stiffness_N_per_m_e, law.exponent, law.damping_N_s_m) == (1e5, 1.0, 90.0)
+    assert (law.full_damping_penetration_m, law.static_friction, law.dynamic_friction) == (1e-4, 0.9, 0.7)
+    assert (law.stiction_velocity_m_s, law.friction_velocity_m_s) == (0.1, 1.0)
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_a_resolved_config_loads_back_to_itself(name: str, loaded: Callable[..., LoadedConfig]) -> None:
+    config = load(Path(name)).config
+    assert loaded(to_yaml(config)).config == config
+
+
+number = st.floats(1e-3, 0.45)
+
+
+@st.composite
+def configs(draw: st.DrawFn) -> dict[str, Any]:
+    return {
+        "name": draw(st.sampled_from(["1e5", "null", "no", "007", "a.b-c_", "x" * 64])),
+        "walker": {"leg_mass_kg": draw(st.floats(1e-6, 1e6)), "foot_to_mass_m": draw(number)},
+        "slope_rad": draw(st.floats(-1.5, 1.5)),
+        "strides": draw(st.integers(1, 10_000)),
+        "contact": draw(st.none() | st.fixed_dictionaries({"pad_pitch": number | st.sampled_from(["rigid", "own"])})),
+        "solver": {"rigid": {"method": draw(st.sampled_from(METHODS)), "rtol": draw(st.floats(1e-14, 0.1))}},
+        "outputs": draw(st.lists(st.sampled_from(OUTPUTS))),
+    }
+
+
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(configs())
+def test_any_config_loads_back_from_its_text(loaded: Callable[..., LoadedConfig], data: dict[str, Any]) -> None:
+    config = Config.model_validate(data)
+    assert loaded(to_yaml(config)).config == config

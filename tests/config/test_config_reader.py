@@ -1,0 +1,153 @@
+"""YAML text to a tree: YAML 1.2 scalars, positions, and texts that are no config."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from walkerlab.config.reader import MAX_CHARACTERS, MAX_DEPTH, read, value_of
+from walkerlab.config.tree import Mapping, plain
+from walkerlab.errors import ConfigError
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        read(text, "f.yaml")
+    return caught.value.message
+
+
+def fate(text: str) -> str:
+    try:
+        read(text, "f.yaml")
+    except ConfigError as error:
+        return "refused with its place" if error.message.startswith("f.yaml:") else error.message
+    return "read"
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e7", 1e7),
+        ("1E-3", 1e-3),
+        ("1.", 1.0),
+        (".5", 0.5),
+        ("-1.5e+2", -150.0),
+        ("+3", 3),
+        ("007", 7),
+        ("0x1F", 31),
+        ("0o17", 15),
+        ("no", "no"),
+        ("yes", "yes"),
+        ("off", "off"),
+        ("true", True),
+        ("False", False),
+        ("null", None),
+        ("~", None),
+        ("", None),
+        ("1_000", "1_000"),
+        ("1:30", "1:30"),
+        ("2001-12-14", "2001-12-14"),
+        ("-.inf", -math.inf),
+        (".e3", ".e3"),
+        ("9" * 5000, math.inf),
+    ],
+)
+def test_a_plain_scalar_means_what_yaml_1_2_says(text: str, value: Any) -> None:
+    assert value_of(text) == value
+    assert type(value_of(text)) is type(value)
+
+
+def test_nan_is_a_number_until_the_schema_refuses_it() -> None:
+    value = value_of(".nan")
+    assert isinstance(value, float)
+    assert math.isnan(value)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_as_python_prints_it_is_read_back(number: float) -> None:
+    assert value_of(repr(number)) == number
+
+
+def test_a_quoted_scalar_is_a_text() -> None:
+    root = read("a: '1'\nb: \"no\"\nc: |\n  x\n", "f.yaml")
+    assert root is not None
+    assert plain(root) == {"a": "1", "b": "no", "c": "x\n"}
+
+
+def test_every_key_and_value_knows_its_line_and_column() -> None:
+    root = read("# c\na:\n  b: [1, no]\n", "f.yaml")
+    assert isinstance(root, Mapping)
+    inner = root.entries["a"]
+    assert isinstance(inner, Mapping)
+    assert str(root.keys["a"]) == "f.yaml:2:1"
+    assert str(inner.keys["b"]) == "f.yaml:3:3"
+    assert str(inner.entries["b"].position) == "f.yaml:3:6"
+
+
+def test_a_text_inside_a_longer_one_counts_columns_from_there() -> None:
+    root = read("[1, x]", "--set start=[1, x]", column=7)
+    assert root is not None
+    assert root.position.column == 7
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "---\n"])
+def test_a_text_without_content_is_nothing(text: str) -> None:
+    root = read(text, "f.yaml")
+    assert root is None or plain(root) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "reason"),
+    [
+        ("a: 1\nb: 2\na: 3\n", "f.yaml:3:1", "a: given a second time, first at f.yaml:1:1"),
+        ("a: &x 1\n", "f.yaml:1:4", "anchor &x"),
+        ("a: *x\n", "f.yaml:1:4", "alias *x"),
+        ("a: !!python/object/apply:os.system [ls]\n", "f.yaml:1:4", "tag"),
+        ("a: 1\n---\nb: 2\n", "f.yaml:2:1", "a second document"),
+        ("%YAML 1.1\n---\na: no\n", "f.yaml:2:1", "YAML 1.2"),
+        ("? [a, b]\n: 1\n", "f.yaml:1:3", "a key is a word"),
+        ("a:\n\t- 1\n", "f.yaml:2:1", "not YAML"),
+        ("a: {b: 1\n", "f.yaml:2:1", "not YAML"),
+        ("a: 1\n  b: 2\n", "f.yaml:2:4", "not YAML"),
+        ("a: 1\nb: \x00\n", "f.yaml:2:4", "\\x00 cannot be in a config"),
+        ("a: \x1b[31m\n", "f.yaml:1:4", "\\x1b cannot be in a config"),
+        ("a: \ud800\n", "f.yaml:1:4", "\\ud800 cannot be in a config"),
+    ],
+)
+def test_what_is_no_plain_tree_is_refused_where_it_stands(text: str, place: str, reason: str) -> None:
+    message = refusal(text)
+    assert message.startswith(f"{place}: ")
+    assert reason in message
+
+
+def test_every_duplicate_key_is_reported() -> None:
+    assert refusal("a: 1\na: 2\nb: 1\nb: 2\n").count("given a second time") == 2
+
+
+def test_a_tower_of_aliases_is_refused_before_it_is_built() -> None:
+    bomb = "a: &a [1, 1]\n" + "".join(
+        f"{new}: &{new} [*{old}, *{old}]\n" for old, new in zip("abcdefg", "bcdefgh", strict=True)
+    )
+    assert "anchor &a" in refusal(bomb)
+
+
+@pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "? "])
+def test_deep_nesting_is_refused_without_recursion(opening: str) -> None:
+    message = refusal(opening * 5000)
+    assert f"nested deeper than {MAX_DEPTH} levels" in message or "a key is a word" in message
+
+
+def test_a_text_longer_than_any_config_is_refused_unread() -> None:
+    assert "not a config" in refusal("a" * (MAX_CHARACTERS + 1))
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    assert fate(text) in ("read", "refused with its place")
+
+
+@given(st.text(alphabet="[]{}:,-?&*!|>'\"%@`# \n\t~ab1.", max_size=60))
+def test_any_punctuation_is_read_or_refused(text: str) -> None:
+    assert fate(text) in ("read", "refused with its place")

@@ -1,0 +1,44 @@
+"""The reference lists every key there is, with what a reader needs to set it."""
+
+import json
+
+from walkerlab.config.fields import leaves
+from walkerlab.config.reference import as_json_schema, as_text, keys
+from walkerlab.config.schema import METHODS, Config
+
+
+def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
+    listed = [row.key for row in keys()]
+    assert {".".join(path) for path, _ in leaves(Config)} | {"extends", "slope_deg"} == set(listed)
+    assert len(listed) == len(set(listed))
+
+
+def test_each_row_has_type_bounds_default_meaning_and_source() -> None:
+    for row in keys():
+        assert all((row.type, row.bounds, row.default, row.meaning, row.source)), row
+
+
+def test_bounds_and_units_are_spelled_out() -> None:
+    rows = {row.key: row for row in keys()}
+    length = rows["walker.leg_length_m"]
+    assert (length.unit, length.bounds, length.default) == ("m", "from 0.001 to 1000", "1")
+    assert rows["walker.foot_to_mass_m"].default == "leg_length_m / 2"
+    assert rows["solver.contact.method"].default == "radau5"
+    assert rows["solver.rigid.method"].bounds == ", ".join(METHODS)
+
+
+def test_the_text_is_a_table_with_one_line_a_key() -> None:
+    lines = as_text().splitlines()
+    width = lines[0].count("|")
+    table = [line for line in lines if line.startswith("|")]
+    assert len(table) == len(keys()) + 2
+    assert {line.count("|") for line in table} == {width}
+    assert len({len(line) for line in table}) == 1
+
+
+def test_the_json_schema_describes_files_and_is_json() -> None:
+    schema = json.loads(json.dumps(as_json_schema(), allow_nan=False))
+    assert set(schema["properties"]) == {*Config.model_fields, "extends", "slope_deg"}
+    assert schema["additionalProperties"] is False
+    assert schema["not"] == {"required": ["slope_rad", "slope_deg"]}
+    assert schema["properties"]["gravity_m_s2"]["unit"] == "m/s^2"

@@ -1,0 +1,191 @@
+"""What the schema admits and refuses; every bound is checked at both of its sides."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from walkerlab.config.fields import Block, extra, leaves
+from walkerlab.config.schema import METHODS, CompassWalker, Config, Contact, SolverSettings
+
+
+def admits(block: type[Block], **values: Any) -> bool:
+    try:
+        block(**values)
+    except ValidationError:
+        return False
+    return True
+
+
+def test_the_defaults_are_the_papers() -> None:
+    config = Config()
+    walker = config.walker
+    assert (walker.leg_length_m, walker.leg_mass_kg, walker.hip_mass_kg) == (1.0, 5.0, 10.0)
+    assert (walker.foot_to_mass_m, walker.mass_to_hip_m, walker.total_mass_kg) == (0.5, 0.5, 20.0)
+    assert (config.gravity_m_s2, config.slope_rad, config.strides, config.seed) == (9.81, 0.0174, 5, 0)
+    assert (config.equations, config.start, config.contact) == ("corrected", "fixed-point", None)
+    assert config.outputs == ("states", "energies", "forces")
+
+
+def test_each_model_has_its_own_solver_defaults_even_in_a_partial_block() -> None:
+    solver = Config.model_validate({"solver": {"rigid": {"rtol": 1e-6}, "contact": {"atol": 1e-6}}}).solver
+    assert (solver.rigid.method, solver.rigid.rtol, solver.rigid.atol) == ("dop853", 1e-6, 1e-12)
+    assert (solver.contact.method, solver.contact.rtol, solver.contact.atol) == ("radau5", 1e-7, 1e-6)
+    assert isinstance(solver.contact, SolverSettings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_is_allowed_for_both_models(method: str) -> None:
+    solver = {"rigid": {"method": method}, "contact": {"method": method}}
+    assert Config.model_validate({"solver": solver}).solver.rigid.method == method
+
+
+def test_a_config_cannot_be_changed_and_can_be_a_key() -> None:
+    config = Config(contact=Contact())
+    with pytest.raises(ValidationError):
+        config.strides = 6  # type: ignore[misc]
+    assert {config: 1}[Config(contact=Contact())] == 1
+
+
+@pytest.mark.parametrize("field", [pytest.param(field, id=".".join(path)) for path, field in leaves(Config)])
+def test_every_key_has_a_meaning_a_source_and_a_unit_if_it_is_a_number(field: Any) -> None:
+    assert field.description
+    assert extra(field, "source")
+    if field.annotation in (float, int):
+        assert extra(field, "unit")
+
+
+@pytest.mark.parametrize(
+    ("block", "values"),
+    [
+        (CompassWalker, {"leg_length_m": 1e-3, "foot_radius_m": 1e-6}),
+        (CompassWalker, {"leg_length_m": 1e3}),
+        (CompassWalker, {"foot_to_mass_m": 0.01}),
+        (CompassWalker, {"foot_to_mass_m": 0.99}),
+        (CompassWalker, {"hip_mass_kg": 0.0}),
+        (CompassWalker, {"hip_mass_kg": 1e6}),
+        (CompassWalker, {"leg_mass_kg": 1e-6}),
+        (CompassWalker, {"leg_mass_kg": 1e3}),
+        (CompassWalker, {"leg_inertia_kg_m2": 0.4}),
+        (CompassWalker, {"foot_radius_m": 0.0}),
+        (CompassWalker, {"foot_radius_m": 0.4999}),
+        (Config, {"gravity_m_s2": 1.62}),
+        (Config, {"gravity_m_s2": 24.8}),
+        (Config, {"slope_rad": math.radians(-1.0)}),
+        (Config, {"slope_rad": 0.0}),
+        (Config, {"slope_rad": math.radians(45.0)}),
+        (Config, {"slope_rad": math.radians(89.999)}),
+        (Config, {"start": [-0.2, 0.17, 1e3, -1e3]}),
+        (Config, {"outputs": []}),
+        (Config, {"strides": 1}),
+        (Contact, {"units": "si", "stiffness": 1e14}),
+        (Contact, {"units": "si", "damping": 1e8}),
+        (Contact, {"damping": 0}),
+        (Contact, {"exponent": 1}),
+        (Contact, {"exponent": 3}),
+        (Contact, {"static_friction": 100, "dynamic_friction": 100}),
+        (Contact, {"static_friction": 0, "dynamic_friction": 0}),
+        (Contact, {"units": "si", "stiction_velocity": 1e-7}),
+        (Contact, {"units": "si", "stiction_velocity": 10, "friction_velocity": 100}),
+        (Contact, {"stiction_velocity": 1e-4}),
+        (Contact, {"pad_pitch": 0.36}),
+        (Contact, {"pad_pitch": "own"}),
+        (SolverSettings, {"rtol": 1e-14, "atol": 1e-300}),
+        (SolverSettings, {"rtol": 0.1}),
+    ],
+)
+def test_the_extremes_are_admitted(block: type[Block], values: dict[str, Any]) -> None:
+    assert admits(block, **values)
+
+
+@pytest.mark.parametrize(
+    ("block", "values"),
+    [
+        (CompassWalker, {"leg_length_m": 0.0}),
+        (CompassWalker, {"leg_length_m": -1.0}),
+        (CompassWalker, {"foot_to_mass_m": 0.0}),
+        (CompassWalker, {"foot_to_mass_m": 1.0}),
+        (CompassWalker, {"foot_to_mass_m": 1.5}),
+        (CompassWalker, {"foot_to_mass_m": 1.0, "leg_inertia_kg_m2": 1.0}),
+        (CompassWalker, {"leg_mass_kg": 0.0}),
+        (CompassWalker, {"hip_mass_kg": -1.0}),
+        (CompassWalker, {"leg_inertia_kg_m2": -1e-9}),
+        (CompassWalker, {"foot_radius_m": -1e-9}),
+        (CompassWalker, {"foot_radius_m": 0.5}),
+        (CompassWalker, {"type": "kneed"}),
+        (Config, {"gravity_m_s2": 0.0}),
+        (Config, {"gravity_m_s2": -9.81}),
+        (Config, {"slope_rad": math.pi / 2}),
+        (Config, {"slope_rad": -math.pi / 2}),
+        (Config, {"strides": 0}),
+        (Config, {"strides": 10_001}),
+        (Config, {"seed": -1}),
+        (Config, {"equations": "printed"}),
+        (Contact, {"exponent": 0.99}),
+        (Contact, {"exponent": 3.01}),
+        (Contact, {"stiffness": 0}),
+        (Contact, {"damping": -1}),
+        (Contact, {"static_friction": -0.1}),
+        (Contact, {"static_friction": 0.5}),
+        (Contact, {"dynamic_friction": 0.91}),
+        (Contact, {"stiction_velocity": 1000}),
+        (Contact, {"friction_velocity": 100}),
+        (Contact, {"units": "si", "stiction_velocity": 100, "friction_velocity": 1000}),
+        (Contact, {"stiction_velocity": 0}),
+        (Contact, {"full_damping_penetration": 0}),
+        (Contact, {"full_damping_penetration": 1e5}),
+        (Contact, {"pad_pitch": 0}),
+        (Contact, {"pad_pitch": "wide"}),
+        (SolverSettings, {"rtol": 0}),
+        (SolverSettings, {"rtol": 0.11}),
+        (SolverSettings, {"atol": 0}),
+        (SolverSettings, {"method": "euler"}),
+    ],
+)
+def test_what_lies_beyond_the_bounds_is_refused(block: type[Block], values: dict[str, Any]) -> None:
+    assert not admits(block, **values)
+
+
+@pytest.mark.parametrize("value", [True, "1", None, [1.0], math.nan, math.inf, -math.inf, 10**400])
+def test_a_number_is_a_finite_number_and_nothing_like_one(value: Any) -> None:
+    assert not admits(Config, gravity_m_s2=value)
+    assert not admits(Config, strides=value)
+
+
+def test_the_mass_sits_in_the_middle_of_a_leg_of_any_length_unless_it_is_told() -> None:
+    assert CompassWalker(leg_length_m=0.3).foot_to_mass_m == 0.15
+
+
+def test_outputs_are_a_set_in_the_order_of_the_schema() -> None:
+    assert Config.model_validate({"outputs": ["forces", "states", "forces"]}).outputs == ("states", "forces")
+
+
+def test_adams_numbers_mean_the_same_quantities_in_si() -> None:
+    in_si = Contact().in_si()
+    assert in_si.stiffness_N_per_m_e == pytest.approx(3.98107170553e11, rel=1e-11)  # 1e5 * 10**6.6
+    assert in_si.damping_N_s_m == 9.0e4
+    assert in_si.full_damping_penetration_m == pytest.approx(1e-4, rel=1e-15)
+    assert (in_si.stiction_velocity_m_s, in_si.friction_velocity_m_s) == (0.1, 1.0)
+    assert (in_si.exponent, in_si.static_friction, in_si.dynamic_friction) == (2.2, 0.9, 0.7)
+
+
+@given(st.floats(1.0, 3.0), st.floats(1e-3, 1e3))
+def test_a_force_in_newton_does_not_depend_on_the_units_of_its_law(exponent: float, penetration_mm: float) -> None:
+    law = Contact(exponent=exponent).in_si()
+    in_adams_units = 1e5 * penetration_mm**exponent
+    assert law.stiffness_N_per_m_e * (penetration_mm / 1000) ** exponent == pytest.approx(in_adams_units, rel=1e-12)
+
+
+@given(st.floats(1.0, 3.0))
+def test_a_key_left_out_is_the_same_quantity_in_either_units(exponent: float) -> None:
+    adams, si = Contact(exponent=exponent).in_si(), Contact(units="si", exponent=exponent).in_si()
+    for name in adams.__dataclass_fields__:
+        assert getattr(adams, name) == pytest.approx(getattr(si, name), rel=1e-14)
+
+
+def test_numbers_in_si_are_taken_as_they_are() -> None:
+    law = Contact(units="si", stiffness=1e5, exponent=1.0, damping=90.0).in_si()
+    assert (law.stiffness_N_per_m_e, law.damping_N_s_m, law.full_damping_penetration_m) == (1e5, 90.0, 1e-4)

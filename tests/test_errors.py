@@ -1,0 +1,33 @@
+"""Every failure a user can act on carries its message, its advice and its exit code."""
+
+import pickle
+
+import pytest
+
+from walkerlab import errors
+
+
+@pytest.mark.parametrize(
+    ("kind", "exit_code"),
+    [
+        (errors.ConfigError, 3),
+        (errors.NoAnswer, 4),
+        (errors.StorageError, 4),
+        (errors.StaleError, 5),
+        (errors.LockedError, 6),
+    ],
+)
+def test_each_failure_has_the_exit_code_of_the_command_line(kind: type[errors.WalkerlabError], exit_code: int) -> None:
+    assert issubclass(kind, errors.WalkerlabError)
+    assert kind.exit_code == exit_code
+
+
+def test_a_failure_says_what_happened_and_what_to_do() -> None:
+    error = errors.NoAnswer("no gait at 10 deg", "try a slope below 5 deg", partial={"states": 3})
+    assert (str(error), error.advice, error.partial) == ("no gait at 10 deg", "try a slope below 5 deg", {"states": 3})
+
+
+def test_a_failure_survives_the_way_from_a_worker_process() -> None:
+    sent = errors.NoAnswer("no gait", "less slope")
+    got = pickle.loads(pickle.dumps(sent))
+    assert (type(got), got.message, got.advice) == (errors.NoAnswer, "no gait", "less slope")
