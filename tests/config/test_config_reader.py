@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walkerlab.config.reader import MAX_CHARACTERS, MAX_DEPTH, read, value_of
@@ -59,12 +59,18 @@ def test_a_plain_scalar_means_what_yaml_1_2_says(text: str, value: Any) -> None:
     assert type(value_of(text)) is type(value)
 
 
+@pytest.mark.parametrize("text", ["-0", "-0.0", "-0e5"])
+def test_there_is_no_negative_zero_so_that_equal_configs_have_equal_keys(text: str) -> None:
+    assert str(value_of(text)) in ("0", "0.0")
+
+
 def test_nan_is_a_number_until_the_schema_refuses_it() -> None:
     value = value_of(".nan")
     assert isinstance(value, float)
     assert math.isnan(value)
 
 
+@settings(deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_number_as_python_prints_it_is_read_back(number: float) -> None:
     assert value_of(repr(number)) == number
@@ -143,11 +149,13 @@ def test_a_text_longer_than_any_config_is_refused_unread() -> None:
     assert "not a config" in refusal("a" * (MAX_CHARACTERS + 1))
 
 
+@settings(deadline=None)
 @given(st.text(max_size=200))
 def test_any_text_is_read_or_refused(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")
 
 
+@settings(deadline=None)
 @given(st.text(alphabet="[]{}:,-?&*!|>'\"%@`# \n\t~ab1.", max_size=60))
 def test_any_punctuation_is_read_or_refused(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")

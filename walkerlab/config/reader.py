@@ -40,7 +40,7 @@ def value_of(text: str) -> str | int | float | bool | None:
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text, 0)
     if _FLOAT.fullmatch(text):
-        return float(text)
+        return float(text) + 0.0  # no negative zero: one number, one text, one key
     if _INFINITE.fullmatch(text) or _NAN.fullmatch(text):
         return float(text.lower().replace(".", ""))
     return text

@@ -1,0 +1,138 @@
+"""A file over what it extends, and `--set` and `--strides` over both."""
+
+import math
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.schema import Config, Contact
+from walkerlab.errors import ConfigError
+
+Write = Callable[..., Path]
+Loaded = Callable[..., LoadedConfig]
+Refused = Callable[..., str]
+
+
+def test_a_file_inherits_and_blocks_are_merged(write: Write) -> None:
+    write("extends: paper\nname: base\nstrides: 7\nwalker: {hip_mass_kg: 3}\n", "base.yaml")
+    config = load(write("extends: base.yaml\nwalker: {leg_mass_kg: 2}\ncontact: {damping: 50}\n")).config
+    assert (config.walker.hip_mass_kg, config.walker.leg_mass_kg, config.strides) == (3, 2, 7)
+    assert config.contact is not None
+    assert (config.contact.damping, config.contact.stiffness) == (50, 1e5)
+
+
+def test_the_name_is_not_inherited_so_that_runs_do_not_mix(loaded: Loaded) -> None:
+    assert loaded("extends: paper\n").run_name == "mine"
+
+
+@pytest.mark.parametrize("slope", ["slope_deg: 3", "slope_rad: 0.05235987755982989"])
+def test_a_slope_displaces_the_inherited_one_in_either_unit(write: Write, slope: str) -> None:
+    write("slope_deg: 1\n", "base.yaml")
+    config = load(write(f"extends: base.yaml\n{slope}\n")).config
+    assert config.slope_rad == pytest.approx(math.radians(3), rel=1e-15)
+
+
+def test_null_leaves_an_inherited_block_out(loaded: Loaded) -> None:
+    assert loaded("extends: paper\ncontact: null\n").config.contact is None
+
+
+def test_a_list_is_replaced_whole(loaded: Loaded) -> None:
+    assert loaded("extends: paper\noutputs: [forces]\n").config.outputs == ("forces",)
+
+
+def test_a_problem_in_an_inherited_file_is_placed_there(write: Write) -> None:
+    write("strides: none\n", "base.yaml")
+    with pytest.raises(ConfigError, match=r"base\.yaml:1:10: strides: 'none' is not an integer"):
+        load(write("extends: base.yaml\n"))
+
+
+def test_a_circle_is_refused(write: Write) -> None:
+    write("extends: mine.yaml\n", "other.yaml")
+    with pytest.raises(ConfigError, match=r"other\.yaml:1:10: extends: .*mine\.yaml extends itself"):
+        load(write("extends: other.yaml\n"))
+
+
+def test_a_missing_parent_is_placed_where_it_is_asked_for(refused: Refused) -> None:
+    assert re.match(r"mine.yaml:2:10: there is no config .*nope\.yaml", refused("strides: 3\nextends: nope.yaml\n"))
+
+
+@pytest.mark.parametrize("parent", ["[paper]", "3", "''", "{a: 1}"])
+def test_a_parent_is_the_name_of_a_config(refused: Refused, parent: str) -> None:
+    assert "extends: is not the name of a config" in refused(f"extends: {parent}\n")
+
+
+def test_a_long_chain_ends(write: Write) -> None:
+    for index in range(20):
+        write(f"extends: c{index + 1}.yaml\n", f"c{index}.yaml")
+    with pytest.raises(ConfigError, match="files deep"):
+        load(write("extends: c0.yaml\n"))
+
+
+def test_a_value_is_yaml_typed_by_the_schema() -> None:
+    config = load(
+        None, ["contact.stiffness=1e6", "outputs=[forces]", "walker.hip_mass_kg=0", "equations=as-printed"]
+    ).config
+    assert config.contact is not None
+    assert (config.contact.stiffness, config.outputs) == (1e6, ("forces",))
+    assert (config.walker.hip_mass_kg, config.equations) == (0.0, "as-printed")
+
+
+def test_a_later_setting_wins() -> None:
+    assert load(None, ["strides=3", "strides=4"]).config.strides == 4
+    assert load(None, ["slope_rad=0.1", "slope_deg=3"]).config.slope_rad == math.radians(3)
+    assert load(None, ["slope_deg=3", "slope_rad=0.1"]).config.slope_rad == 0.1
+
+
+def test_a_block_is_replaced_whole() -> None:
+    contact = load(None, ["contact.damping=50", "contact={stiffness: 2e5}"]).config.contact
+    assert contact == Contact(stiffness=2e5)
+
+
+def test_a_block_can_be_left_out_and_brought_in() -> None:
+    assert load(None, ["contact=null"]).config.contact is None
+    assert load(Path("rigid-only"), ["contact.damping=50"]).config.contact == Contact(damping=50)
+
+
+def test_strides_of_the_command_line_are_over_everything() -> None:
+    assert load(None, ["strides=3"], strides=2).config.strides == 2
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("contact.stifness=1e6", r"--set contact\.stifness=1e6:1:1: .* did you mean contact\.stiffness\?"),
+        ("contact.damping=fast", r":1:17: contact\.damping: 'fast' is not a number"),
+        ("strides=", r"strides: nothing is not an integer"),
+        ("name=../../x", r"is not safe"),
+        ("extends=paper", r"extends: belongs in a file"),
+        ("strides", r"is not of the form KEY=VALUE"),
+        ("=3", r"is not of the form KEY=VALUE"),
+        ("a..b=3", r"is not of the form KEY=VALUE"),
+        ("contact.units.x=3", r"contact\.units is a value, not a block"),
+        ("start=[1, 2", r"not YAML"),
+        ("start=" + "[" * 5000, r"nested deeper"),
+        (".".join("a" * 3000) + "=1", r"nested deeper"),
+        ("walker=&a [*a]", r"anchor"),
+        ("strides=\udcff", r"\\udcff cannot be in a config"),
+    ],
+)
+def test_a_bad_setting_is_refused_with_its_place(refused: Refused, setting: str, expected: str) -> None:
+    assert re.search(expected, refused("contact: {units: si}\n", sets=[setting]))
+
+
+def test_bad_strides_are_refused() -> None:
+    with pytest.raises(ConfigError, match="--strides 0:1:1: strides: 0 is out of bounds"):
+        load(strides=0)
+
+
+@settings(deadline=None)
+@given(st.text(max_size=40))
+def test_any_setting_is_taken_or_refused(text: str) -> None:
+    with suppress(ConfigError):
+        assert isinstance(load(None, [text]).config, Config)
