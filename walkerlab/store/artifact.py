@@ -30,6 +30,10 @@ class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure 
     """A file is not an artifact that can be trusted; the text says why."""
 
 
+class OtherLayout(Damaged):
+    """A file is an artifact of another version of this program, which nobody need be warned of."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stored(Content):
     """The content of an artifact as read back, with what it was determined by and where it comes from.
@@ -102,6 +106,8 @@ def check(path: Path, key: str) -> Verdict:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
         return Verdict(False, "not there yet")
+    except OtherLayout as error:
+        return Verdict(False, str(error))
     except Damaged as error:
         return Verdict(False, f"damaged: {error}", damaged=True)
     if artifact.identity.key != key:
@@ -153,7 +159,7 @@ def unsealed(data: bytes) -> tuple[bytes, str]:
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
     """The artifact made of a file's parts; Damaged if they do not agree with its content digest and key."""
     if root.get("schema_version") != SCHEMA_VERSION:
-        raise Damaged(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
+        raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     identity = Identity(
         stage=root["stage"],
         config_slice=json.loads(root["config_slice"]),

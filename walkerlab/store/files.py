@@ -92,7 +92,8 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        return file.read(limit + 1)
+        # The size it has, not the limit: reading sets the memory aside at once.
+        return file.read(status.st_size)
 
 
 def file_digest(path: Path) -> str | None:

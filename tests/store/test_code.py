@@ -1,0 +1,125 @@
+import itertools
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.stages.graph import STAGES
+from walkerlab.store.code import Sources, code_digest
+
+NUMBER = itertools.count()
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package of its own in each test: its name, and a way to write its files."""
+    name = f"package_{next(NUMBER)}"
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def write(**sources):
+        for path, text in {"__init__": "", **sources}.items():
+            file = tmp_path / name / (path.replace("__SLASH__", "/") + ("" if "." in path else ".py"))
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(textwrap.dedent(text))
+        return name
+
+    return write
+
+
+IMPORTS = [
+    "from {package} import law",
+    "from {package}.law import force",
+    "from {package}.law import (\n    force,  # a comment (with a bracket)\n    other,\n)",
+    "from {package} import other, law as renamed",
+    "from {package} import (other,\n    law)",
+    "from {package} import other, \\\n    law",
+    "import {package}.law",
+    "import json, {package}.law as renamed",
+    "from . import law",
+    "from .law import force",
+    "import json; from .law import force",
+    "def late():\n    from {package}.law import force",
+    "if True: from .law import force",
+    "try:\n    import {package}.law\nexcept ImportError:\n    pass",
+    "LATE = '{package}.law'",
+]
+
+
+@pytest.mark.parametrize("statement", IMPORTS)
+def test_digest_follows_every_way_to_import(package, statement):
+    name = package(other="", law="FORCE = 1\n")
+    package(start=statement.format(package=name) + "\n")
+    before = code_digest(f"{name}.start")
+    package(law="FORCE = 2\n")
+    assert code_digest(f"{name}.start") != before
+
+
+def test_digest_follows_imports_of_imports_and_packages_on_the_way(package):
+    sources = {
+        "__init__": "",
+        "start": "from .a import x",
+        "a": "from .deep import b",
+        "deep__SLASH____init__": "",
+        "deep__SLASH__b": "from .. import nothing",
+    }
+    name = package(**sources)
+    before = code_digest(f"{name}.start")
+    for changed, text in sources.items():
+        package(**{**sources, changed: f"{text}\nCHANGED = True\n"})
+        assert code_digest(f"{name}.start") != before, changed
+    package(**sources)
+    assert code_digest(f"{name}.start") == before
+
+
+def test_digest_ignores_what_is_not_imported(package):
+    name = package(start="from .law import force  # not: from .other import x", law="force = 1", other="x = 1")
+    before = code_digest(f"{name}.start")
+    package(other="x = 2", new="y = 3")
+    assert code_digest(f"{name}.start") == before
+
+
+def test_digest_covers_data_beside_the_code(package):
+    name = package(start="", page__SLASH____init__="", page__SLASH__draw="")
+    package(**{"page__SLASH__parts__SLASH__page.html": "<html>"})
+    drawing, other = code_digest(f"{name}.page.draw"), code_digest(f"{name}.start")
+    package(**{"page__SLASH__parts__SLASH__page.html": "<html lang='en'>"})
+    assert code_digest(f"{name}.page.draw") != drawing
+    assert code_digest(f"{name}.start") == other
+
+
+def test_a_stage_outside_this_package_is_followed_into_it(package):
+    name = package(start="from walkerlab.errors import NoAnswer")
+    assert "walkerlab.errors" in {module.name for module in Sources().closure(f"{name}.start")}
+
+
+def test_circular_imports_end(package):
+    name = package(a="from . import b", b="from . import a")
+    assert [module.name for module in Sources().closure(f"{name}.a")] == [name, f"{name}.a", f"{name}.b"]
+
+
+def test_a_module_that_does_not_exist_is_an_error(package):
+    with pytest.raises(ModuleNotFoundError):
+        code_digest(package() + ".nowhere")
+
+
+IMPORTED = """
+import importlib, sys
+importlib.import_module(sys.argv[1])
+print(*(name for name in sys.modules if name.partition('.')[0] == 'walkerlab'))
+"""
+
+
+ROOT = Path(walkerlab.__file__).parent.parent
+WRITTEN = [stage.module for stage in STAGES if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()]
+
+
+@pytest.mark.parametrize("name", ["walkerlab.stages.runner", "walkerlab.cli.show", "walkerlab.kernels", *WRITTEN])
+def test_what_python_imports_is_in_the_closure(name):
+    """The scanner reads text; the interpreter is the independent witness."""
+    done = subprocess.run([sys.executable, "-c", IMPORTED, name], cwd=ROOT, capture_output=True, text=True)
+    imported = set(done.stdout.split())
+    assert name in imported, done.stderr
+    assert imported <= {module.name for module in Sources().closure(name)}

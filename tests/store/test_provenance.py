@@ -1,0 +1,57 @@
+import importlib
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.config.loader import load
+from walkerlab.config.schema import Config
+from walkerlab.store import provenance
+
+
+def test_versions_are_those_of_the_libraries_that_are_imported():
+    versions = provenance.library_versions()
+    for name in ("numpy", "scipy", "h5py", "pydantic"):
+        assert versions[name] == importlib.import_module(name).__version__
+
+
+@pytest.mark.parametrize("name", ["paper", "rigid-only", "slope-3deg"])
+def test_stored_config_loads_as_the_same_config(name, tmp_path):
+    original = load(Path(name)).config
+    (tmp_path / "stored.yaml").write_text(provenance.resolved_yaml(original))
+    assert load(tmp_path / "stored.yaml").config == original
+
+
+def test_a_result_records_seed_inputs_and_times():
+    origin = provenance.begin(Config(seed=7), {"fixedpoint": "abc"}).until_now()
+    assert origin.seed == 7
+    assert origin.input_digests == {"fixedpoint": "abc"}
+    assert origin.started_utc <= origin.ended_utc
+    assert origin.package_version == walkerlab.__version__
+
+
+def test_commit_is_that_of_the_package_and_marks_changes(tmp_path, monkeypatch):
+    def git(*arguments):
+        identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
+        done = subprocess.run(["git", *identity, *arguments], cwd=tmp_path, check=True, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    source = tmp_path / "walkerlab" / "__init__.py"
+    source.parent.mkdir()
+    source.touch()
+    monkeypatch.setattr(walkerlab, "__file__", str(source))
+    assert provenance.git_commit() is None
+    git("init", "--quiet")
+    git("add", ".")
+    git("commit", "--quiet", "--message", "first")
+    assert provenance.git_commit() == git("rev-parse", "HEAD")
+    source.write_text("changed = True\n")
+    assert provenance.git_commit() == git("rev-parse", "HEAD") + "-dirty"
+
+
+def test_an_installed_package_inside_somebodys_repository_has_no_commit(tmp_path, monkeypatch):
+    subprocess.run(["git", "init", "--quiet"], cwd=tmp_path, check=True)
+    installed = tmp_path / "site-packages" / "walkerlab" / "__init__.py"
+    monkeypatch.setattr(walkerlab, "__file__", str(installed))
+    assert provenance.git_commit() is None
