@@ -135,3 +135,8 @@ def test_summary_is_plain_json():
     assert summary == {"state": [0, 1], "x": 0.5, "row": [1, None, {"a": True}]}
     with pytest.raises(TypeError):
         Content({}, {"x": {1, 2}})
+
+
+def test_groups_on_the_way_to_others_are_there():
+    assert sorted(Content({"a/b/c": Group({})}).groups) == ["a", "a/b", "a/b/c"]
+    assert Content({"a/b": Group({})}).digest() == Content({"a/b": Group({}), "a": Group({})}).digest()

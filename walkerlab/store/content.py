@@ -93,7 +93,7 @@ class Group:
 class Content:
     """Everything that a stage stores.
 
-    groups   by path, such as 'corrected/gaits'
+    groups   by path, such as 'corrected/gaits'; the groups above one are there too, if only empty
     summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     timed    further top-level keys of the summary that follow from timings, such as 'best'
 
@@ -109,13 +109,13 @@ class Content:
         object.__setattr__(self, "summary", {key: plain(value) for key, value in self.summary.items()})
         object.__setattr__(self, "timed", tuple(sorted(self.timed)))
         check_text(*self.summary, *self.timed)
+        object.__setattr__(self, "groups", with_parents(self.groups))
         for path in self.groups:
-            parts = path.split("/")
-            for depth, part in enumerate(parts):
-                check_name(part)
-                parent = self.groups.get("/".join(parts[:depth]))
-                if parent is not None and (part in parent.variables or part in parent.sizes):
-                    raise ValueError(f"{path!r} is a group, and {part!r} a variable or dimension beside it")
+            above, _, name = path.rpartition("/")
+            check_name(name)
+            parent = self.groups.get(above, Group({}))
+            if name in parent.variables or name in parent.sizes:
+                raise ValueError(f"{path!r} is a group, and {name!r} a variable or dimension beside it")
 
     def __getitem__(self, path: str) -> Group:
         """The group at a path."""
@@ -136,6 +136,12 @@ class Content:
             for name, variable in sorted(group.variables.items()):
                 if not variable.timing:
                     yield from variable_parts(name, variable)
+
+
+def with_parents(groups: Mapping[str, Group]) -> dict[str, Group]:
+    """The groups and, empty, those that a path leads through and that are not among them."""
+    through = {path[:end] for path in groups for end, letter in enumerate(path) if letter == "/"}
+    return {**groups, **{path: Group({}) for path in sorted(through.difference(groups))}}
 
 
 def variable_parts(name: str, variable: Variable) -> Iterator[bytes]:

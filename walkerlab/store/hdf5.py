@@ -103,25 +103,21 @@ class Budget:
 
 
 def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
-    """Every group below a group, by path; those that only lead to others are not named."""
+    """Every group below a group, by path, after those below it."""
     if path.count("/") >= MOST_LEVELS:
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
-    nested = False
     for name in parent:
         budget.spend(LEAST_BYTES)
         if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"it holds a link, {name!r}")
         member = parent[name]
         if isinstance(member, h5py.Group):
-            nested = True
             yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
         elif not is_bare_dimension(member):
             variables[name] = read_variable(name, member, budget)
     if path:
-        attrs = dict(read_attributes(parent))
-        if variables or attrs or not nested:
-            yield path, Group(variables, attrs)
+        yield path, Group(variables, dict(read_attributes(parent)))
     elif variables:
         raise ValueError("it holds arrays outside any group")
 
