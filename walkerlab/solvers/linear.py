@@ -38,6 +38,7 @@ def solve(A: Any, pivots: Any, b: Any) -> None:
         best = pivots[k]
         if best != k:
             b[k], b[best] = b[best], b[k]
+    for k in range(n):
         for i in range(k + 1, n):
             b[i] -= A[i, k] * b[k]
     for k in range(n - 1, -1, -1):

@@ -1,0 +1,42 @@
+"""Tuples as small vectors and matrices that compiled code keeps in registers."""
+
+from typing import Any
+
+from numba.cpython.unsafe.tuple import tuple_setitem
+from numba.extending import overload
+
+from walkerlab.kernels import PART_FLAGS, inlined
+
+Vector = tuple[float, ...]
+
+
+def put(vector: Vector, index: int, value: float) -> Vector:
+    """A copy of `vector` with one number replaced."""
+    return vector[:index] + (value,) + vector[index + 1 :]
+
+
+@overload(put, jit_options=PART_FLAGS)
+def _put(vector: Any, index: Any, value: Any) -> Any:
+    def replaced(vector: Any, index: Any, value: Any) -> Any:
+        return tuple_setitem(vector, index, value)
+
+    return replaced
+
+
+@inlined
+def solve_symmetric(M: Vector, b: Vector) -> Vector:
+    """Solve M x = b for a symmetric positive definite M, given row by row; only its lower half is read."""
+    n = len(b)
+    for k in range(n):
+        scale = 1.0 / M[k * n + k]
+        for i in range(k + 1, n):
+            factor = M[i * n + k] * scale
+            b = put(b, i, b[i] - factor * b[k])
+            for j in range(k + 1, i + 1):
+                M = put(M, i * n + j, M[i * n + j] - factor * M[j * n + k])
+    for k in range(n - 1, -1, -1):
+        rest = b[k]
+        for j in range(k + 1, n):
+            rest -= M[j * n + k] * b[j]
+        b = put(b, k, rest / M[k * n + k])
+    return b

@@ -1,0 +1,348 @@
+"""Radau IIA of order 5: implicit, L-stable, for stiff contact; simplified Newton with the system's exact Jacobian.
+
+Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.kernels import inlined
+from walkerlab.physics.system import State, blank, derivative, jacobian
+from walkerlab.solvers.linear import factor, solve
+from walkerlab.solvers.stepping import (
+    ACCEPTED,
+    BUDGET,
+    COUNTS,
+    H_NEXT,
+    JACOBIANS,
+    OUT_OF_BUDGET,
+    REJECTED,
+    RHS,
+    SMALLEST_STEP,
+    STEP_DONE,
+    STEP_TOO_SMALL,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    dense_degree,
+    end_state,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
+from walkerlab.solvers.vectors import combine, load, store
+
+ROOT6 = math.sqrt(6.0)
+C = ((4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0)
+# eigenvalues of A^-1: one real, one complex pair; A^-1 = T Lambda T^-1, (8.5) and (8.12)
+GAMMA = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
+ALPHA = 3.0 + 0.5 * (3.0 ** (1.0 / 3.0) - 3.0 ** (2.0 / 3.0))
+BETA = 0.5 * (3.0 ** (5.0 / 6.0) + 3.0 ** (7.0 / 6.0))
+T_11, T_12, T_13 = 0.09443876248897524, -0.14125529502095421, 0.03002919410514742
+T_21, T_22, T_23 = 0.25021312296533332, 0.20412935229379994, -0.38294211275726192
+INV_1 = (4.17871859155190428, 0.32768282076106237, 0.52337644549944951)
+INV_2 = (-4.17871859155190428, -0.32768282076106237, 0.47662355450055044)
+INV_3 = (0.50287263494578682, -2.57192694985560522, 0.59603920482822492)
+# error estimate (8.19): h gamma_0 f(y_0) + sum e_i z_i, times gamma
+ERROR = ((-13.0 - 7.0 * ROOT6) / 3.0, (-13.0 + 7.0 * ROOT6) / 3.0, -1.0 / 3.0)
+# the collocation polynomial: z(s) = s (P_1 + s (P_2 + s P_3)), each a combination of z_1, z_2, z_3
+P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0)
+P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
+P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
+
+NEWTON_MOST = 7
+SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
+KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios within which the factored matrices are kept
+FRESH_RATE = 1e-3  # Newton convergence below which the Jacobian is kept
+FIRST_STEP = 1e-6
+
+# indices into `control`
+H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH = 0, 1, 2, 3, 4, 5
+
+
+class Radau5(NamedTuple):
+    """The method with its memory for n equations."""
+
+    rtol: float
+    atol: float
+    clock: Any
+    y_old: Any
+    y: Any
+    counts: Any
+    slope: Any  # (2, n) derivative at the start of the next step, and of the last
+    z: Any  # (3, n) stages less the step's start
+    w: Any  # (3, n) the same, transformed
+    f: Any  # (3, n) stage derivatives, transformed; Newton's right-hand sides
+    dense: Any  # (3, n) coefficients of the collocation polynomial
+    J: Any  # (n, n)
+    real: Any  # (n, n) factors of gamma/h I - J
+    pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
+    pivots: Any  # (2, n)
+    move: Any  # (n,) Newton's move, real part of the transformed system
+    move_pair: Any  # (n,) complex, the pair's
+    control: Any  # (6,) see the indices above
+
+
+def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
+    """A Radau IIA method for n equations that may evaluate `budget` right-hand sides."""
+    counts = np.zeros(COUNTS, np.int64)
+    counts[BUDGET] = budget
+    three, square = (3, n), (n, n)
+    return Radau5(
+        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros((2, n)),
+        np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
+        np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
+        np.zeros(n), np.zeros(n, np.complex128), np.zeros(6),
+    )  # fmt: skip
+
+
+@begin.case(Radau5)
+def begin_radau5(method: Radau5, system: Any, t: float, y: State, h: float) -> None:
+    """Derivative and Jacobian at the start; what was learnt of the step before is forgotten."""
+    clock, control = method.clock, method.control
+    clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_STEP
+    store(y, method.y, 0)
+    store(derivative(system, t, y), method.slope, 0)
+    jacobian(system, t, y, method.J)
+    method.counts[RHS] += 1
+    method.counts[JACOBIANS] += 1
+    control[H_FACTORED], control[H_OLD], control[RATE] = 0.0, 0.0, 1.0
+    control[SMOOTH], control[FRESH] = 0.0, 1.0
+
+
+@inlined
+def factor_matrices(method: Radau5, h: float) -> bool:
+    """Factors of both matrices of the simplified Newton iteration for step h."""
+    n = method.y.size
+    J, real, pair = method.J, method.real, method.pair
+    for i in range(n):
+        for j in range(n):
+            real[i, j] = -J[i, j]
+            pair[i, j] = -J[i, j]
+        real[i, i] += GAMMA / h
+        pair[i, i] += complex(ALPHA / h, -BETA / h)
+    method.control[H_FACTORED] = h
+    return factor(real, method.pivots[0]) and factor(pair, method.pivots[1])
+
+
+@inlined
+def first_guess(method: Radau5, h: float) -> None:
+    """Stages from the collocation polynomial of the step before, or zero after a start."""
+    ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
+    z, w, dense = method.z, method.w, method.dense
+    for i in range(method.y.size):
+        start = dense[0, i] + dense[1, i] + dense[2, i]
+        for stage in range(3):
+            s = 1.0 + C[stage] * ratio
+            z[stage, i] = s * (dense[0, i] + s * (dense[1, i] + s * dense[2, i])) - start if ratio > 0.0 else 0.0
+        w[0, i] = INV_1[0] * z[0, i] + INV_1[1] * z[1, i] + INV_1[2] * z[2, i]
+        w[1, i] = INV_2[0] * z[0, i] + INV_2[1] * z[1, i] + INV_2[2] * z[2, i]
+        w[2, i] = INV_3[0] * z[0, i] + INV_3[1] * z[1, i] + INV_3[2] * z[2, i]
+
+
+@inlined
+def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> float:
+    """One simplified Newton iteration on the stages; returns the size of its move relative to the tolerance."""
+    z, w, f = method.z, method.w, method.f
+    for stage in range(3):
+        at = combine((1.0, 1.0), (y, load(z, stage, y)))
+        store(derivative(system, t + C[stage] * h, at), f, stage)
+    method.counts[RHS] += 3
+    n = method.y.size
+    real = method.move
+    for i in range(n):
+        f1, f2, f3 = f[0, i], f[1, i], f[2, i]
+        real[i] = INV_1[0] * f1 + INV_1[1] * f2 + INV_1[2] * f3 - GAMMA / h * w[0, i]
+        re = INV_2[0] * f1 + INV_2[1] * f2 + INV_2[2] * f3 - (ALPHA * w[1, i] + BETA * w[2, i]) / h
+        im = INV_3[0] * f1 + INV_3[1] * f2 + INV_3[2] * f3 - (ALPHA * w[2, i] - BETA * w[1, i]) / h
+        method.move_pair[i] = complex(re, im)
+    solve(method.real, method.pivots[0], real)
+    solve(method.pair, method.pivots[1], method.move_pair)
+    size = 0.0
+    for i in range(n):
+        d1, d2, d3 = real[i], method.move_pair[i].real, method.move_pair[i].imag
+        scale = 1.0 / (method.atol + method.rtol * abs(y[i]))
+        size += (d1 * scale) ** 2 + (d2 * scale) ** 2 + (d3 * scale) ** 2
+        w1, w2, w3 = w[0, i] + d1, w[1, i] + d2, w[2, i] + d3
+        w[0, i], w[1, i], w[2, i] = w1, w2, w3
+        z[0, i] = T_11 * w1 + T_12 * w2 + T_13 * w3
+        z[1, i] = T_21 * w1 + T_22 * w2 + T_23 * w3
+        z[2, i] = w1 + w2
+    return math.sqrt(size / (3 * n))
+
+
+@inlined
+def solve_stages(method: Radau5, system: Any, t: float, y: State, h: float) -> int:
+    """Iterate until the stages are accurate to a part of the tolerance; returns the iterations used, 0 if they diverge."""
+    tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
+    first_guess(method, h)
+    size_old, rate = 0.0, method.control[RATE]
+    for iteration in range(1, NEWTON_MOST + 1):
+        size = newton_move(method, system, t, y, h)
+        if not size < 1e100:
+            return 0
+        if iteration > 1:
+            rate = size / size_old
+            if rate >= 0.99:
+                return 0
+            ahead = rate ** (NEWTON_MOST - iteration) / (1.0 - rate) * size
+            if ahead > 10.0 * tolerance:
+                return 0
+            method.control[RATE] = rate
+        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size <= tolerance):
+            return iteration
+        size_old = max(size, 1e-300)
+    return 0
+
+
+@inlined
+def step_error(method: Radau5, system: Any, t: float, y: State, h: float, again: bool) -> float:
+    """Error relative to the tolerance, (8.19); filtered once more, (8.20), after a rejection or a start."""
+    n = method.y.size
+    error, z = method.f[0], method.z
+    for i in range(n):
+        method.f[1, i] = (ERROR[0] * z[0, i] + ERROR[1] * z[1, i] + ERROR[2] * z[2, i]) / h
+        error[i] = method.slope[0, i] + method.f[1, i]
+    solve(method.real, method.pivots[0], error)
+    size = error_size(method, y, error)
+    if size >= 1.0 and again:
+        at = combine((1.0, 1.0), (y, load(method.f, 0, y)))
+        store(derivative(system, t, at), method.f, 0)
+        method.counts[RHS] += 1
+        for i in range(n):
+            error[i] += method.f[1, i]
+        solve(method.real, method.pivots[0], error)
+        size = error_size(method, y, error)
+    return size
+
+
+@inlined
+def error_size(method: Radau5, y: State, error: Any) -> float:
+    """Root mean square of the error over the tolerance."""
+    total = 0.0
+    for i in range(len(y)):
+        scale = method.atol + method.rtol * max(abs(y[i]), abs(y[i] + method.z[2, i]))
+        total += (error[i] / scale) ** 2
+    return max(1e-10, math.sqrt(total / len(y)))
+
+
+@advance.case(Radau5)
+def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
+    """One accepted step with Hairer's predictive step control."""
+    clock, control = method.clock, method.control
+    t, h = clock[T], clock[H_NEXT]
+    y = load(method.y, 0, blank(system))
+    rejected = False
+    while method.counts[RHS] < method.counts[BUDGET]:
+        if h <= SMALLEST_STEP * max(abs(t), 1e-3):
+            return STEP_TOO_SMALL
+        last = t + 1.0001 * h >= t_end
+        if last:
+            h = t_end - t
+        fine = control[H_FACTORED] == h or factor_matrices(method, h)
+        iterations = solve_stages(method, system, t, y, h) if fine else 0
+        if iterations == 0:
+            method.counts[REJECTED] += 1
+            control[SMOOTH] = 0.0
+            if control[FRESH] == 0.0:
+                refresh(method, system, t, y)
+            else:
+                h *= 0.5
+            rejected = True
+            continue
+        error = step_error(method, system, t, y, h, rejected or control[SMOOTH] == 0.0)
+        safety = min(SAFETY, SAFETY * (1 + 2 * NEWTON_MOST) / (iterations + 2 * NEWTON_MOST))
+        shrink = max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, error**0.25 / safety))
+        if error < 1.0:
+            accept(method, system, t, t_end if last else t + h, h, y)
+            h_new = next_step(method, h, error, shrink, safety)
+            clock[H_NEXT] = max(h_new, clock[H_NEXT]) if last else h_new
+            return STEP_DONE
+        method.counts[REJECTED] += 1
+        rejected = True
+        h /= shrink
+        control[SMOOTH] = 0.0
+    return OUT_OF_BUDGET
+
+
+@inlined
+def refresh(method: Radau5, system: Any, t: float, y: State) -> None:
+    """The Jacobian at the step's start."""
+    jacobian(system, t, y, method.J)
+    method.counts[JACOBIANS] += 1
+    method.control[FRESH], method.control[H_FACTORED] = 1.0, 0.0
+
+
+@inlined
+def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
+    """The step after an accepted one: the smaller of the error's and Gustafsson's prediction, (8.25)."""
+    control = method.control
+    if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
+        predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety
+        shrink = max(shrink, max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, predicted)))
+    control[ERROR_OLD], control[H_OLD] = max(1e-2, error), h
+    h_new = h / shrink
+    if control[FRESH] == 0.0 and KEEP_LOW * h <= h_new <= KEEP_HIGH * h:
+        return h
+    return h_new
+
+
+@inlined
+def accept(method: Radau5, system: Any, t: float, t_new: float, h: float, y: State) -> None:
+    """Make the step's end the state, keep its polynomial, and renew derivative and Jacobian."""
+    clock, control = method.clock, method.control
+    y_new = combine((1.0, 1.0), (y, load(method.z, 2, y)))
+    z1, z2, z3 = load(method.z, 0, y), load(method.z, 1, y), load(method.z, 2, y)
+    store(combine(P_1, (z1, z2, z3)), method.dense, 0)
+    store(combine(P_2, (z1, z2, z3)), method.dense, 1)
+    store(combine(P_3, (z1, z2, z3)), method.dense, 2)
+    store(y, method.y_old, 0)
+    store(y_new, method.y, 0)
+    store(load(method.slope, 0, y), method.slope, 1)
+    store(derivative(system, t_new, y_new), method.slope, 0)
+    method.counts[RHS] += 1
+    method.counts[ACCEPTED] += 1
+    clock[T_OLD], clock[T] = t, t_new
+    control[SMOOTH] = 1.0
+    control[FRESH] = 0.0
+    if control[RATE] > FRESH_RATE:
+        refresh(method, system, t_new, y_new)
+
+
+@rewind.case(Radau5)
+def rewind_radau5(method: Radau5, system: Any) -> None:
+    """Back to the step's start; the Jacobian of its end is near enough, the polynomial is not used."""
+    clock, control = method.clock, method.control
+    store(load(method.y_old, 0, blank(system)), method.y, 0)
+    store(load(method.slope, 1, blank(system)), method.slope, 0)
+    clock[T] = clock[T_OLD]
+    refresh(method, system, clock[T], load(method.y, 0, blank(system)))
+    control[SMOOTH], control[H_OLD] = 0.0, 0.0
+
+
+@prepare_dense.case(Radau5)
+def prepare_dense_radau5(method: Radau5, system: Any) -> None:
+    """The collocation polynomial is there already."""
+
+
+@interpolate.case(Radau5)
+def interpolate_radau5(method: Radau5, system: Any, fraction: float) -> State:
+    """The collocation polynomial."""
+    like, s = blank(system), fraction
+    rows = (load(method.dense, 0, like), load(method.dense, 1, like), load(method.dense, 2, like))
+    return combine((1.0, s, s * s, s * s * s), (load(method.y_old, 0, like), rows[0], rows[1], rows[2]))
+
+
+@end_state.case(Radau5)
+def end_state_radau5(method: Radau5, system: Any) -> State:
+    """The state at the end of the last step."""
+    return load(method.y, 0, blank(system))
+
+
+@dense_degree.case(Radau5)
+def dense_degree_radau5(method: Radau5) -> int:
+    """Three."""
+    return 3
