@@ -1,0 +1,88 @@
+"""A copy of the toy pipeline for each test, importable here and in other processes."""
+
+import importlib
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.config.loader import load
+from walkerlab.stages.runner import execute, plan, preview
+from walkerlab.store.runfolder import RunFolder
+
+HERE = Path(__file__).parent
+
+
+class Toy:
+    """The toy pipeline on a folder of runs."""
+
+    def __init__(self, source, runs):
+        self.source = source
+        self.runs = runs
+        self.graph = importlib.import_module("toy.pipeline").GRAPH
+        self.environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(source), str(Path(walkerlab.__file__).parent.parent)]),
+        }
+
+    def loaded(self, *sets, config=None):
+        loaded = load(Path(config) if config else None, sets)
+        return loaded.config, RunFolder(self.runs, loaded.run_name)
+
+    def execute(self, target, *sets, config=None, **options):
+        loaded, folder = self.loaded(*sets, config=config)
+        return execute(loaded, target, folder, graph=self.graph, **options)
+
+    def plan(self, target, *sets, config=None, force=False):
+        loaded, folder = self.loaded(*sets, config=config)
+        return plan(loaded, target, folder, force, self.graph)
+
+    def preview(self, target, *sets, config=None, force=False):
+        loaded, folder = self.loaded(*sets, config=config)
+        return preview(loaded, target, folder, force=force, graph=self.graph)
+
+    def edit(self, module, old, new):
+        """Change the source of a toy stage; this process goes on with what it has imported."""
+        path = self.source / "toy" / f"{module}.py"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    shutil.copytree(HERE / "toy", tmp_path / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.syspath_prepend(tmp_path / "source")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toy"]:
+        monkeypatch.delitem(sys.modules, name)
+    return Toy(tmp_path / "source", tmp_path / "runs")
+
+
+class Listener:
+    """A reporter that remembers."""
+
+    def __init__(self):
+        self.notes, self.warnings, self.started = [], [], []
+
+    def start(self, label, total=None):
+        self.started.append((label, total))
+
+    def advance(self, n=1):
+        pass
+
+    def note(self, text):
+        self.notes.append(text)
+
+    def warn(self, text):
+        self.warnings.append(text)
+
+    def finish(self):
+        pass
+
+
+@pytest.fixture
+def listener():
+    return Listener()

@@ -1,0 +1,67 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from walkerlab.config.canonical import slice_of
+from walkerlab.config.files import builtin_names
+from walkerlab.config.loader import load
+from walkerlab.stages.graph import PIPELINE, STAGES, Graph, Stage, results_of
+
+NAMES = [stage.name for stage in STAGES]
+EXPLICIT = "start=[-0.2, 0.17, -0.6, -0.86]"
+
+
+def needed(target, *sets, config=None):
+    return [stage.name for stage in PIPELINE.needed_for(target, load(config and Path(config), sets).config)]
+
+
+@pytest.mark.parametrize("config", builtin_names())
+@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+def test_inputs_stand_earlier_in_the_table(stage, config):
+    inputs = (*stage.inputs(load(Path(config)).config), *stage.if_current)
+    assert set(inputs) <= set(NAMES[: NAMES.index(stage.name)])
+
+
+@pytest.mark.parametrize("config", builtin_names())
+@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+def test_what_a_stage_reads_is_in_the_config(stage, config):
+    slice_of(load(Path(config)).config, stage.reads)
+
+
+def test_the_fixed_stages_are_there_in_order():
+    fixed = ["fixedpoint", "simulate", "contact-sim", "compare", "plot", "report"]
+    assert [name for name in NAMES if name in fixed] == fixed
+
+
+def test_a_stage_needs_its_inputs_and_theirs():
+    assert needed("fixedpoint") == ["fixedpoint"]
+    assert needed("simulate") == ["fixedpoint", "simulate"]
+    assert needed("compare") == ["fixedpoint", "simulate", "contact-sim", "compare"]
+    assert needed("report")[-1] == "report"
+
+
+def test_a_given_start_needs_no_gait():
+    assert needed("simulate", EXPLICIT) == ["simulate"]
+    assert needed("contact-sim", EXPLICIT, "contact.pad_pitch=0.37") == ["contact-sim"]
+
+
+def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
+    assert needed("contact-sim", EXPLICIT, "contact.pad_pitch=rigid") == ["fixedpoint", "contact-sim"]
+
+
+def test_two_stages_of_one_name_are_refused():
+    with pytest.raises(ValueError, match="one name"):
+        Graph(Stage("a", "m", "", ()), Stage("a", "n", "", ()))
+
+
+def test_results_of_names_them_whatever_the_config():
+    assert results_of("a", "b")(load().config) == ("a", "b")
+
+
+def test_the_table_is_read_without_loading_config_or_arrays():
+    heavy = "'numpy', 'h5py', 'scipy', 'numba', 'pydantic', 'ruamel'"
+    code = f"import sys, walkerlab.stages.graph; print([name for name in ({heavy}) if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr

@@ -1,0 +1,299 @@
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from walkerlab.errors import ConfigError, LockedError, StorageError
+from walkerlab.stages.graph import Graph, Stage
+from walkerlab.stages.plan import survey
+from walkerlab.stages.runner import execute
+from walkerlab.store.artifact import read
+
+EXPLICIT = "start=[0.1, 0.2, 0.3, 0.4]"
+STEEP = "slope_rad=1.2"
+
+
+def actions(report):
+    return {done.stage: done.action for done in report.steps}
+
+
+def reasons(report):
+    return {done.stage: done.reason for done in report.steps}
+
+
+def test_a_stage_runs_what_it_needs_first_and_stores_it(toy):
+    report = toy.execute("roll")
+    assert actions(report) == {"drop": "run", "roll": "run"}
+    assert not report.reused
+    assert report.artifact == toy.runs / "paper" / "roll.h5"
+    assert report.summary == {"steps": 10, "duration_s": pytest.approx(10 * (2 / 9.81) ** 0.5)}
+    assert read(toy.runs / "paper" / "drop.h5").summary["period_s"] == pytest.approx((2 / 9.81) ** 0.5)
+
+
+def test_what_is_up_to_date_is_reused_untouched(toy):
+    first = toy.execute("page")
+    before = {path: path.stat().st_mtime_ns for path in (toy.runs / "paper").rglob("*") if path.is_file()}
+    second = toy.execute("page")
+    assert second.reused
+    assert set(actions(second).values()) == {"reuse"}
+    assert second.summary == first.summary
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_only_what_a_change_concerns_runs_again(toy):
+    toy.execute("page", config="paper")
+    config, folder = toy.loaded("strides=7")
+    again = execute(config, "page", type(folder)(folder.runs_dir, "paper"), graph=toy.graph)
+    assert actions(again) == {
+        "drop": "reuse",
+        "roll": "run",
+        "bounce": "reuse",
+        "survey": "reuse",
+        "picture": "run",
+        "page": "run",
+    }
+    assert reasons(again)["roll"] == "strides 5 -> 7"
+    assert reasons(again)["picture"] == "input roll changed"
+
+
+def test_an_experiment_does_not_overwrite_the_run_beside_it(toy):
+    toy.execute("roll")
+    before = (toy.runs / "paper" / "roll.h5").read_bytes()
+    assert toy.execute("roll", "strides=7").run_dir == toy.runs / "paper@strides=7"
+    assert (toy.runs / "paper" / "roll.h5").read_bytes() == before
+
+
+def test_changed_code_runs_again_with_what_depends_on_it(toy):
+    toy.execute("page")
+    toy.edit("physics", "math.sqrt(2 *", "math.sqrt(2.0 *")
+    assert {step.stage.name: step.reason for step in toy.plan("page") if step.action == "run"} == {
+        "drop": "code changed",
+        "roll": "input drop changed",
+        "bounce": "input drop changed",
+        "picture": "input bounce changed, input drop changed, input roll changed",
+        "page": "input bounce changed, input drop changed, input picture changed, input roll changed",
+    }
+
+
+def test_changed_code_of_another_stage_does_not_matter(toy):
+    toy.execute("roll")
+    toy.edit("bounce", "How high", "Whether high")
+    assert toy.execute("roll").reused
+
+
+def test_force_runs_everything_that_is_needed(toy):
+    toy.execute("roll")
+    report = toy.execute("roll", force=True)
+    assert actions(report) == {"drop": "run", "roll": "run"}
+    assert set(reasons(report).values()) == {"--force"}
+
+
+def test_forced_numbers_are_the_same_and_drawings_are_made_anew(toy):
+    toy.execute("page")
+    digest = read(toy.runs / "paper" / "roll.h5").digest()
+    toy.execute("roll", force=True)
+    assert read(toy.runs / "paper" / "roll.h5").digest() == digest
+    report = toy.execute("page")
+    assert actions(report)["bounce"] == "reuse"
+    assert reasons(report)["picture"] == "input drop was made anew"
+
+
+def test_a_lost_input_is_made_again_and_results_that_agree_with_it_are_reused(toy):
+    toy.execute("roll")
+    (toy.runs / "paper" / "drop.h5").unlink()
+    assert actions(toy.execute("roll")) == {"drop": "run", "roll": "reuse"}
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: data[::-1]])
+def test_a_damaged_artifact_is_made_anew_with_a_warning(toy, listener, damage):
+    toy.execute("roll")
+    path = toy.runs / "paper" / "drop.h5"
+    sound = read(path).digest()
+    path.write_bytes(damage(path.read_bytes()))
+    report = toy.execute("roll", reporter=listener)
+    assert actions(report) == {"drop": "run", "roll": "reuse"}
+    assert len(listener.warnings) == 1
+    assert str(path) in listener.warnings[0]
+    assert "damaged" in listener.warnings[0]
+    assert read(path).digest() == sound
+
+
+def test_a_drawing_that_was_altered_is_drawn_again(toy):
+    toy.execute("page")
+    figure = toy.runs / "paper" / "figures" / "figure-01.svg"
+    drawn = figure.read_bytes()
+    figure.write_text("scribbled over")
+    assert reasons(toy.execute("picture"))["picture"] == "figures/figure-01.svg was altered"
+    assert figure.read_bytes() == drawn
+    (toy.runs / "paper" / "report.html").unlink()
+    assert reasons(toy.execute("page"))["page"].startswith(("report.html is missing", "input picture was made anew"))
+    assert (toy.runs / "paper" / "report.html").exists()
+
+
+def test_a_drawing_takes_what_happens_to_be_current(toy):
+    figure = toy.runs / "paper" / "figures" / "figure-01.svg"
+    report = toy.execute("picture")
+    assert "survey" not in actions(report)
+    assert ("survey", "no current result; `walkerlab survey` makes one") in {(e.what, e.why) for e in report.left_out}
+    assert "without ['survey']" in figure.read_text()
+    toy.execute("survey")
+    assert toy.execute("picture").left_out == ()
+    assert "without []" in figure.read_text()
+    assert toy.execute("picture", force=True).left_out == ()
+    assert toy.execute("picture").reused
+
+
+def test_without_contact_block_the_stage_refuses_and_drawings_leave_it_out(toy):
+    with pytest.raises(ConfigError, match="contact block"):
+        toy.execute("bounce", config="rigid-only")
+    report = toy.execute("page", config="rigid-only")
+    assert actions(report)["bounce"] == "leave out"
+    assert [(entry.what, entry.why) for entry in report.left_out] == [("bounce", "the config has no contact block")]
+    assert report.no_answer is None
+    assert not (report.run_dir / "bounce.h5").exists()
+
+
+def test_no_answer_is_kept_with_what_was_found_and_told_again(toy):
+    first = toy.execute("drop", STEEP)
+    again = toy.execute("drop", STEEP)
+    for report in (first, again):
+        assert report.no_answer is not None
+        assert (report.no_answer.message, report.no_answer.advice) == ("the slope is too steep", "Try one below 1 rad.")
+        assert report.no_answer.exit_code == 4
+        assert report.summary["slope_rad"] == 1.2
+    assert (first.reused, again.reused) == (False, True)
+    assert not read(first.artifact).complete
+    assert read(first.artifact)["fall"]["height"][0] == 1.0
+
+
+def test_what_needs_an_answer_does_without(toy):
+    report = toy.execute("roll", STEEP)
+    assert actions(report) == {"drop": "run", "roll": "leave out"}
+    assert report.artifact is None
+    assert report.no_answer is not None
+    assert report.no_answer.message == "drop: the slope is too steep"
+
+
+def test_a_slope_without_an_answer_is_walked_from_a_given_start(toy):
+    report = toy.execute("roll", STEEP, EXPLICIT)
+    assert actions(report) == {"roll": "run"}
+    assert report.no_answer is None
+
+
+def test_a_page_about_a_slope_without_an_answer_is_made_and_says_so(toy):
+    report = toy.execute("page", STEEP)
+    assert report.artifact is not None
+    assert report.no_answer is not None
+    assert [entry.what for entry in report.left_out] == ["drop", "roll", "bounce"]
+    assert "the slope is too steep" in (report.run_dir / "report.html").read_text()
+    assert toy.execute("page", STEEP).reused
+
+
+def test_a_page_is_made_anew_when_the_reason_for_a_gap_changes(toy):
+    toy.execute("page", STEEP)
+    toy.edit("drop", "too steep", "far too steep")
+    for name in ("toy.drop", "toy"):
+        sys.modules.pop(name, None)
+    report = toy.execute("page", STEEP)
+    assert "far too steep" in (report.run_dir / "report.html").read_text()
+
+
+def test_what_a_stage_leaves_out_itself_is_told(toy):
+    assert [(entry.what, entry.why) for entry in toy.execute("roll").left_out] == [("forces", "a stone has none")]
+
+
+def test_a_stage_sees_what_it_declared_and_no_more(toy):
+    config, folder = toy.loaded()
+    blind = Graph(Stage("drop", "toy.drop", "", reads=("slope",)))
+    with pytest.raises(AttributeError, match=r"gravity_m_s2.*not declared"):
+        execute(config, "drop", folder, graph=blind)
+    assert not folder.artifact("drop").exists()
+
+
+def test_a_stage_that_fails_half_way_leaves_the_results_before_it(toy):
+    toy.execute("drop")
+    toy.edit("roll", "period = ", "period = 1 / 0 + ")
+    with pytest.raises(ZeroDivisionError):
+        toy.execute("roll")
+    assert actions(toy.execute("drop")) == {"drop": "reuse"}
+
+
+def test_jobs_reach_the_stage_that_has_cells(toy):
+    assert toy.execute("survey", jobs=3).summary["jobs_wall_s"] == 3.0
+
+
+def test_looking_touches_nothing(toy):
+    for look in (toy.plan, toy.preview):
+        look("page")
+        assert not toy.runs.exists()
+    report = toy.preview("page")
+    assert set(actions(report).values()) == {"run"}
+    assert report.artifact is None
+    toy.execute("page")
+    before = sorted((path, path.stat().st_mtime_ns) for path in toy.runs.rglob("*"))
+    assert toy.preview("page").reused
+    assert set(actions(toy.preview("page", force=True)).values()) == {"run"}
+    config, folder = toy.loaded()
+    assert [step.action for step in survey(config, folder, toy.graph)] == ["reuse"] * 6
+    assert sorted((path, path.stat().st_mtime_ns) for path in toy.runs.rglob("*")) == before
+
+
+def test_a_reused_result_needs_no_lock_and_no_permission_to_write(toy):
+    folder = toy.execute("page").run_dir
+    (folder / ".lock").unlink()
+    assert toy.execute("page").reused
+    assert not (folder / ".lock").exists()
+
+
+def test_a_result_that_cannot_be_stored_is_told(toy):
+    toy.runs.write_text("a file stands where the folder belongs")
+    with pytest.raises(StorageError, match="could not be stored"):
+        toy.execute("drop")
+
+
+EXECUTE = """
+import json, sys
+from pathlib import Path
+from toy.pipeline import GRAPH
+from walkerlab.config.loader import load
+from walkerlab.stages.runner import execute
+from walkerlab.store.runfolder import RunFolder
+report = execute(load().config, "drop", RunFolder(Path(sys.argv[1]), "paper"), graph=GRAPH)
+print(json.dumps({"reused": report.reused}))
+"""
+
+
+def test_of_two_processes_one_computes_and_the_other_waits_and_reuses(toy, tmp_path, listener):
+    begun, go_on = tmp_path / "begun", tmp_path / "go-on"
+    environment = {**toy.environment, "TOY_BEGUN": str(begun), "TOY_GO_ON": str(go_on)}
+    command = [sys.executable, "-c", EXECUTE, toy.runs]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as first:
+        while not begun.exists():
+            assert first.poll() is None
+        with pytest.raises(LockedError):
+            toy.execute("drop", wait=False)
+        second = subprocess.Popen(command, env=toy.environment, stdout=subprocess.PIPE, text=True)
+        with pytest.raises(subprocess.TimeoutExpired):
+            second.wait(timeout=1.0)
+        go_on.touch()
+        outputs = [json.loads(process.communicate()[0]) for process in (first, second)]
+    assert outputs == [{"reused": False}, {"reused": True}]
+
+
+def test_a_run_that_was_killed_is_taken_up_by_the_next(toy, tmp_path):
+    begun = tmp_path / "begun"
+    environment = {**toy.environment, "TOY_BEGUN": str(begun), "TOY_GO_ON": str(tmp_path / "never")}
+    with subprocess.Popen([sys.executable, "-c", EXECUTE, toy.runs], env=environment) as first:
+        while not begun.exists():
+            assert first.poll() is None
+        os.kill(first.pid, 9)
+    assert actions(toy.execute("drop", wait=False)) == {"drop": "run"}
+
+
+def test_a_second_run_imports_no_stage(toy):
+    toy.execute("page")
+    code = EXECUTE + "print([name for name in ('toy.drop', 'toy.physics', 'filelock') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code, toy.runs], env=toy.environment, capture_output=True, text=True)
+    assert done.stdout.splitlines() == ['{"reused": true}', "[]"], done.stderr
