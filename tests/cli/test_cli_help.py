@@ -1,0 +1,98 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+import walkerlab
+from walkerlab.stages.graph import STAGES
+
+HEAVY = (
+    "numpy",
+    "scipy",
+    "numba",
+    "h5py",
+    "matplotlib",
+    "ruamel",
+    "jinja2",
+    "filelock",
+    "rich",
+    "walkerlab.config.schema",
+)
+OPTIONS = ("--config", "-c", "--set", "--runs", "--force", "--dry-run", "--json", "--quiet", "-q", "--verbose", "-v")
+
+LOADED_BY = """
+import sys
+from walkerlab.cli.main import main
+sys.argv = ["walkerlab", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as end:
+    assert end.code == 0, end.code
+print(*(name for name in %r if name in sys.modules), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["simulate", "--help"], ["status", "--help"], ["--version"]])
+def test_help_loads_no_library(arguments):
+    code = LOADED_BY % (HEAVY,)
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.split() == []
+    assert done.stdout
+
+
+def test_help_names_every_command(walker):
+    done = walker("--help")
+    commands = {line.split()[0] for line in done.stdout.split("Commands:")[1].splitlines() if line.strip()}
+    assert {*(stage.name for stage in STAGES), "status", "show", "schema", "clean"} <= commands
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
+    words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())
+    assert set(OPTIONS) <= words
+    assert ("--strides" in words) == (stage.name in ("simulate", "contact-sim"))
+
+
+def test_stages_with_cells_take_jobs(toy):
+    assert "--jobs" in toy("survey", "--help").stdout
+    assert "--jobs" in toy("page", "--help").stdout
+    assert "--jobs" not in toy("drop", "--help").stdout
+
+
+def test_version(walker):
+    assert walker("--version").stdout == f"walkerlab {walkerlab.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["dance"],
+        ["simulate", "--quick"],
+        ["simulate", "--strides", "many"],
+        ["fixedpoint", "--strides", "3"],
+        ["show"],
+        ["show", "dance"],
+    ],
+)
+def test_wrong_usage_exits_2_without_traceback(walker, arguments):
+    done = walker(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert not list(walker.folder.iterdir())
+
+
+def test_schema_prints_every_key_as_text_and_as_json(walker):
+    assert "walker.leg_length_m" in walker("schema").stdout
+    assert "slope_rad" in json.loads(walker("schema", "--json").stdout)["properties"]
+
+
+@pytest.mark.parametrize("arguments", [["--set", "slope=1"], ["--set", "slope_rad=.nan"], ["--config", "nowhere.yaml"]])
+def test_a_bad_config_exits_3_before_anything_runs(walker, arguments):
+    done = walker("simulate", *arguments)
+    assert done.returncode == 3
+    assert done.stderr.startswith("error: ")
+    assert done.stdout == ""
+    assert not list(walker.folder.iterdir())

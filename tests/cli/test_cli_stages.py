@@ -1,0 +1,189 @@
+import json
+import os
+import pty
+import signal
+import subprocess
+
+import pytest
+
+COMMON = {"stage", "run_dir", "artifact", "reused", "wall_s", "left_out"}
+
+
+def one_object(done):
+    """The one JSON object on stdout."""
+    value, end = json.JSONDecoder().raw_decode(done.stdout)
+    assert done.stdout[end:] == "\n"
+    assert set(value) >= COMMON
+    return value
+
+
+def test_results_go_to_stdout_and_messages_to_stderr(toy):
+    first = toy("roll")
+    assert first.returncode == 0
+    assert "duration_s" in first.stdout
+    assert "ran" not in first.stdout
+    assert [line.split()[:2] for line in first.stderr.splitlines()] == [["drop:", "ran"], ["roll:", "ran"]]
+    second = toy("roll")
+    assert second.stdout == first.stdout
+    assert [line.split()[:2] for line in second.stderr.splitlines()] == [["drop:", "reused"], ["roll:", "reused"]]
+
+
+def test_json_is_one_object_with_the_fixed_keys(toy):
+    first = one_object(toy("roll", "--json", "--strides", "3"))
+    assert first["stage"] == "roll"
+    assert first["run_dir"] == "runs/paper@strides=3"
+    assert first["artifact"] == "runs/paper@strides=3/roll.h5"
+    assert first["reused"] is False
+    assert first["steps"] == 6
+    assert first["left_out"] == [{"what": "forces", "why": "a stone has none"}]
+    assert [(done["stage"], done["action"]) for done in first["stages"]] == [("drop", "run"), ("roll", "run")]
+    assert one_object(toy("roll", "--json", "--strides", "3"))["reused"] is True
+
+
+def test_quiet_and_verbose(toy):
+    assert toy("roll", "--quiet").stderr == ""
+    loud = toy("roll", "--verbose", "--force").stderr
+    assert "runs/paper" in loud
+    assert "dropping (1)" in loud
+
+
+def test_warnings_are_said_even_if_quiet(toy):
+    toy("drop")
+    (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"broken")
+    done = toy("drop", "-q")
+    assert done.returncode == 0
+    assert done.stderr.startswith("warning: runs/paper/drop.h5 is damaged")
+
+
+def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
+    done = toy("page", "--config", "rigid-only", "--dry-run")
+    assert done.returncode == 0
+    assert [line.split()[:2] for line in done.stdout.splitlines()[1:-1]] == [
+        ["drop", "run"],
+        ["roll", "run"],
+        ["bounce", "leave"],
+        ["survey", "run"],
+        ["picture", "run"],
+        ["page", "run"],
+    ]
+    assert "no contact block" in done.stdout
+    assert not list(toy.folder.iterdir())
+    plan = one_object(toy("page", "--config", "rigid-only", "--dry-run", "--json"))
+    assert plan["dry_run"] is True
+    assert plan["left_out"] == [{"what": "bounce", "why": "the config has no contact block"}]
+    assert {step["reason"] for step in plan["stages"]} == {"not there yet", "the config has no contact block"}
+
+
+def test_dry_run_after_a_run_says_that_all_is_reused(toy):
+    toy("page")
+    plan = one_object(toy("page", "--dry-run", "--json"))
+    assert plan["reused"] is True
+    assert {step["action"] for step in plan["stages"]} == {"reuse"}
+
+
+def test_no_answer_exits_4_and_keeps_what_was_found(toy):
+    done = toy("drop", "--set", "slope_rad=1.2", "--json")
+    assert done.returncode == 4
+    assert "Traceback" not in done.stderr
+    assert done.stderr.splitlines()[-2:] == ["error: the slope is too steep", "advice: Try one below 1 rad."]
+    value = one_object(done)
+    assert value["slope_rad"] == 1.2
+    assert value["error"]["exit_code"] == 4
+    assert (toy.folder / value["artifact"]).exists()
+
+
+def test_what_needs_a_contact_block_exits_3_without_one(toy):
+    done = toy("bounce", "--config", "rigid-only", "--json")
+    assert done.returncode == 3
+    assert "contact block" in one_object(done)["error"]["message"]
+    assert not list(toy.folder.iterdir())
+
+
+def test_a_bad_config_is_one_object_too(toy):
+    done = toy("drop", "--set", "slop_rad=1", "--json")
+    assert done.returncode == 3
+    assert one_object(done)["error"]["exit_code"] == 3
+
+
+def test_a_result_that_cannot_be_stored_exits_4(toy):
+    (toy.folder / "runs").write_text("a file stands where the folder belongs")
+    done = toy("drop")
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[-2].startswith("error: runs/paper could not be stored")
+    assert done.stderr.splitlines()[-1].startswith("advice: ")
+
+
+def test_a_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
+    source = tmp_path / "source" / "toy" / "drop.py"
+    source.write_text(source.read_text().replace("progress.start(", "progress.begin("))
+    done = toy("drop")
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "AttributeError" in done.stderr
+
+
+@pytest.fixture
+def caught(toy, tmp_path):
+    """A process in the middle of a stage."""
+    begun, go_on = tmp_path / "begun", tmp_path / "go-on"
+    process = toy.start("drop", "--json", environment={"TOY_BEGUN": str(begun), "TOY_GO_ON": str(go_on)})
+    with process:
+        while not begun.exists():
+            assert process.poll() is None, process.communicate()
+        process.go_on = go_on.touch
+        yield process
+        process.kill()
+
+
+def test_interrupted_exits_130_and_leaves_no_lock(toy, caught):
+    os.kill(caught.pid, signal.SIGINT)
+    assert caught.wait(timeout=30) == 130
+    assert "Traceback" not in caught.stderr.read()
+    assert toy("drop", "--no-wait").returncode == 0
+
+
+def test_no_wait_exits_6(toy, caught):
+    done = toy("drop", "--no-wait", "--json")
+    assert done.returncode == 6
+    assert one_object(done)["error"]["exit_code"] == 6
+
+
+def test_by_default_a_second_process_says_that_it_waits_and_then_reuses(toy, caught):
+    with toy.start("drop", "--json") as second:
+        assert "waiting: another walkerlab process is working in runs/paper" in second.stderr.readline()
+        with pytest.raises(subprocess.TimeoutExpired):
+            second.wait(timeout=0.5)
+        caught.go_on()
+        assert json.loads(second.stdout.read())["reused"] is True
+    assert json.loads(caught.stdout.read())["reused"] is False
+
+
+def test_runs_go_where_they_are_told(toy, tmp_path):
+    toy("drop", "--runs", tmp_path / "elsewhere")
+    assert (tmp_path / "elsewhere" / "paper" / "drop.h5").exists()
+    assert not (toy.folder / "runs").exists()
+
+
+def read_all(terminal):
+    """What a process wrote on a terminal until it closed it."""
+    text = b""
+    while True:
+        try:
+            text += os.read(terminal, 4096)
+        except OSError:
+            return text.decode()
+
+
+def test_a_bar_is_drawn_on_a_terminal_only(toy):
+    ours, theirs = pty.openpty()
+    with toy.start("drop", stderr=theirs, environment={"TERM": "xterm"}) as process:
+        os.close(theirs)
+        drawn = read_all(ours)
+        assert process.wait(timeout=30) == 0
+    os.close(ours)
+    assert "\x1b[" in drawn
+    assert "dropping" in drawn
+    assert "drop: ran in" in drawn
+    off_terminal = toy("drop", "--force", environment={"TERM": "xterm"}).stderr
+    assert "\x1b" not in off_terminal
+    assert "dropping" not in off_terminal
