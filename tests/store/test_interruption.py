@@ -1,5 +1,6 @@
 """Writers that die or are refused: what was there before stays, and nothing else is left."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -13,7 +14,7 @@ import walkerlab
 from walkerlab.errors import StorageError
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
-from walkerlab.store.files import TEMPORARY, remove_leftovers, write_atomically
+from walkerlab.store.files import TEMPORARY, drawing_into, remove_leftovers, write_atomically
 
 ENVIRONMENT = {
     **os.environ,
@@ -97,6 +98,13 @@ def test_read_only_folder_leaves_the_old_artifact(tmp_path, content, identity, o
 def test_a_folder_that_is_gone_is_told(tmp_path):
     with pytest.raises(StorageError, match="not there any more"):
         write_atomically(tmp_path / "gone" / "a", b"")
+
+
+def test_refusals_to_store_are_told_apart_from_other_failures(tmp_path):
+    with pytest.raises(StorageError, match="No space left"), drawing_into(tmp_path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(FileNotFoundError), drawing_into(tmp_path):
+        (tmp_path / "template that was not shipped").read_text()
 
 
 def test_only_temporary_files_are_left_over(tmp_path):

@@ -18,7 +18,7 @@ from walkerlab.stages.progress import Reporter, Silent
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
-from walkerlab.store.files import storing
+from walkerlab.store.files import drawing_into
 from walkerlab.store.runfolder import RunFolder
 
 __all__ = ["Done", "StageReport", "execute", "plan", "preview"]
@@ -186,7 +186,7 @@ class Run:
         extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
         if stage.draws:
             extra |= {"folder": self.folder.path, "left_out": self.planner.missing_inputs(stage)}
-            with storing(self.folder.path):
+            with drawing_into(self.folder.path):
                 content = run(config, inputs, self.reporter, **extra)
         else:
             content = run(config, inputs, self.reporter, **extra)

@@ -34,14 +34,28 @@ ADVICE = {
 
 @contextlib.contextmanager
 def storing(path: Path) -> Iterator[None]:
-    """Turn the operating system's refusals to store at `path` into StorageError; other errors pass."""
+    """Turn whatever the operating system refuses while `path` is stored into StorageError."""
+    try:
+        yield
+    except OSError as error:
+        raise refused(path, error) from error
+
+
+@contextlib.contextmanager
+def drawing_into(folder: Path) -> Iterator[None]:
+    """Turn the system's refusals to store into StorageError, around code that may fail in other ways: those pass."""
     try:
         yield
     except OSError as error:
         if error.errno not in ADVICE:
             raise
-        reason = error.strerror or str(error)
-        raise StorageError(f"{path} could not be stored: {reason}.", ADVICE[error.errno]) from error
+        raise refused(folder, error) from error
+
+
+def refused(path: Path, error: OSError) -> StorageError:
+    """What the system refused, and what to do about it."""
+    advice = ADVICE.get(error.errno or 0, "Choose another folder with --runs.")
+    return StorageError(f"{path} could not be stored: {error.strerror or error}.", advice)
 
 
 def write_atomically(path: Path, data: bytes) -> None:
