@@ -1,0 +1,162 @@
+"""What ground there is for each foot: pads laid in one lane a leg, or a plane that lets scuffing feet through.
+
+Straight legs scuff, so the paper walks on a checkerboard: in the plane, one lane of raised pads for each leg. A lane is
+cut into cells, pads (even numbers) and gaps (odd); a plane is one endless cell.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from walkerlab.kernels import by_type
+
+FAR = 1e9  # m, an edge out of reach
+
+
+class Checkerboard(NamedTuple):
+    """Pads of the length of a step, for either leg in turn; nothing between them."""
+
+    pitch: float  # [S] m, step length the pads are laid for
+    lanes: tuple[float, float]  # m, where each foot's pad number 0 is centred
+
+
+class AfterMidSwing(NamedTuple):
+    """A plane that a foot can touch only once it has been above the ground ahead of the other foot."""
+
+    step_length: float  # [S] m, what a step ahead is measured by
+
+
+@by_type
+def cell_at(terrain: Any, foot: int, along: float) -> int:
+    """Number of the cell of a foot's lane at `along` (m)."""
+
+
+@by_type
+def cell_edges(terrain: Any, foot: int, cell: int) -> tuple[float, float]:
+    """Where a cell begins and ends (m)."""
+
+
+@by_type
+def stride_measure(terrain: Any) -> float:
+    """Length (m) by which a step ahead and a slide are judged."""
+
+
+@by_type
+def starts_carried(terrain: Any, is_stance: bool) -> bool:
+    """Whether a foot that starts on the ground is carried by it."""
+
+
+@by_type
+def carried_in_cell(terrain: Any, cell: int) -> bool:
+    """Whether a foot that comes into a cell from above is carried there."""
+
+
+@by_type
+def carried_after_lift(terrain: Any, carried: bool, ahead: bool) -> bool:
+    """Whether the ground still carries a foot that has just lifted."""
+
+
+@by_type
+def carried_in_air(terrain: Any, carried: bool, ahead: bool) -> bool:
+    """Whether the ground carries a foot that is above it and ahead of the other foot, or not."""
+
+
+@by_type
+def order_matters(terrain: Any) -> bool:
+    """Whether it matters which foot is ahead."""
+
+
+@cell_at.case(Checkerboard)
+def checkerboard_cell(terrain: Checkerboard, foot: int, along: float) -> int:
+    """Pads and gaps are S long; pad 2 j of a lane is centred 2 j S from the lane's first."""
+    return math.floor((along - terrain.lanes[foot]) / terrain.pitch + 0.5)
+
+
+@cell_edges.case(Checkerboard)
+def checkerboard_edges(terrain: Checkerboard, foot: int, cell: int) -> tuple[float, float]:
+    """Half a pitch to both sides of the cell's centre."""
+    centre = terrain.lanes[foot] + cell * terrain.pitch
+    return centre - 0.5 * terrain.pitch, centre + 0.5 * terrain.pitch
+
+
+@stride_measure.case(Checkerboard)
+def checkerboard_measure(terrain: Checkerboard) -> float:
+    """The pads' pitch."""
+    return terrain.pitch
+
+
+@starts_carried.case(Checkerboard)
+def checkerboard_start(terrain: Checkerboard, is_stance: bool) -> bool:
+    """Both feet start on pads."""
+    return True
+
+
+@carried_in_cell.case(Checkerboard)
+def checkerboard_carries(terrain: Checkerboard, cell: int) -> bool:
+    """Pads have even numbers."""
+    return cell % 2 == 0
+
+
+@carried_after_lift.case(Checkerboard)
+def checkerboard_after_lift(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
+    """A pad stays where it is."""
+    return carried
+
+
+@carried_in_air.case(Checkerboard)
+def checkerboard_in_air(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
+    """The other foot does not matter."""
+    return carried
+
+
+@order_matters.case(Checkerboard)
+def checkerboard_order(terrain: Checkerboard) -> bool:
+    """No."""
+    return False
+
+
+@cell_at.case(AfterMidSwing)
+def plane_cell(terrain: AfterMidSwing, foot: int, along: float) -> int:
+    """One plane."""
+    return 0
+
+
+@cell_edges.case(AfterMidSwing)
+def plane_edges(terrain: AfterMidSwing, foot: int, cell: int) -> tuple[float, float]:
+    """None within reach."""
+    return -FAR, FAR
+
+
+@stride_measure.case(AfterMidSwing)
+def plane_measure(terrain: AfterMidSwing) -> float:
+    """The rigid gait's step length."""
+    return terrain.step_length
+
+
+@starts_carried.case(AfterMidSwing)
+def plane_start(terrain: AfterMidSwing, is_stance: bool) -> bool:
+    """The foot that is about to swing has not been ahead yet."""
+    return is_stance
+
+
+@carried_in_cell.case(AfterMidSwing)
+def plane_carries(terrain: AfterMidSwing, cell: int) -> bool:
+    """Never asked: the plane has no edges."""
+    return True
+
+
+@carried_after_lift.case(AfterMidSwing)
+def plane_after_lift(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
+    """A foot that lifts behind the other swings through; one that bounces ahead comes down again."""
+    return carried and ahead
+
+
+@carried_in_air.case(AfterMidSwing)
+def plane_in_air(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
+    """Ahead and above the ground: from here on it can touch. Fallen back: no longer."""
+    return ahead
+
+
+@order_matters.case(AfterMidSwing)
+def plane_order(terrain: AfterMidSwing) -> bool:
+    """Yes."""
+    return True
