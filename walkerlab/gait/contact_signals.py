@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 from walkerlab.kernels import by_type, inlined
 from walkerlab.physics.contact.friction import Coulomb, Frictionless
+from walkerlab.physics.contact.motion import OnGround
 from walkerlab.physics.contact.pinned import Pinned, floating_state
 from walkerlab.physics.contact.terrain import cell_edges, order_matters
-from walkerlab.physics.contact.walker import ContactWalker, FootMotion, OnGround, foot_motion
+from walkerlab.physics.contact.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.physics.multibody.tree import sines_cosines
 from walkerlab.physics.system import State
 from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing

@@ -23,6 +23,7 @@ from walkerlab.gait.contact_signals import (
 )
 from walkerlab.gait.outcome import Outcome
 from walkerlab.kernels import by_type, inlined
+from walkerlab.physics.contact.motion import OnGround
 from walkerlab.physics.contact.pinned import Pinned
 from walkerlab.physics.contact.terrain import (
     carried_after_lift,
@@ -31,7 +32,7 @@ from walkerlab.physics.contact.terrain import (
     order_matters,
     stride_measure,
 )
-from walkerlab.physics.contact.walker import ContactWalker, FootMotion, OnGround
+from walkerlab.physics.contact.walker import ContactWalker, FootMotion
 from walkerlab.physics.system import State
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import (

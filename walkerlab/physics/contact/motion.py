@@ -1,12 +1,19 @@
 """Equations of motion of the walker on compliant ground, and their exact derivatives."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
-from walkerlab.physics.contact.walker import ContactWalker, Foot, OnGround, foot_force, foot_motion
+from walkerlab.physics.contact.walker import ContactWalker, Foot, foot_force, foot_motion
 from walkerlab.physics.multibody.tree import mass_matrix, sines_cosines, tree_gradients, with_centrifugal
 from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.physics.tuples import Vector, put, solve_symmetric
+
+
+class OnGround(NamedTuple):
+    """The walker while each foot either finds ground under it or does not."""
+
+    walker: ContactWalker
+    carried: tuple[bool, bool]
 
 
 @blank.case(OnGround)

@@ -36,13 +36,6 @@ class ContactWalker(NamedTuple):
     blank: State  # a state of zeros
 
 
-class OnGround(NamedTuple):
-    """The walker while each foot either finds ground under it or does not."""
-
-    walker: ContactWalker
-    carried: tuple[bool, bool]
-
-
 class FootMotion(NamedTuple):
     """Where a foot's lowest point is and how it moves."""
 

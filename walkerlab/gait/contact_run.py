@@ -1,0 +1,272 @@
+"""A whole walk on compliant ground: hinged first step if wanted, then free, with everything observed on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.gait.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.gait.contact_signals import HEIGHT, PER_FOOT, SIGNALS, Frame, feet_motion
+from walkerlab.gait.contact_walk import (
+    AIRBORNE_SINCE,
+    STEPS,
+    Ledger,
+    walk_part,
+)
+from walkerlab.gait.outcome import Outcome
+from walkerlab.kernels import kernel
+from walkerlab.physics.contact.energy import book_energy, kinetic_energy, potential_energy
+from walkerlab.physics.contact.motion import OnGround
+from walkerlab.physics.contact.pinned import Pinned, floating_state
+from walkerlab.physics.contact.terrain import carried_in_cell, cell_at, starts_carried
+from walkerlab.physics.contact.walker import ContactWalker, foot_force
+from walkerlab.physics.system import State
+from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.registry import Method, finder_for
+from walkerlab.solvers.stepping import T
+from walkerlab.solvers.vectors import load
+
+Floats = NDArray[np.float64]
+
+
+USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+
+
+@dataclass(frozen=True)
+class MethodSettings:
+    """Which method integrates, and how exactly."""
+
+    method: Method
+    rtol: float
+    atol: float
+    budget: int  # right-hand sides
+
+    def new(self, n: int) -> Any:
+        """The method with memory for n equations."""
+        return self.method.new(n, self.rtol, self.atol, self.budget)
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Where and at what cost a walk stopped."""
+
+    time_s: float
+    state: State
+    work: NDArray[np.int64]
+
+
+class Ground(NamedTuple):
+    """What a walk happens on and is judged by."""
+
+    terrain: Any  # Checkerboard or AfterMidSwing
+    frame: Frame
+
+
+@kernel
+def walk_free(
+    walker: ContactWalker,
+    ground: Ground,
+    method: Any,
+    finder: CrossingFinder,
+    observer: Any,
+    ledger: Ledger,
+    t: float,
+    y: State,
+) -> int:
+    """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends."""
+    system = OnGround(walker, (True, True))
+    return walk_part(system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y)
+
+
+@kernel
+def walk_hinged(
+    pinned: Pinned, ground: Ground, method: Any, finder: CrossingFinder, observer: Any, ledger: Ledger, y: State
+) -> int:
+    """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
+    return walk_part(
+        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, ledger, 0.0, y
+    )
+
+
+@kernel
+def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies: Any) -> None:
+    """Kinetic energy, potential energy and energy of the books (J) of every sampled state into energies (samples, 3)."""
+    for i in range(states.shape[0]):
+        y = load(states, i, walker.blank)
+        energies[i, 0] = kinetic_energy(walker, y)
+        energies[i, 1] = potential_energy(walker, y)
+        energies[i, 2] = book_energy(walker, (carried[i, 0] != 0, carried[i, 1] != 0), y)
+
+
+@kernel
+def sampled_feet(walker: ContactWalker, states: Any, carried: Any, feet: Any) -> None:
+    """Position along and height (m), normal and friction force (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
+    for i in range(states.shape[0]):
+        y = load(states, i, walker.blank)
+        motions = feet_motion(walker, y)
+        for foot in range(2):
+            motion = motions[foot]
+            feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = motion.along, motion.height, motion.slip
+            feet[i, foot, 2], feet[i, foot, 3] = 0.0, 0.0
+            if carried[i, foot] != 0 and motion.height < 0.0:
+                force = foot_force(walker, motion)
+                feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
+
+
+@dataclass(frozen=True)
+class ContactSamples:
+    """A walk at evenly spaced times."""
+
+    time_s: Floats  # (samples,)
+    states: Floats  # (samples, 8)
+    carried: NDArray[np.int8]  # (samples, 2)
+    stance: NDArray[np.int64]  # (samples,)
+    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges  # noqa: N815 (a unit's capital)
+
+
+@dataclass(frozen=True)
+class ContactWalkResult:
+    """A walk on compliant ground, its fate and its cost."""
+
+    outcome: Outcome
+    touch_time_s: Floats  # (steps,)
+    touch_along_m: Floats  # (steps,)
+    slip_m: Floats  # (steps,)
+    end_time_s: float
+    end_state: State
+    max_penetration_m: float
+    energy_balance_residual_J: float  # noqa: N815
+    dissipated_J: Floats  # (3,)  # noqa: N815
+    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    samples: ContactSamples | None
+
+    @property
+    def periods_s(self) -> Floats:
+        """Time of each step from touch to touch."""
+        return np.diff(self.touch_time_s, prepend=0.0)
+
+    @property
+    def lengths_m(self) -> Floats:
+        """Distance along the slope of each step from touch to touch; the first from the first foothold."""
+        return np.diff(self.touch_along_m, prepend=0.0)
+
+
+def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: State) -> Ledger:
+    """The ledger of a walk of `steps` steps that starts from y with both feet on the ground."""
+    feet = feet_motion(walker, y)
+    cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
+    carried = np.zeros(2, np.int8)
+    for foot in range(2):
+        on_pad = carried_in_cell(terrain, int(cells[foot]))
+        carried[foot] = on_pad and starts_carried(terrain, foot == stance)
+    at_zero = np.zeros(SIGNALS, np.int8)
+    at_zero[[HEIGHT, PER_FOOT + HEIGHT]] = 1
+    foothold = np.array([motion.along for motion in feet])
+    record = [np.zeros(steps) for _ in range(3)]
+    return Ledger(*record, carried, cells, cells.copy(), foothold, at_zero, np.zeros(2), np.array([stance, 0]))
+
+
+def new_observer(walker: ContactWalker, ledger: Ledger, y: State, interval_s: float, samples: int) -> ContactObserver:
+    """An observer with room for `samples` samples, with the books opened at state y."""
+    extremes = np.zeros(3)
+    extremes[START_ENERGY] = book_energy(walker, (bool(ledger.carried[0]), bool(ledger.carried[1])), y)
+    return ContactObserver(
+        interval_s * np.arange(samples),
+        np.zeros((samples, len(walker.blank))),
+        np.zeros((samples, 2), np.int8),
+        np.zeros(samples, np.int64),
+        np.zeros((samples, BOOKS)),
+        np.zeros(1, np.int64),
+        np.zeros(BOOKS),
+        extremes,
+    )
+
+
+def walk_contact(
+    walker: ContactWalker,
+    ground: Ground,
+    pinned: Pinned | None,
+    stance: int,
+    start: State,
+    methods: MethodSettings,
+    steps: int,
+    interval_s: float | None,
+) -> ContactWalkResult:
+    """Walk up to `steps` steps.
+
+    pinned      the hinged first step, or None
+    stance      the foot that carries the first step
+    start       state of the free walker (8); its angles and angular velocities start the hinged one
+    methods     how to integrate
+    interval_s  time between samples, or None for none
+
+    The room for samples doubles until the whole walk fits.
+    """
+    frame = ground.frame
+    room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
+    while True:
+        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
+        observer = new_observer(walker, ledger, start, interval_s or 1.0, room)
+        outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
+        if room == 0 or observer.recorded[0] < room:
+            return gather(outcome, stopped, ledger, observer, walker)
+        room *= 2
+
+
+def run_parts(
+    walker: ContactWalker,
+    ground: Ground,
+    pinned: Pinned | None,
+    start: State,
+    methods: MethodSettings,
+    observer: ContactObserver,
+    ledger: Ledger,
+) -> tuple[Outcome, Stopped]:
+    """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped."""
+    t, y = 0.0, start
+    spent = np.zeros(4, np.int64)
+    if pinned is not None:
+        method = methods.new(len(pinned.blank))
+        angles = len(pinned.tree.arm_x)
+        hinged = (*start[2 : 2 + angles], *start[4 + angles :])
+        outcome = Outcome(walk_hinged(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
+        t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
+        spent += method.counts[:4]
+        if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
+            return outcome, Stopped(t, y, spent)
+    method = methods.new(len(walker.blank))
+    ledger.times[AIRBORNE_SINCE] = t
+    outcome = Outcome(walk_free(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y))
+    return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+
+
+def gather(
+    outcome: Outcome, stopped: Stopped, ledger: Ledger, observer: ContactObserver, walker: ContactWalker
+) -> ContactWalkResult:
+    """The result of a walk from what was written on the way."""
+    done, seen = int(ledger.feet[STEPS]), int(observer.recorded[0])
+    samples = None
+    if observer.times.size:
+        samples = ContactSamples(
+            observer.times[:seen],
+            observer.states[:seen],
+            observer.carried[:seen],
+            observer.stance[:seen],
+            observer.sampled_books[:seen],
+        )
+    return ContactWalkResult(
+        outcome,
+        ledger.touch_time[:done],
+        ledger.touch_along[:done],
+        ledger.slip[:done],
+        stopped.time_s,
+        stopped.state,
+        float(observer.extremes[MAX_PENETRATION]),
+        float(observer.extremes[RESIDUAL]),
+        observer.books.copy(),
+        stopped.work,
+        samples,
+    )

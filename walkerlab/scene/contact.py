@@ -1,0 +1,159 @@
+"""From a config to the least that can walk it on compliant ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from walkerlab.gait.contact_signals import Frame
+from walkerlab.physics.contact.compass import (
+    STANCE_FOOT,
+    CompassParts,
+    centre_to,
+    compass_assembly,
+    contact_walker,
+    pinned_walker,
+)
+from walkerlab.physics.contact.friction import Coulomb, Frictionless
+from walkerlab.physics.contact.normal_force import NormalLaw
+from walkerlab.physics.contact.pinned import Pinned, floating_state
+from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
+from walkerlab.physics.contact.walker import ContactWalker
+from walkerlab.physics.system import State
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import CompassWalker, Config, Contact
+
+
+@dataclass(frozen=True)
+class ContactScene:
+    """A walker on the ground, ready to walk."""
+
+    walker: ContactWalker
+    terrain: Checkerboard | AfterMidSwing
+    frame: Frame
+    pinned: Pinned | None  # the hinged first step, if the config wants one
+    pitch_m: float
+    left_out: tuple[dict[str, str], ...]
+
+
+def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
+    """The scene of a config with a contact block.
+
+    rigid_step_length_m  step length of the rigid gait: what pads and steps are measured by
+    own_pitch_m          step length of the contact gait, for `pad_pitch: own`
+    """
+    contact = config.contact
+    if contact is None:
+        raise ValueError("this config has no contact block")
+    pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
+    parts = compass_parts(config.walker)
+    assembly = compass_assembly(parts)
+    walker = contact_walker(
+        assembly, normal_law(contact), friction_law(contact), config.gravity_m_s2, config.slope_rad
+    )
+    hip = centre_to(assembly, "leg 2", (0.0, 0.0))
+    frame = Frame(
+        leg_length=parts.leg_length_m,
+        pendulum_time=math.sqrt(parts.leg_length_m / config.gravity_m_s2),
+        hip_x=tuple(float(x) for x in hip[:, 0]),
+        hip_y=tuple(float(x) for x in hip[:, 1]),
+        locate_joins=False,
+    )
+    terrain = Checkerboard(pitch, (-pitch, 0.0)) if contact.terrain == "checkerboard" else AfterMidSwing(pitch)
+    pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
+    return ContactScene(walker, terrain, frame, pinned, pitch, left_out(config, contact))
+
+
+def compass_parts(walker: CompassWalker) -> CompassParts:
+    """The measures that the walker is assembled by."""
+    return CompassParts(
+        walker.leg_length_m,
+        walker.foot_to_mass_m,
+        walker.leg_mass_kg,
+        walker.hip_mass_kg,
+        walker.leg_inertia_kg_m2,
+        walker.foot_radius_m,
+    )
+
+
+def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
+    """Pitch of the pads (m); on a plane the rigid step length, by which steps are judged."""
+    if contact.terrain == "after-mid-swing" or contact.pad_pitch == "rigid":
+        return rigid_step_length_m
+    if contact.pad_pitch == "own":
+        if own_pitch_m is None:
+            raise ValueError("pad_pitch: own needs the contact gait's step length")
+        return own_pitch_m
+    return float(contact.pad_pitch)
+
+
+def normal_law(contact: Contact) -> NormalLaw:
+    """The normal force in SI."""
+    si = contact.in_si()
+    return NormalLaw(si.stiffness_N_per_m_e, si.exponent, si.damping_N_s_m, si.full_damping_penetration_m)
+
+
+def friction_law(contact: Contact) -> Coulomb | Frictionless:
+    """The friction in SI; no friction is a law of its own, not a coefficient of zero."""
+    if contact.friction == "none":
+        return Frictionless()
+    si = contact.in_si()
+    return Coulomb(si.static_friction, si.dynamic_friction, si.stiction_velocity_m_s, si.friction_velocity_m_s)
+
+
+def start_state(scene: ContactScene, rigid_state: State) -> State:
+    """The walker with the rigid start state, its stance foot just touching at along = 0, at rest and rolling.
+
+    rigid_state  (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2), both feet on the slope
+
+    The hinge at the ball's centre gives position and velocity; then the ball rolls without slip instead of turning
+    about its centre.
+    """
+    walker = scene.walker
+    foot = walker.feet[STANCE_FOOT]
+    pinned = scene.pinned or Pinned(walker, walker.tree, STANCE_FOOT, 0.0, (0.0,) * 4)
+    hinged = floating_state(pinned, rigid_state)
+    rolled = hinged[4] - foot.radius * rigid_state[2 + STANCE_FOOT]
+    return (*hinged[:4], rolled if scene.pinned is None else hinged[4], *hinged[5:])
+
+
+def left_out(config: Config, contact: Contact) -> tuple[dict[str, str], ...]:
+    """What this scene does without, and why."""
+    rows: list[tuple[bool, str, str]] = [
+        (contact.friction == "none", "tangential velocity and friction force", "contact.friction is none"),
+        (
+            contact.stance == "pinned",
+            "floating base and stance contact in the first step",
+            "contact.stance is pinned: two angles suffice",
+        ),
+        ("states" not in config.outputs, "trajectory of the contact walk", "outputs does not ask for states"),
+        ("energies" not in config.outputs, "energies of the contact walk", "outputs does not ask for energies"),
+        ("forces" not in config.outputs, "forces of the contact walk", "outputs does not ask for forces"),
+    ]
+    return tuple({"what": what, "why": why} for absent, what, why in rows if absent)
+
+
+def static_penetration(scene: ContactScene) -> float:
+    """Penetration (m) under the walker's whole weight on one foot."""
+    law, walker = scene.walker.normal, scene.walker
+    weight = walker.tree.mass * math.hypot(walker.gravity_along, walker.gravity_down)
+    return float((weight / law.stiffness) ** (1.0 / law.exponent))
+
+
+def damping_ratio(scene: ContactScene) -> float:
+    """Damping ratio c / (2 sqrt(dF/dd m)) at the static penetration, damping fully developed, with the total mass."""
+    law = scene.walker.normal
+    depth = static_penetration(scene)
+    slope = law.stiffness * law.exponent * depth ** (law.exponent - 1.0)
+    return float(law.damping / (2.0 * math.sqrt(slope * scene.walker.tree.mass)))
+
+
+def scene_measures(scene: ContactScene) -> dict[str, Any]:
+    """What the scene derives from the config, SI, for summaries."""
+    return {
+        "static_penetration_m": static_penetration(scene),
+        "damping_ratio": damping_ratio(scene),
+        "pitch_m": scene.pitch_m,
+    }

@@ -1,0 +1,205 @@
+"""SciPy's integrators behind the same functions as our own, with the compiled right-hand side.
+
+They serve as peers and as a check. Walks with them run in Python: the same source, uncompiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from walkerlab.kernels import kernel
+from walkerlab.physics.system import State, blank, derivative, jacobian
+from walkerlab.solvers.stepping import (
+    ACCEPTED,
+    BUDGET,
+    COUNTS,
+    H_NEXT,
+    JACOBIANS,
+    OUT_OF_BUDGET,
+    RHS,
+    STEP_DONE,
+    STEP_TOO_SMALL,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    dense_degree,
+    end_state,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
+from walkerlab.solvers.vectors import load, store
+
+
+class Entry(NamedTuple):
+    """A class of scipy.integrate, by name so that SciPy is imported only where it is used."""
+
+    class_name: str
+    implicit: bool
+
+
+SCIPY_CLASSES = {
+    "scipy-rk45": Entry("RK45", False),
+    "scipy-dop853": Entry("DOP853", False),
+    "scipy-lsoda": Entry("LSODA", True),
+    "scipy-radau": Entry("Radau", True),
+    "scipy-bdf": Entry("BDF", True),
+}
+DENSE_DEGREE = 7
+
+
+class OutOfBudgetError(Exception):
+    """The right-hand sides are used up; ends a step of a library that knows no budget."""
+
+
+@kernel
+def right_hand_side(system: Any, t: float, y: Any, dy: Any) -> None:
+    """dy/dt of any system, arrays in and out."""
+    store(derivative(system, t, load(y, 0, blank(system))), dy, 0)
+
+
+@kernel
+def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
+    """The Jacobian of any system, arrays in and out."""
+    jacobian(system, t, load(y, 0, blank(system)), J)
+
+
+def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
+    """The machine code of a kernel for arguments of these types, without the cost of looking at them again."""
+    code: Callable[..., None] = function.compile(tuple(numba.typeof(argument) for argument in arguments))
+    return code
+
+
+class ScipyMethod:
+    """A library's integrator with the fields of a method."""
+
+    def __init__(self, entry: Entry, n: int, rtol: float, atol: float, budget: int) -> None:
+        """Prepare for n equations; the solver itself is made by `begin`."""
+        self.entry = entry
+        self.rtol, self.atol = rtol, atol
+        self.clock = np.zeros(3)
+        self.y_old, self.y = np.zeros(n), np.zeros(n)
+        self.counts = np.zeros(COUNTS, np.int64)
+        self.counts[BUDGET] = budget
+        self.solver: Any = None
+        self.dense: Any = None
+        self.failure = ""
+
+
+def new_scipy_method(name: str) -> Callable[[int, float, float, int], ScipyMethod]:
+    """A builder of the method of that name."""
+
+    def build(n: int, rtol: float, atol: float, budget: int) -> ScipyMethod:
+        return ScipyMethod(SCIPY_CLASSES[name], n, rtol, atol, budget)
+
+    return build
+
+
+def counted(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """The compiled right-hand side as SciPy calls it, counting and keeping the budget."""
+    probe = np.zeros(n)
+    code = entry_point(right_hand_side, system, 0.0, probe, probe)
+    counts = method.counts
+
+    def fun(t: float, y: Any) -> Any:
+        if counts[RHS] >= counts[BUDGET]:
+            raise OutOfBudgetError
+        counts[RHS] += 1
+        dy = np.empty(n)
+        code(system, t, y, dy)
+        return dy
+
+    return fun
+
+
+def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """The compiled Jacobian as SciPy calls it, counting."""
+    code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
+
+    def jac(t: float, y: Any) -> Any:
+        method.counts[JACOBIANS] += 1
+        J = np.empty((n, n))
+        code(system, t, y, J)
+        return J
+
+    return jac
+
+
+@begin.case(ScipyMethod)
+def begin_scipy(method: ScipyMethod, system: Any, t: float, y: State, h: float) -> None:
+    """Make a new solver; SciPy chooses its first step itself."""
+    from scipy import integrate
+
+    n = method.y.size
+    method.y[:] = y
+    method.clock[T_OLD] = method.clock[T] = t
+    options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
+    if method.entry.implicit:
+        options["jac"] = counted_jacobian(method, system, n)
+    method.dense = None
+    try:
+        solver_class = getattr(integrate, method.entry.class_name)
+        method.solver = solver_class(counted(method, system, n), t, method.y.copy(), np.inf, **options)
+    except OutOfBudgetError:
+        method.solver = None
+
+
+@advance.case(ScipyMethod)
+def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
+    """One step of the solver, or the rest of one that was rewound, read off its dense output."""
+    clock = method.clock
+    if method.dense is not None and clock[T] < t_end <= method.dense.t_max:
+        method.y[:] = method.dense(t_end)
+        clock[T] = t_end
+        return STEP_DONE
+    if method.solver is None:
+        return OUT_OF_BUDGET
+    try:
+        method.solver.step()
+    except OutOfBudgetError:
+        return OUT_OF_BUDGET
+    if method.solver.status == "failed":
+        return STEP_TOO_SMALL
+    method.counts[ACCEPTED] += 1
+    method.dense = method.solver.dense_output()
+    clock[T_OLD], clock[T] = method.solver.t_old, min(method.solver.t, t_end)
+    method.y_old[:] = method.dense(method.solver.t_old)
+    method.y[:] = method.solver.y if clock[T] == method.solver.t else method.dense(clock[T])
+    clock[H_NEXT] = method.solver.t - method.solver.t_old
+    return STEP_DONE
+
+
+@rewind.case(ScipyMethod)
+def rewind_scipy(method: ScipyMethod, system: Any) -> None:
+    """The step's dense output stays; `advance` reads the event's state off it."""
+    method.clock[T] = method.clock[T_OLD]
+    method.y[:] = method.y_old
+
+
+@prepare_dense.case(ScipyMethod)
+def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
+    """Each step makes its own."""
+
+
+@interpolate.case(ScipyMethod)
+def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float) -> State:
+    """The library's dense output."""
+    t_old, t = method.clock[T_OLD], method.clock[T]
+    return tuple(method.dense(t_old + fraction * (t - t_old)).tolist())
+
+
+@end_state.case(ScipyMethod)
+def end_state_scipy(method: ScipyMethod, system: Any) -> State:
+    """The state at the end of the last step."""
+    return tuple(method.y.tolist())
+
+
+@dense_degree.case(ScipyMethod)
+def dense_degree_scipy(method: ScipyMethod) -> int:
+    """High enough for all of them."""
+    return DENSE_DEGREE

@@ -1,0 +1,206 @@
+"""The physical model: an assembled walker on compliant ground, walked from the rigid model's start state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
+from walkerlab.gait.contact_run import (
+    ContactSamples,
+    ContactWalkResult,
+    Ground,
+    MethodSettings,
+    sampled_energies,
+    sampled_feet,
+    walk_contact,
+)
+from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.physics.contact.terrain import Checkerboard
+from walkerlab.scene.contact import ContactScene, contact_scene, scene_measures, start_state
+from walkerlab.solvers.registry import method_named
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content, Group, Variable
+
+BUDGET_PER_STEP = 1_000_000  # right-hand sides
+SAMPLES_PER_PENDULUM_TIME = 200
+TIME, LEG = "time", "leg"
+
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Walk `config.strides` strides on compliant ground; raises NoAnswer if the solver gives none."""
+    rigid_step, rigid_state = rigid_start(config, inputs)
+    scene = contact_scene(config, rigid_step)
+    settings = config.solver.contact
+    methods = MethodSettings(
+        method_named(settings.method), settings.rtol, settings.atol, 2 * config.strides * BUDGET_PER_STEP
+    )
+    sampled = bool(config.outputs)
+    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+    progress.start("contact-sim", 1)
+    result = walk_contact(
+        scene.walker,
+        Ground(scene.terrain, scene.frame),
+        scene.pinned,
+        STANCE_FOOT,
+        start_state(scene, rigid_state),
+        methods,
+        2 * config.strides,
+        interval,
+    )
+    progress.advance()
+    content = Content(groups(config, scene, result), summary(scene, result))
+    if not result.outcome.answered:
+        raise NoAnswer(
+            f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps at t = {result.end_time_s:.4g} s",
+            result.outcome.advice,
+            partial=content,
+        )
+    return content
+
+
+def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, tuple[float, ...]]:
+    """Step length (m) that pads and steps are measured by, and the rigid start state."""
+    given = config.start if config.start != "fixed-point" else None
+    if "fixedpoint" in inputs:
+        gait = inputs["fixedpoint"].summary
+        state = given if given is not None else gait["state"]
+        return float(gait["step_length_m"]), tuple(float(x) for x in state)
+    if given is None:
+        raise ValueError("neither a start state nor a fixed point")
+    state = tuple(float(x) for x in given)
+    return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
+
+
+def summary(scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
+    """What the command prints."""
+    slips = result.slip_m
+    return {
+        "outcome": result.outcome.label,
+        "advice": result.outcome.advice,
+        "steps": int(result.touch_time_s.size),
+        "step_periods_s": result.periods_s.tolist(),
+        "step_lengths_m": result.lengths_m.tolist(),
+        "end_time_s": result.end_time_s,
+        "max_penetration_m": result.max_penetration_m,
+        "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
+        "slips_m": slips.tolist(),
+        "energy_balance_residual_J": result.energy_balance_residual_J,
+        "dissipated_J": dict(zip(("damping", "friction", "edges"), result.dissipated_J.tolist(), strict=True)),
+        "rhs_evaluations": int(result.work[0]),
+        "accepted_steps": int(result.work[1]),
+        "rejected_steps": int(result.work[2]),
+        "jacobians": int(result.work[3]),
+        "slope_rad": scene.walker.slope,
+        **scene_measures(scene),
+        "left_out": list(scene.left_out),
+    }
+
+
+def groups(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
+    """The datasets of the artifact."""
+    stored = {"steps": steps_group(result)}
+    if isinstance(scene.terrain, Checkerboard):
+        stored["terrain"] = pads_group(scene.terrain, result)
+    if result.samples is not None:
+        stored["trajectory"] = trajectory_group(config, scene, result.samples)
+    return {name: group for name, group in stored.items() if group is not None}
+
+
+def steps_group(result: ContactWalkResult) -> Group:
+    """One row a step."""
+    rows = (
+        ("period_s", result.periods_s, "s", "time from touch to touch"),
+        ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
+        ("touch_time_s", result.touch_time_s, "s", "time of the touch that ends the step"),
+        ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
+        ("slip_m", result.slip_m, "m", "net slip of the stance foot from its touch to its lift"),
+    )
+    variables = {"step": Variable(np.arange(result.touch_time_s.size), ("step",), "1", "step number")}
+    variables |= {name: Variable(values, ("step",), units, text) for name, values, units, text in rows}
+    return Group(variables)
+
+
+def pads_group(terrain: Checkerboard, result: ContactWalkResult) -> Group:
+    """The pads from behind the start to ahead of the end."""
+    last = int(np.ceil(result.end_state[0] / terrain.pitch)) + 2
+    numbers = range(-2, last + 1)
+    centres = np.array([number * terrain.pitch for number in numbers])
+    legs = np.array([1 if number % 2 == 0 else 0 for number in numbers])
+    return Group(
+        {
+            "pad": Variable(np.arange(centres.size), ("pad",), "1", "pad number"),
+            "left_m": Variable(centres - 0.5 * terrain.pitch, ("pad",), "m", "where the pad begins, along the slope"),
+            "right_m": Variable(centres + 0.5 * terrain.pitch, ("pad",), "m", "where the pad ends, along the slope"),
+            "leg": Variable(legs, ("pad",), "1", "leg whose lane the pad lies in"),
+        }
+    )
+
+
+def trajectory_group(config: Config, scene: ContactScene, samples: ContactSamples) -> Group:
+    """Samples of the walk: what `outputs` asks for."""
+    per_time, per_leg = (TIME,), (TIME, LEG)
+    variables = {
+        TIME: Variable(samples.time_s, per_time, "s", "time"),
+        LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
+        "stance_leg": Variable(samples.stance, per_time, "1", "leg of the last step's touch"),
+    }
+    feet = np.zeros((samples.time_s.size, 2, 5))
+    sampled_feet(scene.walker, samples.states, samples.carried, feet)
+    if "states" in config.outputs:
+        variables |= state_variables(scene, samples, feet)
+    if "energies" in config.outputs:
+        variables |= energy_variables(scene, samples, feet)
+    if "forces" in config.outputs:
+        depth = np.where(samples.carried > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
+        variables |= {
+            "penetration_m": Variable(depth, per_leg, "m", "depth of the foot in the ground that carries it"),
+            "normal_force_N": Variable(feet[:, :, 2], per_leg, "N", "normal force of the ground on the foot"),
+            "friction_force_N": Variable(feet[:, :, 3], per_leg, "N", "friction on the foot, positive downhill"),
+            "slip_velocity_m_s": Variable(feet[:, :, 4], per_leg, "m/s", "velocity of the foot's lowest material point"),
+        }
+    return Group(variables)
+
+
+def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
+    """Angles and velocities of the legs, and where hip and feet are."""
+    y, frame = samples.states, scene.frame
+    tilted = y[:, 2:4] + scene.walker.slope
+    hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
+    along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
+    height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
+    return {
+        "angle": Variable(y[:, 2:4], (TIME, LEG), "rad", "angle of the leg from the vertical"),
+        "velocity": Variable(y[:, 6:8], (TIME, LEG), "rad/s", "angular velocity of the leg"),
+        "hip_along_m": Variable(along, (TIME,), "m", "position of the hip along the slope"),
+        "hip_height_m": Variable(height, (TIME,), "m", "height of the hip over the slope"),
+        "foot_along_m": Variable(feet[:, :, 0], (TIME, LEG), "m", "position of the foot along the slope"),
+        "foot_height_m": Variable(feet[:, :, 1], (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
+    }
+
+
+def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
+    """Energies as the paper plots them, from the current stance foot, and the books from a fixed origin."""
+    energies = np.zeros((samples.time_s.size, 3))
+    sampled_energies(scene.walker, samples.states, samples.carried, energies)
+    walker = scene.walker
+    row = np.arange(samples.time_s.size)
+    foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]
+    of_foot = walker.tree.mass * (walker.gravity_down * foot_height - walker.gravity_along * foot_along)
+    potential = energies[:, 1] - of_foot
+    lost = samples.dissipated_J
+    residual = energies[:, 2] + lost.sum(axis=1) - energies[0, 2]
+    rows = (
+        ("kinetic_J", energies[:, 0], "kinetic energy"),
+        ("potential_J", potential, "potential energy from the current stance foot"),
+        ("mechanical_J", energies[:, 0] + potential, "kinetic and potential energy from the current stance foot"),
+        ("book_mechanical_J", energies[:, 2], "kinetic, potential from a fixed origin, and elastic energy"),
+        ("dissipated_damping_J", lost[:, 0], "dissipated in normal direction so far"),
+        ("dissipated_friction_J", lost[:, 1], "dissipated in friction so far"),
+        ("lost_at_edges_J", lost[:, 2], "elastic energy lost at pads' edges so far"),
+        ("residual_J", residual, "book energy plus what was lost, less the start's"),
+    )
+    return {name: Variable(values, (TIME,), "J", text) for name, values, text in rows}
