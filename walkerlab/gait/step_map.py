@@ -24,6 +24,7 @@ SECTION = 3
 SMALLEST_MOVE = 2.0**-8
 MOST_EVALUATIONS = 60
 NO_RESIDUAL = 1e300
+ROUNDING = 1e-10  # a residual this small that no longer shrinks is rounding
 # derivative (4, 3) of the state with respect to z: theta_2 takes theta_1 along with the opposite sign
 ALONG_SECTION = (-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -128,7 +129,7 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
                 break
         else:
             scale *= 0.5
-            if scale < SMALLEST_MOVE or best_status != WALKED:
+            if scale < SMALLEST_MOVE or best_status != WALKED or best_residual < ROUNDING:
                 break
         for i in range(SECTION):
             z[i] = best[i] + scale * move[i]
