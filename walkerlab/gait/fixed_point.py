@@ -19,8 +19,7 @@ from walkerlab.gait.step_map import evaluate, new_shooting, newton
 from walkerlab.physics.rigid.swing import VARIATION_BLANK
 from walkerlab.physics.rigid.walker import CORRECTED, RigidWalker
 from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.events import new_crossing_finder
-from walkerlab.solvers.stepping import dense_degree
+from walkerlab.solvers.registry import finder_for
 
 RANDOM_START = "random start"
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
@@ -116,7 +115,7 @@ class Search:
         self.lost: list[str] = []
         n, budget = len(VARIATION_BLANK), settings.budget
         self.method = new_dop853(4, settings.solved_rtol, settings.solved_atol, budget)
-        self.finder = new_crossing_finder(dense_degree(self.method), SIGNALS)
+        self.finder = finder_for(self.method, SIGNALS)
         self.looking = new_shooting(self.walker, new_dop853(n, settings.rtol, settings.atol, budget), self.finder)
         solved = new_dop853(n, settings.solved_rtol, settings.solved_atol, budget)
         self.solving = new_shooting(self.walker, solved, self.finder)

@@ -30,13 +30,14 @@ from walkerlab.gait.rigid_walk import (
 )
 from walkerlab.physics.rigid.walker import RigidWalker, step_length
 from walkerlab.physics.system import State
-from walkerlab.solvers.events import CrossingFinder, new_crossing_finder
-from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts, dense_degree
+from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
 
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
-CLOSEST_SAMPLES = 1e-6  # of the time between samples; one nearer to a heel strike is dropped
+CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
 Array = NDArray[np.float64]
 NO_STATES = np.zeros((0, 4))
@@ -131,7 +132,9 @@ class Recorder:
         self.start = self.state = start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
-        self.finder: CrossingFinder = new_crossing_finder(dense_degree(method), SIGNALS)
+        self.finder = finder_for(method, SIGNALS)
+        # a library's method is integrated with in Python
+        self.walk: Callable[..., tuple[int, int]] = walk.py_func if isinstance(method, ScipyMethod) else walk
         first = new_observer(np.zeros(0))
         observe_start(first, walker, start)
         self.energy_at_start = float(first.energy[LATEST])
@@ -149,7 +152,7 @@ class Recorder:
         observer = new_observer(self._grid(steps))
         clear_counts(self.method)
         self.method.counts[BUDGET] = steps * BUDGET_OF_A_STEP
-        status, taken = walk(self.walker, self.method, self.finder, observer, self.state, strikes, before, after)
+        status, taken = self.walk(self.walker, self.method, self.finder, observer, self.state, strikes, before, after)
         self.counts += self.method.counts
         self._keep(observer)
         strikes, before, after = strikes[:taken] + self.time, before[:taken], after[:taken]

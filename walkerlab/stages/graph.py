@@ -92,7 +92,7 @@ PIPELINE = Graph(
         "fixedpoint",
         "walkerlab.stages.fixedpoint",
         "Find the periodic gait of the rigid model and its multipliers.",
-        reads=("walker", "gravity", "slope", "equations", "solver.rigid"),
+        reads=("walker", "gravity", "slope", "equations", "seed"),
     ),
     Stage(
         "simulate",
