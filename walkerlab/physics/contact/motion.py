@@ -4,7 +4,13 @@ from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
 from walkerlab.physics.contact.walker import ContactWalker, Foot, foot_force, foot_motion
-from walkerlab.physics.multibody.tree import mass_matrix, sines_cosines, tree_gradients, with_centrifugal
+from walkerlab.physics.multibody.tree import (
+    divide_by_mass,
+    mass_matrix,
+    sines_cosines,
+    tree_gradients,
+    with_centrifugal,
+)
 from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.physics.tuples import Vector, put, solve_symmetric
 
@@ -131,13 +137,8 @@ def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
         ground_gradients(walker, walker.feet[1], s, c, y, J)
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, 4 + n, all_wrenches(system, s, c, y)[2])
-    tree_gradients(tree, s, c, y, solve_symmetric(M, torques), J)
+    tree_gradients(tree, s, c, y, 2, solve_symmetric(M, torques), J)
+    divide_by_mass(tree, M, J)
     for j in range(4 + 2 * n):
         J[2 + n, j] /= tree.mass
         J[3 + n, j] /= tree.mass
-        column = tree.arm_x
-        for k in range(n):
-            column = put(column, k, J[4 + n + k, j])
-        column = solve_symmetric(M, column)
-        for k in range(n):
-            J[4 + n + k, j] = column[k]

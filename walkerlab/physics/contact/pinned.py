@@ -4,13 +4,20 @@ The paper's temporary revolute joint. The hinge is at the centre of the ball foo
 ground while the leg turns over it.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
 from walkerlab.physics.contact.walker import ContactWalker
-from walkerlab.physics.multibody.tree import Tree, mass_matrix, sines_cosines, with_centrifugal
-from walkerlab.physics.system import State, blank, derivative
-from walkerlab.physics.tuples import put, solve_symmetric
+from walkerlab.physics.multibody.tree import (
+    Tree,
+    divide_by_mass,
+    mass_matrix,
+    sines_cosines,
+    tree_gradients,
+    with_centrifugal,
+)
+from walkerlab.physics.system import State, blank, derivative, jacobian
+from walkerlab.physics.tuples import Vector, put, solve_symmetric
 
 
 class Pinned(NamedTuple):
@@ -29,23 +36,50 @@ def pinned_blank(system: Pinned) -> State:
     return system.blank
 
 
-@derivative.case(Pinned)
-def pinned_derivative(system: Pinned, t: float, y: State) -> State:
-    """The tree's equations about the hinge; gravity turns each body by its first moment about it."""
+@inlined
+def gravity_torques(system: Pinned, s: Vector, c: Vector) -> Vector:
+    """Torque of gravity on each body (N m): its first moment about the hinge in the field."""
     tree, walker = system.tree, system.walker
-    n = len(tree.arm_x)
-    s, c = sines_cosines(tree, y, 0, walker.slope)
     torques = tree.arm_x
-    for k in range(n):
+    for k in range(len(s)):
         forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
         upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
         torques = put(torques, k, -walker.gravity_along * upward - walker.gravity_down * forward)
-    alpha = solve_symmetric(mass_matrix(tree, s, c), with_centrifugal(tree, s, c, y, n, torques))
+    return torques
+
+
+@derivative.case(Pinned)
+def pinned_derivative(system: Pinned, t: float, y: State) -> State:
+    """The tree's equations about the hinge."""
+    tree = system.tree
+    n = len(tree.arm_x)
+    s, c = sines_cosines(tree, y, 0, system.walker.slope)
+    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    alpha = solve_symmetric(mass_matrix(tree, s, c), torques)
     rate = system.blank
     for k in range(n):
         rate = put(rate, k, y[n + k])
         rate = put(rate, n + k, alpha[k])
     return rate
+
+
+@jacobian.case(Pinned)
+def pinned_jacobian(system: Pinned, t: float, y: State, J: Any) -> None:
+    """Derivatives of the tree's equations about the hinge."""
+    tree, walker = system.tree, system.walker
+    n = len(tree.arm_x)
+    s, c = sines_cosines(tree, y, 0, walker.slope)
+    for i in range(2 * n):
+        for j in range(2 * n):
+            J[i, j] = 1.0 if j == i + n else 0.0
+    for k in range(n):
+        forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
+        upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
+        J[n + k, k] = walker.gravity_down * upward - walker.gravity_along * forward
+    M = mass_matrix(tree, s, c)
+    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    tree_gradients(tree, s, c, y, 0, solve_symmetric(M, torques), J)
+    divide_by_mass(tree, M, J)
 
 
 @inlined

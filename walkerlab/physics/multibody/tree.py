@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
 from walkerlab.physics.trigonometry import sine_cosine
-from walkerlab.physics.tuples import Vector, put
+from walkerlab.physics.tuples import Vector, put, solve_symmetric
 
 
 class Tree(NamedTuple):
@@ -61,19 +61,34 @@ def with_centrifugal(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, to
 
 
 @inlined
-def tree_gradients(tree: Tree, s: Vector, c: Vector, y: Vector, alpha: Vector, J: Any) -> None:
+def tree_gradients(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, alpha: Vector, J: Any) -> None:
     """Add the derivatives of (centrifugal terms - M alpha) at fixed alpha to the last n rows of J.
 
-    The state y is two positions, n angles and the velocities of all; J is square in it.
+    The angles are y[first], y[first + 1], ...; their velocities are the last n numbers of y.
     """
     n = len(s)
+    rates = len(y) - n
     for k in range(n):
-        row = 4 + n + k
+        row = rates + k
         for l in range(n):
-            omega = y[4 + n + l]
+            omega = y[rates + l]
             A, B = tree.cosine[k * n + l], tree.sine[k * n + l]
             cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
             along = omega * omega * (A * cos_d + B * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
-            J[row, 2 + l] += along
-            J[row, 2 + k] -= along
-            J[row, 4 + n + l] += 2.0 * omega * (A * sin_d - B * cos_d)
+            J[row, first + l] += along
+            J[row, first + k] -= along
+            J[row, rates + l] += 2.0 * omega * (A * sin_d - B * cos_d)
+
+
+@inlined
+def divide_by_mass(tree: Tree, M: Vector, J: Any) -> None:
+    """Solve M X = (last n rows of J) in place: torques' derivatives become those of angular accelerations."""
+    n = len(tree.arm_x)
+    size = J.shape[0]
+    for j in range(size):
+        column = tree.arm_x
+        for k in range(n):
+            column = put(column, k, J[size - n + k, j])
+        column = solve_symmetric(M, column)
+        for k in range(n):
+            J[size - n + k, j] = column[k]
