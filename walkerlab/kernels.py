@@ -1,7 +1,7 @@
 """How physics becomes machine code: compiled functions, bodies chosen by type, and where the code is cached.
 
 Numba's own cache does not notice that a called function in another file changed, so the cache folder is keyed by
-a digest of every source file of the package: an edited function can never run stale.
+a digest of all sources that kernels can be made of: an edited function can never run stale.
 """
 
 import functools
@@ -14,7 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-KEPT_GENERATIONS = 3
+# the only packages in which compiled functions may stand (a test says so)
+KERNEL_HOMES = ("physics", "solvers", "gait")
+KEPT_GENERATIONS = 8
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 # parts of a kernel are never entered from outside
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
@@ -23,10 +25,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def sources_digest() -> str:
-    """Digest (hex) of every source file of the package, in the order of their names."""
+    """Digest (hex) of every source file that a kernel can be made of."""
     root = Path(__file__).parent
+    paths = [Path(__file__), *(path for home in KERNEL_HOMES for path in (root / home).rglob("*.py"))]
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted(paths):
         digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
