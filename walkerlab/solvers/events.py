@@ -21,6 +21,7 @@ from walkerlab.kernels import inlined
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
 NARROWEST = 2.0**-48
+CLOSEST = 2.0**-52  # how finely a crossing is located within its piece
 DEPTH = 64
 
 
@@ -147,11 +148,10 @@ def bisect(stack: Any, piece: int, size: int, low: float, high: float) -> float:
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0
     for _ in range(100):
-        if b - a < 1e-16 or value_a == value_b:
+        if b - a <= 2.0 * CLOSEST or value_a == value_b:
             break
-        c = (a * value_b - b * value_a) / (value_b - value_a)
-        if not a < c < b:
-            break
+        # rounding may put the secant's zero on an end: a step inside shrinks the bracket to it
+        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + CLOSEST), b - CLOSEST)
         value_c = evaluate(stack, piece, size, c)
         if value_c == 0.0:
             a, b = c, c
