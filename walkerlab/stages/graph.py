@@ -86,6 +86,7 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -131,7 +132,7 @@ PIPELINE = Graph(
         "report",
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
-        reads=("name",),
+        reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "plot"),
         draws=True,
     ),
