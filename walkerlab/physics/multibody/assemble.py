@@ -31,8 +31,10 @@ class Anchor:
 def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
     """Levers d (bodies, 2) in m: `point` lies at root + sum over k of R(theta_k) d[k].
 
-    Raises ValueError if hinges do not lead from the root's body to the point's.
+    Raises KeyError for an unknown body, ValueError if hinges do not lead from the root's body to the point's.
     """
+    for end in (root, point):
+        assembly.index(end.body)
     d = np.zeros((len(assembly.bodies), 2))
     here = np.array(root.at_m)
     for body, leaving, entering in path(assembly, root.body, point.body):

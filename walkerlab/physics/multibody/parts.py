@@ -51,12 +51,29 @@ class BallFoot:
 
 @dataclass(frozen=True)
 class Assembly:
-    """Bodies held together by hinges, without closed loops."""
+    """Bodies held together by hinges, without closed loops.
+
+    Raises KeyError for a part on a body that is not there, ValueError for two bodies of one name and for closed loops.
+    """
 
     bodies: tuple[Body, ...]
     joints: tuple[Revolute, ...]
     particles: tuple[Particle, ...] = ()
     feet: tuple[BallFoot, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a tree of known bodies."""
+        names = [body.name for body in self.bodies]
+        if len(set(names)) < len(names):
+            raise ValueError(f"two bodies of one name among {', '.join(names)}")
+        for body in [*(particle.body for particle in self.particles), *(foot.body for foot in self.feet)]:
+            self.index(body)
+        group = list(range(len(names)))
+        for joint in self.joints:
+            one, other = group[self.index(joint.parent)], group[self.index(joint.child)]
+            if one == other:
+                raise ValueError(f"hinge {joint.name!r} makes a closed loop; only trees can be assembled")
+            group = [one if of == other else of for of in group]
 
     def index(self, body: str) -> int:
         """Place of a body in `bodies`; KeyError names the bodies there are."""
