@@ -1,0 +1,106 @@
+"""The fixedpoint stage: what it stores and says, for slopes with and without a gait."""
+
+import json
+
+import numpy as np
+import pytest
+
+from walkerlab.config.canonical import only
+from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
+from walkerlab.stages import fixedpoint
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+
+# design contract, section 4
+FIXED_KEYS = {
+    "state",
+    "period_s",
+    "step_length_m",
+    "multipliers",
+    "spectral_radius",
+    "stable",
+    "residual",
+    "energy_J",
+    "equations",
+    "slope_rad",
+}
+
+
+def run(**changes):
+    config = Config.model_validate(changes)
+    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].reads), {}, Silent())
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return run()
+
+
+def test_summary_has_the_fixed_keys_and_both_sets_of_equations(paper):
+    assert set(paper.summary) >= FIXED_KEYS
+    assert set(paper.summary["equation_sets"]) == {"corrected", "as-printed"}
+    for name, one in paper.summary["equation_sets"].items():
+        assert set(one) >= FIXED_KEYS
+        assert one["equations"] == name
+    json.dumps(paper.summary, allow_nan=False)
+
+
+def test_main_set_is_the_configs(paper):
+    assert paper.summary["equations"] == "corrected"
+    printed = run(equations="as-printed").summary
+    assert printed["state"] == paper.summary["equation_sets"]["as-printed"]["state"]
+    assert [round(value, 4) for value in printed["state"][:2]] == [-0.2022, 0.1674]
+
+
+def test_residual_and_shapes_of_the_summary(paper):
+    summary = paper.summary
+    assert summary["residual"] <= 1e-11
+    assert len(summary["state"]) == 4
+    assert np.shape(summary["multipliers"]) == (3, 2)
+    assert summary["spectral_radius"] == pytest.approx(np.hypot(*summary["multipliers"][0]))
+    assert summary["stable"] is True
+
+
+@pytest.mark.parametrize("equations", ["corrected", "as-printed"])
+def test_all_gaits_are_stored_with_the_chosen_one_marked(paper, equations):
+    group, summary = paper[f"{equations}/gaits"], paper.summary["equation_sets"][equations]
+    assert group.sizes == {"gait": summary["gaits_found"], "coordinate": 4, "multiplier": 3}
+    chosen = group.attrs["chosen"]
+    assert group["state"][chosen].tolist() == summary["state"]
+    assert group["period_s"][chosen] == summary["period_s"]
+    assert group["stable"][chosen]
+    assert (np.diff(group["period_s"]) > 0.0).all()
+    assert (group["residual"] <= 1e-11).all()
+
+
+def test_the_result_is_the_same_every_time(paper):
+    assert run().digest() == paper.digest()
+
+
+def test_another_seed_finds_the_same_gait(paper):
+    other = run(seed=7)
+    assert other.summary["state"] == pytest.approx(paper.summary["state"], abs=1e-12)
+    assert other.summary["random_hits"] != paper.summary["random_hits"]
+
+
+@pytest.mark.parametrize(
+    ("slope", "said", "advised"),
+    [
+        (0.0, "standing still is no gait", "slope_deg above 0"),
+        (-0.05, "does not descend", "slope_deg above 0"),
+        (0.5, "the ground would have to pull", "gentler slope"),
+        (1.5, "none of 100 random starting values led to a gait", "gentler slope"),
+    ],
+)
+def test_a_slope_without_a_gait_has_no_answer_in_words(slope, said, advised):
+    with pytest.raises(NoAnswer, match="no gait at a slope of") as caught:
+        run(slope_rad=slope)
+    assert said in caught.value.message
+    assert advised in caught.value.advice
+    assert caught.value.partial.summary["equation_sets"]["corrected"]["reason"] in caught.value.message
+
+
+def test_an_impossible_walker_has_no_answer_in_words():
+    with pytest.raises(NoAnswer, match="random starting values"):
+        run(walker={"leg_inertia_kg_m2": 1e9})
