@@ -1,0 +1,146 @@
+"""Make the parts of README and docs that follow from the code anew: results, gaits, stages, config keys.
+
+    python scripts/refresh_docs.py [--check]
+
+Each such part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing
+is written, and the exit code is 1 if a part is not what it would be made to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from walkerlab.config.loader import load
+from walkerlab.config.reference import as_text
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.runner import execute
+from walkerlab.store.runfolder import RunFolder
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
+PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+class Results:
+    """Summaries of stages, run in a folder when they are asked for."""
+
+    def __init__(self, runs: Path) -> None:
+        """Run in, and reuse what is in, the folder of runs."""
+        self.runs = runs
+        self.summary = cache(self._summary)
+
+    def _summary(self, stage: str, *sets: str) -> dict[str, Any]:
+        loaded = load(None, sets)
+        report = execute(loaded.config, stage, RunFolder(self.runs, loaded.run_name))
+        return report.summary
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def number(value: float, digits: int) -> str:
+    """A number with so many decimals, with a true minus sign."""
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
+def stages(_results: Results) -> str:
+    """What the stages are, what they need under the paper config, and what they read."""
+    config = load(None, ()).config
+    rows = [
+        [f"`{stage.name}`", stage.purpose, ", ".join(stage.inputs(config)) or "nothing", ", ".join(stage.reads)]
+        for stage in PIPELINE.stages
+    ]
+    return table(["stage", "purpose", "needs (paper config)", "reads of the config"], rows)
+
+
+def config_keys(_results: Results) -> str:
+    """What `walkerlab schema` prints."""
+    return as_text().rstrip("\n") + "\n"
+
+
+def gaits(results: Results) -> str:
+    """The gaits of the paper's walker: both sets of equations, and the slope of Goswami et al."""
+    paper = results.summary("fixedpoint")["equation_sets"]
+    rows = [
+        gait_row("0.0174 rad, corrected", paper["corrected"]),
+        gait_row("0.0174 rad, as printed", paper["as-printed"]),
+        gait_row("3 degrees, corrected", results.summary("fixedpoint", "slope_deg=3")),
+    ]
+    head = [
+        "slope, equations",
+        "theta_1, theta_2 (rad)",
+        "dtheta_1, dtheta_2 (rad/s)",
+        "T (s)",
+        "step (m)",
+        "multipliers",
+    ]
+    return table(head, rows)
+
+
+def gait_row(name: str, gait: dict[str, Any]) -> list[str]:
+    """A gait in a row of a table."""
+    state = [number(value, 6) for value in gait["state"]]
+    return [
+        name,
+        ", ".join(state[:2]),
+        ", ".join(state[2:]),
+        number(gait["period_s"], 6),
+        number(gait["step_length_m"], 6),
+        multipliers(gait["multipliers"]),
+    ]
+
+
+def multipliers(pairs: Sequence[Sequence[float]]) -> str:
+    """Multipliers, complex pairs as one entry."""
+    real = [number(re_, 4) for re_, im in pairs if im == 0.0]
+    double = [f"{number(re_, 4)} ± {number(im, 4)} i" for re_, im in pairs if im > 0.0]
+    return ", ".join([*double, *real])
+
+
+PARTS: dict[str, Callable[[Results], str]] = {
+    "stages": stages,
+    "config-keys": config_keys,
+    "gaits": gaits,
+}
+
+
+def refreshed(text: str, results: Results) -> str:
+    """A document with its parts made anew; KeyError for a part that there is no maker of."""
+    return PART.sub(lambda found: found[1] + PARTS[found[2]](results) + found[4], text)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Refresh or check all documents; the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is not current")
+    parser.add_argument("--runs", type=Path, help="folder of runs to reuse; default: a temporary one")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as temporary:
+        results = Results(options.runs or Path(temporary))
+        stale = [path for name in DOCUMENTS if not refresh(path := ROOT / name, results, write=not options.check)]
+    for path in stale:
+        print(f"{path.relative_to(ROOT)}: {'not current' if options.check else 'made anew'}")
+    return 1 if stale and options.check else 0
+
+
+def refresh(path: Path, results: Results, write: bool) -> bool:
+    """Whether a document was current; it is afterwards if `write`."""
+    old = path.read_text(encoding="utf-8")
+    new = refreshed(old, results)
+    if write and new != old:
+        path.write_text(new, encoding="utf-8")
+    return new == old
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.kernels import KERNEL_HOMES
+
+PACKAGE = Path(walkerlab.__file__).parent
+# each imports only those after it
+LAYERS = (
+    "cli",
+    "stages",
+    "report",
+    "figures",
+    "store",
+    "scene",
+    "gait",
+    "solvers",
+    "physics",
+    "config",
+    "kernels",
+    "errors",
+)
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+IN_LAYERS = [path for path in SOURCES if path.parent != PACKAGE or path.stem in LAYERS]
+COMPILING = {"kernel", "inlined", "by_type"}
+
+
+def layer_of(path):
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def named(path):
+    return str(path.relative_to(PACKAGE))
+
+
+def imported_modules(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute, so that they can be read"
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def imported_layers(path):
+    modules = (name.split(".") for name in imported_modules(path))
+    return {parts[1] for parts in modules if parts[0] == "walkerlab" and len(parts) > 1 and parts[1] in LAYERS}
+
+
+def test_every_part_of_the_package_has_its_layer():
+    parts = {path.name.removesuffix(".py") for path in PACKAGE.iterdir() if path.suffix == ".py" or path.is_dir()}
+    assert parts - {"__init__", "__main__", "__pycache__"} <= set(LAYERS)
+
+
+@pytest.mark.parametrize("path", IN_LAYERS, ids=named)
+def test_imports_run_downward(path):
+    own = LAYERS.index(layer_of(path))
+    assert {name for name in imported_layers(path) if LAYERS.index(name) < own} == set()
+
+
+@pytest.mark.parametrize("path", IN_LAYERS, ids=named)
+def test_compiled_functions_stand_where_the_cache_key_looks(path):
+    if layer_of(path) in (*KERNEL_HOMES, "kernels"):
+        return
+    names = set(imported_modules(path))
+    assert "numba" not in names
+    assert not names & {f"walkerlab.kernels.{name}" for name in COMPILING}
