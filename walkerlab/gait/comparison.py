@@ -1,0 +1,212 @@
+"""How far two walks differ: at the same time, at the same phase of each step, and as orbits in the phase plane.
+
+A clock that runs one percent fast makes the difference at the same time grow without bound, however alike the gaits
+are. At the same phase, every step's own time scaled to [0, 1], only the difference of the motions is left. The distance
+of the orbits does not know of time at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+Array = NDArray[np.float64]
+
+LEGS = 2
+JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a heel strike
+PHASES = 401  # samples of a step
+IMPACT_PHASE = 0.02  # of a step: by then a compliant impact is over
+FINENESS = 5e-3  # of an orbit's range: how finely orbits are drawn to measure between them
+AT_ONCE = 256  # points of an orbit that are measured at once
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The legs of a walk in time, SI units.
+
+    time       (samples,) strictly rising
+    angle      (samples, leg)
+    velocity   (samples, leg)
+    step_ends  (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
+    """
+
+    time: Array
+    angle: Array
+    velocity: Array
+    step_ends: Array
+
+    @property
+    def steps(self) -> int:
+        """Completed steps."""
+        return int(self.step_ends.size)
+
+    @cached_property
+    def _first_samples(self) -> NDArray[np.int64]:
+        """Where the smooth pieces begin: at the start, and behind every jump of the velocities."""
+        close = np.diff(self.time) < JUMP * (self.time[-1] - self.time[0])
+        return np.concatenate(([0], np.flatnonzero(close) + 1))
+
+    @cached_property
+    def _pieces(self) -> list[tuple[CubicHermiteSpline, PchipInterpolator]]:
+        """Angles through both angles and velocities; velocities without the overshoot that an impact would cause."""
+        ends = (*self._first_samples[1:], self.time.size)
+        pieces = []
+        for first, end in zip(self._first_samples, ends, strict=True):
+            span = slice(first, end) if end - first > 1 else slice(max(first - 1, 0), first + 1)
+            time, velocity = self.time[span], self.velocity[span]
+            pieces.append((CubicHermiteSpline(time, self.angle[span], velocity), PchipInterpolator(time, velocity)))
+        return pieces
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Angles and velocities (times, leg); at a heel strike, those after it."""
+        angle, velocity = np.empty((times.size, LEGS)), np.empty((times.size, LEGS))
+        piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
+        for index in np.unique(piece_of):
+            here = piece_of == index
+            of_angle, of_velocity = self._pieces[index]
+            angle[here], velocity[here] = of_angle(times[here]), of_velocity(times[here])
+        return angle, velocity
+
+    def last_before(self, end: float) -> float:
+        """The last instant before a jump at `end`; `end` itself where nothing jumps."""
+        index = int(np.searchsorted(self.time, end))
+        if index < self.time.size and self.time[index] == end and index in self._first_samples[1:]:
+            return float(self.time[index - 1])
+        return end
+
+    def during(self, step: int, phases: Array) -> tuple[Array, Array]:
+        """Angles and velocities at phases of a step: 0 just after the impact that began it, 1 just before the next."""
+        start = self.time[0] if step == 0 else self.step_ends[step - 1]
+        end = self.step_ends[step]
+        return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
+
+    def last_stride(self) -> Motion:
+        """The last two completed steps, with both impacts; ValueError if there are not two."""
+        if self.steps < 2:
+            raise ValueError("no stride was completed")
+        start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
+        end = self.last_before(self.step_ends[-1])
+        inside = self.time[(self.time > start) & (self.time < end)]
+        time = np.concatenate(([start], inside, [end]))
+        angle, velocity = self.at(time)
+        return Motion(time, angle, velocity, self.step_ends[-2:])
+
+
+def sampled_at_step_ends(motion: Motion) -> Motion:
+    """The motion with a sample at the end of every step, continued from the three samples before where there is none.
+
+    A compliant impact takes less than the time between samples: interpolating across a touch would smear it into the
+    step before.
+    """
+    missing = [end for end in motion.step_ends if end not in motion.time and np.searchsorted(motion.time, end) >= 3]
+    if not missing:
+        return motion
+    rows = [continued(motion, end) for end in missing]
+    time = np.concatenate((motion.time, missing))
+    order = np.argsort(time)
+    angle = np.concatenate((motion.angle, [row[0] for row in rows]))
+    velocity = np.concatenate((motion.velocity, [row[1] for row in rows]))
+    return Motion(time[order], angle[order], velocity[order], motion.step_ends)
+
+
+def continued(motion: Motion, end: float) -> tuple[Array, Array]:
+    """Angles and velocities (leg,) at `end`, by the parabola through the last three samples before it."""
+    last = int(np.searchsorted(motion.time, end))
+    known = motion.time[last - 3 : last]
+    weights = [np.prod([(end - other) / (one - other) for other in known if other != one]) for one in known]
+    return np.asarray(weights @ motion.angle[last - 3 : last]), np.asarray(weights @ motion.velocity[last - 3 : last])
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """One walk less another, along time, or along steps and phases; the last axis is the leg."""
+
+    angle: Array
+    velocity: Array
+
+    @property
+    def largest_angle(self) -> Array:
+        """(leg,) largest difference of each angle (rad)."""
+        return np.asarray(np.abs(self.angle).reshape(-1, LEGS).max(axis=0))
+
+    @property
+    def largest_velocity(self) -> Array:
+        """(leg,) largest difference of each velocity (rad/s)."""
+        return np.asarray(np.abs(self.velocity).reshape(-1, LEGS).max(axis=0))
+
+
+def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, Difference]:
+    """`walk` less `reference` at the same times: at every sample of either while both walk.
+
+    Returns the times (s) and the difference.
+    """
+    time = np.union1d(walk.time, reference.time)
+    time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
+    angle, velocity = walk.at(time)
+    reference_angle, reference_velocity = reference.at(time)
+    return time, Difference(angle - reference_angle, velocity - reference_velocity)
+
+
+def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> Difference:
+    """`walk` less `reference` at the same phases (phases,) of the steps that both completed: (step, phase, leg).
+
+    Raises ValueError if one of them completed none.
+    """
+    steps = min(walk.steps, reference.steps)
+    if steps == 0:
+        raise ValueError("no step was completed by both")
+    pairs = [(walk.during(step, phases), reference.during(step, phases)) for step in range(steps)]
+    angle = np.stack([ours[0] - theirs[0] for ours, theirs in pairs])
+    velocity = np.stack([ours[1] - theirs[1] for ours, theirs in pairs])
+    return Difference(angle, velocity)
+
+
+def orbit_distances(walk: Motion, reference: Motion) -> Array:
+    """(leg,) how far the orbits of the last stride lie apart in the plane of angle and angular velocity.
+
+    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is measured
+    in the reference orbit's range along it, so that 0.01 is one percent of the orbit's size.
+
+    Raises ValueError if one of them completed no stride.
+    """
+    stride, reference_stride = walk.last_stride(), reference.last_stride()
+    distances = np.empty(LEGS)
+    for leg in range(LEGS):
+        orbit, other = phase_plane(stride, leg), phase_plane(reference_stride, leg)
+        scale = np.ptp(other, axis=0)
+        distances[leg] = hausdorff(orbit / scale, other / scale)
+    return distances
+
+
+def phase_plane(motion: Motion, leg: int) -> Array:
+    """(samples, 2) angle and velocity of a leg."""
+    return np.column_stack((motion.angle[:, leg], motion.velocity[:, leg]))
+
+
+def hausdorff(curve: Array, other: Array) -> float:
+    """Largest distance of a point of either polyline (points, 2) from the other."""
+    return max(farthest(refined(curve), other), farthest(refined(other), curve))
+
+
+def refined(curve: Array) -> Array:
+    """The polyline with points put in, so that none is further than FINENESS from the next."""
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
+    points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / FINENESS) + 2))
+    return np.column_stack([np.interp(points, along, axis) for axis in curve.T])
+
+
+def farthest(points: Array, polyline: Array) -> float:
+    """Largest distance of one of the points (n, 2) from the polyline (m, 2)."""
+    start, edge = polyline[:-1], np.diff(polyline, axis=0)
+    length_squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
+    largest = 0.0
+    for first in range(0, len(points), AT_ONCE):
+        away = points[first : first + AT_ONCE, None, :] - start
+        fraction = np.clip((away * edge).sum(axis=2) / length_squared, 0.0, 1.0)
+        squared = ((away - fraction[:, :, None] * edge) ** 2).sum(axis=2)
+        largest = max(largest, float(np.sqrt(squared.min(axis=1).max())))
+    return largest

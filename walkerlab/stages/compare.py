@@ -1,0 +1,195 @@
+"""Both models compared with each other and with every number that the paper prints."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.schema import Config, Equations
+from walkerlab.gait.comparison import Motion, sampled_at_step_ends
+from walkerlab.gait.paper.errata import errata
+from walkerlab.gait.paper.measured import (
+    ContactModel,
+    EnergyRecord,
+    Measured,
+    RigidModel,
+    characteristics,
+    over_last_steps,
+    rigid_model,
+)
+from walkerlab.gait.paper.result_rows import result_rows
+from walkerlab.gait.paper.start_rows import start_rows
+from walkerlab.gait.paper.study import study_the_paper
+from walkerlab.gait.paper.tables import table_1, table_2, table_3
+from walkerlab.gait.paper.verdict import Row, Verdict
+from walkerlab.gait.recorded_walk import as_state
+from walkerlab.physics.system import State
+from walkerlab.scene.departures import departures
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.compared_motion import Comparison, compare_motion
+from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content
+
+STEPS_OF_A_STRIDE = 2
+MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
+EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
+
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Compare the walks of both models, and hold both against the paper."""
+    progress.start("compare", 3)
+    study = study_the_paper()
+    progress.advance()
+    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
+    progress.advance()
+    measured = measure(config, inputs, motion)
+    rows = (*start_rows(measured, study), *result_rows(measured, study))
+    progress.advance()
+    found = errata(study)
+    tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
+    groups = {name: table_group(table) for name, table in tables.items()}
+    return Content(
+        {"paper_numbers": numbers_group(rows), "errata": errata_group(found), **groups, **motion.groups},
+        {
+            "paper_numbers": [row_summary(row) for row in rows],
+            "verdicts": verdicts(rows),
+            **tables,
+            **motion.summary,
+            "errata": [vars(erratum) for erratum in found],
+            "departures": list(measured.departures.contact),
+            "left_out": left_out(inputs, measured, motion),
+        },
+    )
+
+
+def row_summary(row: Row) -> dict[str, Any]:
+    """A row of `paper_numbers` as the command prints it."""
+    return {
+        "where": row.printed.where,
+        "quantity": row.printed.quantity,
+        "unit": row.printed.unit,
+        "printed": row.printed.text,
+        "as_printed": row.as_printed,
+        "corrected": row.corrected,
+        "contact": row.contact,
+        "verdict": row.verdict.value,
+        "evidence": row.evidence,
+    }
+
+
+def verdicts(rows: tuple[Row, ...]) -> dict[str, int]:
+    """How many numbers fared how."""
+    count = Counter(row.verdict for row in rows)
+    return {verdict.value: count[verdict] for verdict in Verdict}
+
+
+def motion_of(walk: Content) -> Motion | None:
+    """The legs of a stored walk in time; None if states were not stored."""
+    trajectory = walk.groups.get("trajectory")
+    if trajectory is None or "angle" not in trajectory.variables:
+        return None
+    motion = Motion(trajectory["time"], trajectory["angle"], trajectory["velocity"], step_ends(walk))
+    return sampled_at_step_ends(motion)
+
+
+def step_ends(walk: Content) -> Any:
+    """Times (s) of the heel strikes or touches of a stored walk."""
+    steps = walk.groups.get("steps")
+    if steps is None:
+        return np.zeros(0)
+    return steps["heel_strike_time_s" if "heel_strike_time_s" in steps.variables else "touch_time_s"]
+
+
+def measure(config: Config, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
+    """Everything that the paper's numbers are held against."""
+    sets = inputs["fixedpoint"].summary["equation_sets"]
+    found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
+    models: dict[str, RigidModel] = {name: walk_gait(config, name, gait) for name, gait in found.items()}
+    contact = contact_model(config, inputs["contact-sim"])
+    return Measured(
+        walker=rigid_walker(config, config.equations),
+        equations=config.equations,
+        models=dict(models),
+        spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
+        contact=contact,
+        errors=motion.errors,
+        departures=departures(config, start_moved(models.get(config.equations), contact.start)),
+    )
+
+
+def walk_gait(config: Config, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
+    """The rigid model walked from a stored fixed point."""
+    return rigid_model(rigid_walker(config, equations), as_state(gait["state"]))
+
+
+def start_moved(model: RigidModel | None, start: State | None) -> bool:
+    """Whether a walk is known to have started elsewhere than at the gait's fixed point."""
+    if start is None:
+        return False
+    return model is None or max(abs(x - y) for x, y in zip(start, model.state, strict=True)) > MOVED
+
+
+def contact_model(config: Config, walk: Content) -> ContactModel:
+    """What is held against the paper's ADAMS model."""
+    contact = config.contact
+    if contact is None:
+        raise ValueError("compare needs a contact block")
+    summary = walk.summary
+    periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
+    stride = STEPS_OF_A_STRIDE * (lengths.size // STEPS_OF_A_STRIDE)
+    energy = energy_of(walk)
+    return ContactModel(
+        outcome=str(summary["outcome"]),
+        steps=int(summary["steps"]),
+        start=start_of(walk),
+        table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
+        step_length=float(lengths[stride - STEPS_OF_A_STRIDE : stride].mean()) if stride else None,
+        energy_least=None if energy is None else energy.least,
+        energy_most=None if energy is None else energy.most,
+        stiffness=contact.stiffness,
+        damping=contact.damping,
+        units=contact.units,
+        static_friction=contact.static_friction,
+        dynamic_friction=contact.dynamic_friction,
+        static_penetration=float(summary["static_penetration_m"]),
+        damping_ratio=float(summary["damping_ratio"]),
+        foot_radius=config.walker.foot_radius_m,
+    )
+
+
+def energy_of(walk: Content) -> EnergyRecord | None:
+    """The energy of a stored walk over its last five steps; None if there is none."""
+    trajectory = walk.groups.get("trajectory")
+    if trajectory is None or "mechanical_J" not in trajectory.variables:
+        return None
+    return over_last_steps(trajectory["time"], trajectory["mechanical_J"], step_ends(walk))
+
+
+def start_of(walk: Content) -> State | None:
+    """The rigid state that a stored walk starts from: leg 0 swings first."""
+    trajectory = walk.groups.get("trajectory")
+    if trajectory is None or "angle" not in trajectory.variables:
+        return None
+    return as_state([*trajectory["angle"][0], *trajectory["velocity"][0]])
+
+
+def left_out(inputs: Mapping[str, Content], measured: Measured, motion: Comparison) -> list[dict[str, str]]:
+    """What could not be compared, and why."""
+    sets = inputs["fixedpoint"].summary["equation_sets"]
+    missing = [
+        {"what": f"columns of the {name} equations", "why": str(sets.get(name, {}).get("reason", "no gait was found"))}
+        for name in EQUATION_SETS
+        if name not in measured.models
+    ]
+    contact = measured.contact
+    if contact.table_3.t_cycle is None:
+        why = f"the walk completed {contact.steps} steps ({contact.outcome})"
+        missing.append({"what": "a stride of the contact model in Table 3", "why": why})
+    if contact.table_3.E_avg is None:
+        why = "no step was completed" if contact.steps == 0 else "outputs does not ask for energies"
+        missing.append({"what": "energy of the contact model", "why": why})
+    return [*missing, *motion.left_out]

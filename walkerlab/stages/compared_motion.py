@@ -1,0 +1,144 @@
+"""The walks of both models against each other, as `compare` stores and prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from walkerlab.gait.comparison import (
+    IMPACT_PHASE,
+    LEGS,
+    PHASES,
+    Array,
+    Difference,
+    Motion,
+    difference_in_phase,
+    difference_in_time,
+    orbit_distances,
+)
+from walkerlab.gait.paper.measured import Errors, LegErrors
+from walkerlab.store.content import Group, Variable
+
+LEG, TIME, STEP, PHASE = "leg", "time", "step", "phase"
+LAST_STRIDE = 2  # steps
+SENSE = "contact less rigid model"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What came out.
+
+    groups    of the artifact
+    left_out  what could not be compared, and why
+    """
+
+    errors: Errors = field(default_factory=Errors)
+    groups: dict[str, Group] = field(default_factory=dict)
+    left_out: tuple[dict[str, str], ...] = ()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What the command prints."""
+        orbit = self.errors.orbit
+        return {
+            "max_angle_error_rad": largest(self.errors, lambda errors: errors.angle),
+            "max_velocity_error_rad_s": largest(self.errors, lambda errors: errors.velocity),
+            "orbit_distance": None if orbit is None else max(orbit),
+            "orbit_distance_per_leg": None if orbit is None else list(orbit),
+        }
+
+
+def largest(errors: Errors, of: Callable[[LegErrors], tuple[float, ...]]) -> dict[str, Any]:
+    """The larger leg's error and both legs' errors in every way they are compared; None where they are not."""
+    ways = {
+        "raw": errors.raw,
+        "aligned": errors.aligned,
+        "between_impacts": errors.between_impacts,
+        "settled": errors.settled,
+    }
+    over_legs = {way: None if found is None else max(of(found)) for way, found in ways.items()}
+    return over_legs | {"per_leg": {way: None if found is None else list(of(found)) for way, found in ways.items()}}
+
+
+def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
+    """The contact model's walk less the rigid one's, in time, in phase, and as orbits."""
+    if rigid is None or contact is None:
+        why = "the walks' states were not stored (outputs does not ask for states)"
+        return Comparison(left_out=({"what": "differences of the walks", "why": why},))
+    time, raw = difference_in_time(contact, rigid)
+    groups = {"errors": in_time(time, raw)}
+    errors = Errors(raw=of_legs(raw))
+    if min(rigid.steps, contact.steps) == 0:
+        return Comparison(errors, groups, (without("differences in phase, and of the orbits", "step"),))
+    phases = np.linspace(0.0, 1.0, PHASES)
+    aligned = difference_in_phase(contact, rigid, phases)
+    between = part(aligned, slice(None), phases >= IMPACT_PHASE)
+    groups["aligned"] = in_phase(phases, aligned)
+    errors = Errors(errors.raw, of_legs(aligned), of_legs(between))
+    if min(rigid.steps, contact.steps) < LAST_STRIDE:
+        return Comparison(errors, groups, (without("difference of the last stride, and of the orbits", "stride"),))
+    orbit = orbit_distances(contact, rigid)
+    groups["orbit"] = orbit_group(orbit)
+    settled = part(between, slice(-LAST_STRIDE, None), slice(None))
+    return Comparison(
+        Errors(errors.raw, errors.aligned, errors.between_impacts, of_legs(settled), tuple(orbit.tolist())), groups
+    )
+
+
+def without(what: str, needed: str) -> dict[str, str]:
+    """What could not be compared because neither or only one model went so far."""
+    return {"what": what, "why": f"no {needed} was completed by both models"}
+
+
+def part(difference: Difference, steps: Any, phases: Any) -> Difference:
+    """Some steps and phases of a difference in phase."""
+    return Difference(difference.angle[steps][:, phases], difference.velocity[steps][:, phases])
+
+
+def of_legs(difference: Difference) -> LegErrors:
+    """The largest differences."""
+    return LegErrors(tuple(difference.largest_angle.tolist()), tuple(difference.largest_velocity.tolist()))
+
+
+def legs() -> Variable:
+    """The legs' coordinate."""
+    return Variable(np.arange(LEGS), (LEG,), "1", "leg: 0 swings first, 1 stands first")
+
+
+def in_time(time: Array, raw: Difference) -> Group:
+    """Differences at the same time."""
+    dims = (TIME, LEG)
+    return Group(
+        {
+            TIME: Variable(time, (TIME,), "s", "time"),
+            LEG: legs(),
+            "raw_angle_error_rad": Variable(raw.angle, dims, "rad", f"angle, {SENSE}, at the same time"),
+            "raw_velocity_error_rad_s": Variable(raw.velocity, dims, "rad/s", f"velocity, {SENSE}, at the same time"),
+        }
+    )
+
+
+def in_phase(phases: Array, aligned: Difference) -> Group:
+    """Differences at the same phase of each step."""
+    dims = (STEP, PHASE, LEG)
+    return Group(
+        {
+            STEP: Variable(np.arange(len(aligned.angle)), (STEP,), "1", "step number"),
+            PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
+            LEG: legs(),
+            "aligned_angle_error_rad": Variable(aligned.angle, dims, "rad", f"angle, {SENSE}, at the same phase"),
+            "aligned_velocity_error_rad_s": Variable(
+                aligned.velocity, dims, "rad/s", f"velocity, {SENSE}, at the same phase"
+            ),
+        },
+        {"impact_phase": IMPACT_PHASE},
+    )
+
+
+def orbit_group(orbit: Array) -> Group:
+    """Distances of the orbits."""
+    text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's ranges"
+    return Group({LEG: legs(), "orbit_distance": Variable(orbit, (LEG,), "1", text)})

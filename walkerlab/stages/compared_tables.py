@@ -1,0 +1,103 @@
+"""The paper's numbers, tables and errata as groups of an artifact.
+
+Where a model has no value there is none: a column of numbers has a dimension of its own, whose coordinate says which
+rows the numbers stand in. Beside it a column of texts has all the rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from walkerlab.gait.paper.errata import Erratum
+from walkerlab.gait.paper.verdict import Row
+from walkerlab.store.content import Group, Variable
+
+ROW = "row"
+MODELS = {
+    "as_printed": "rigid model, equations as printed",
+    "corrected": "rigid model, corrected equations",
+    "contact": "contact model",
+}
+MEANINGS = {
+    **MODELS,
+    "quantity": "what it is",
+    "unit": "unit of the row's numbers",
+    "where": "where the paper has it",
+    "paper": "as the paper has it",
+    "used": "as used here",
+    "paper_matlab": "the paper's MATLAB model",
+    "paper_adams": "the paper's MSC ADAMS model",
+    "paper_percent": "difference rate as printed",
+    "percent_of_matlab": "difference in percent of the MATLAB value",
+    "percent_of_adams": "difference in percent of the ADAMS value",
+}
+"""Columns of the tables."""
+BY_ROW = "see the column of units"
+
+
+def texts(values: Iterable[str], long_name: str) -> Variable:
+    """A column of texts."""
+    return Variable(np.array(list(values), dtype=object), (ROW,), "", long_name)
+
+
+def numbers(name: str, values: Sequence[float | None], long_name: str) -> dict[str, Variable]:
+    """A column of numbers with gaps, and its texts."""
+    rows = [row for row, value in enumerate(values) if value is not None]
+    as_text = ["" if value is None else f"{value:.10g}" for value in values]
+    column = {f"{name}_text": texts(as_text, f"{long_name}, as text")}
+    if rows:
+        dim = f"{name}_{ROW}"
+        given = np.array([value for value in values if value is not None], dtype=float)
+        column[dim] = Variable(np.array(rows), (dim,), "1", f"rows with a number: {long_name}")
+        column[name] = Variable(given, (dim,), BY_ROW, long_name)
+    return column
+
+
+def row_numbers(count: int) -> Variable:
+    """The rows' coordinate."""
+    return Variable(np.arange(count), (ROW,), "1", "row")
+
+
+def numbers_group(rows: Sequence[Row]) -> Group:
+    """Every number of the paper."""
+    variables = {
+        ROW: row_numbers(len(rows)),
+        "where": texts((row.printed.where for row in rows), "where the paper has it"),
+        "quantity": texts((row.printed.quantity for row in rows), "what it is"),
+        "unit": texts((row.printed.unit for row in rows), "unit of the row's numbers"),
+        "printed": texts((row.printed.text for row in rows), "as printed"),
+        "verdict": texts((row.verdict.value for row in rows), "reproduced, explained or refuted"),
+        "evidence": texts((row.evidence for row in rows), "why"),
+    }
+    for name, long_name in MODELS.items():
+        variables |= numbers(name, [getattr(row, name) for row in rows], long_name)
+    return Group(variables)
+
+
+def errata_group(found: Sequence[Erratum]) -> Group:
+    """The errata."""
+    columns = {
+        "where": "where the paper errs",
+        "printed": "as printed",
+        "right": "as it should be",
+        "evidence": "by which argument",
+        "measured": "numbers of that argument, from this run",
+    }
+    variables = {name: texts((getattr(erratum, name) for erratum in found), text) for name, text in columns.items()}
+    return Group({ROW: row_numbers(len(found)), **variables})
+
+
+def table_group(table: Mapping[str, Mapping[str, Any]]) -> Group:
+    """One of the paper's tables."""
+    rows = list(table.values())
+    variables = {ROW: row_numbers(len(rows)), "name": texts(table, "symbol of the row")}
+    for name in rows[0]:
+        values = [row[name] for row in rows]
+        if all(isinstance(value, str) for value in values):
+            variables[name] = texts(values, MEANINGS[name])
+        else:
+            variables |= numbers(name, values, MEANINGS[name])
+    return Group(variables)
