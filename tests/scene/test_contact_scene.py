@@ -1,0 +1,91 @@
+"""What a config with a contact block becomes, and where its walker starts."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from walkerlab.config.loader import load
+from walkerlab.gait.contact_signals import feet_motion, hip_height
+from walkerlab.physics.contact.friction import Coulomb, Frictionless
+from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
+from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
+
+STEP = 0.3714
+
+
+@functools.cache
+def scene_of(*sets):
+    return contact_scene(load(None, sets).config, STEP)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.001, 0.1])
+@given(theta_2=st.floats(0.05, 0.4), w_1=st.floats(-3.0, 3.0), w_2=st.floats(-3.0, 3.0))
+def test_the_walk_starts_with_the_stance_foot_just_touching_and_rolling(radius, theta_2, w_1, w_2):
+    scene = scene_of(f"walker.foot_radius_m={radius}")
+    rigid = (-2 * 0.0174 - theta_2, theta_2, w_1, w_2)
+    start = start_state(scene, rigid)
+    swing, stance = feet_motion(scene.walker, start)
+    np.testing.assert_allclose((stance.along, stance.height), 0.0, atol=1e-14)
+    np.testing.assert_allclose((stance.slip, stance.climb), 0.0, atol=1e-13)
+    assert (start[2:4], start[6:]) == (rigid[:2], rigid[2:])
+    # legs of one length with their balls on the slope: symmetric to its normal, so the other ball touches too
+    assert swing.height == pytest.approx(0.0, abs=1e-14)
+    apart = 2 * (1.0 - radius) * math.sin(theta_2 + 0.0174)
+    assert stance.along - swing.along == pytest.approx(apart, abs=1e-13)
+    assert hip_height(scene.walker, scene.frame, start) == pytest.approx(
+        radius + (1.0 - radius) * math.cos(theta_2 + 0.0174), abs=1e-13
+    )
+
+
+def test_a_point_foot_starts_as_the_hinged_one():
+    """Without a radius rolling and turning about the hinge are one."""
+    rigid = (-0.2042, 0.1694, -0.6, -0.86)
+    free, hinged = (
+        start_state(scene_of("walker.foot_radius_m=0", f"contact.stance={stance}"), rigid)
+        for stance in ("free", "pinned")
+    )
+    assert free == hinged
+
+
+def test_the_paper_reads_its_contact_in_adams_units():
+    walker = scene_of().walker
+    assert walker.normal == pytest.approx((1e5 * 1000**2.2, 2.2, 90e3, 1e-4))
+    assert walker.friction == pytest.approx((0.9, 0.7, 0.1, 1.0))
+    assert isinstance(walker.friction, Coulomb)
+
+
+def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foot():
+    """0.059 mm and over-damped, against the same two numbers worked out in N and mm."""
+    scene = scene_of()
+    depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
+    assert static_penetration(scene) == pytest.approx(depth_mm / 1000.0)
+    assert depth_mm == pytest.approx(0.059, abs=5e-4)
+    stiffness_N_per_m = 2.2 * 1e5 * depth_mm**1.2 * 1000.0
+    assert damping_ratio(scene) == pytest.approx(90e3 / (2 * math.sqrt(stiffness_N_per_m * 20.0)))
+    assert damping_ratio(scene) > 1.0
+
+
+def test_a_scene_without_friction_has_another_law_not_a_zero():
+    scene = scene_of("contact.friction=none")
+    assert isinstance(scene.walker.friction, Frictionless)
+    assert any("friction" in row["why"] for row in scene.left_out)
+
+
+def test_pads_are_laid_by_the_step_that_the_config_asks_for():
+    config = load(None, ()).config
+    assert contact_scene(config, STEP).terrain == Checkerboard(STEP, (-STEP, 0.0))
+    assert scene_of("contact.pad_pitch=0.36").pitch_m == 0.36
+    own = load(None, ("contact.pad_pitch=own",)).config
+    assert contact_scene(own, STEP, 0.3608).pitch_m == 0.3608
+    with pytest.raises(ValueError, match="own"):
+        contact_scene(own, STEP)
+    assert scene_of("contact.terrain=after-mid-swing").terrain == AfterMidSwing(STEP)
+
+
+def test_a_hinged_first_step_is_a_system_of_two_angles():
+    assert scene_of().pinned is None
+    assert len(scene_of("contact.stance=pinned").pinned.blank) == 4
