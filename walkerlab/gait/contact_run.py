@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from walkerlab.gait.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
 from walkerlab.gait.contact_signals import HEIGHT, PER_FOOT, SIGNALS, Frame, feet_motion
+from walkerlab.gait.contact_tangent import new_tangent
 from walkerlab.gait.contact_walk import (
     AIRBORNE_SINCE,
     STEPS,
@@ -32,6 +33,7 @@ from walkerlab.solvers.vectors import load
 Floats = NDArray[np.float64]
 
 
+NEVER = -1
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 
 
@@ -71,23 +73,27 @@ def walk_free(
     ground: Ground,
     method: Any,
     finder: CrossingFinder,
-    observer: Any,
+    observer: ContactObserver,
     ledger: Ledger,
     t: float,
     y: State,
+    stop_passing_after: int,
 ) -> int:
-    """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends."""
+    """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends.
+
+    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
+    """
     system = OnGround(walker, (True, True))
-    return walk_part(system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y)
+    return walk_part(system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after)
 
 
 @kernel
 def walk_hinged(
-    pinned: Pinned, ground: Ground, method: Any, finder: CrossingFinder, observer: Any, ledger: Ledger, y: State
+    pinned: Pinned, ground: Ground, method: Any, finder: CrossingFinder, observer: ContactObserver, ledger: Ledger, y: State
 ) -> int:
     """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
     return walk_part(
-        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, ledger, 0.0, y
+        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, ledger, 0.0, y, NEVER
     )
 
 
@@ -169,11 +175,25 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
     return Ledger(*record, carried, cells, cells.copy(), foothold, at_zero, np.zeros(2), np.array([stance, 0]))
 
 
-def new_observer(walker: ContactWalker, ledger: Ledger, y: State, interval_s: float, samples: int) -> ContactObserver:
-    """An observer with room for `samples` samples, with the books opened at state y."""
+def new_observer(
+    walker: ContactWalker,
+    ledger: Ledger,
+    y: State,
+    interval_s: float = 1.0,
+    samples: int = 0,
+    booked: bool = False,
+    directions: int = 0,
+) -> ContactObserver:
+    """An observer of a walk from state y.
+
+    interval_s, samples  time between samples, and how many there is room for
+    booked               whether to keep the energy's books
+    directions           how many directions of the start to carry along as the tangent
+    """
     extremes = np.zeros(3)
     extremes[START_ENERGY] = book_energy(walker, (bool(ledger.carried[0]), bool(ledger.carried[1])), y)
     return ContactObserver(
+        booked,
         interval_s * np.arange(samples),
         np.zeros((samples, len(walker.blank))),
         np.zeros((samples, 2), np.int8),
@@ -182,6 +202,7 @@ def new_observer(walker: ContactWalker, ledger: Ledger, y: State, interval_s: fl
         np.zeros(1, np.int64),
         np.zeros(BOOKS),
         extremes,
+        new_tangent(len(walker.blank), directions),
     )
 
 
@@ -209,7 +230,7 @@ def walk_contact(
     room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
     while True:
         ledger = new_ledger(walker, ground.terrain, stance, steps, start)
-        observer = new_observer(walker, ledger, start, interval_s or 1.0, room)
+        observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked=True)
         outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
         if room == 0 or observer.recorded[0] < room:
             return gather(outcome, stopped, ledger, observer, walker)
@@ -239,7 +260,7 @@ def run_parts(
             return outcome, Stopped(t, y, spent)
     method = methods.new(len(walker.blank))
     ledger.times[AIRBORNE_SINCE] = t
-    outcome = Outcome(walk_free(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y))
+    outcome = Outcome(walk_free(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
 
 

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from walkerlab.kernels import by_type, inlined
 from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.motion import OnGround
+from walkerlab.physics.contact.normal_force import grip
 from walkerlab.physics.contact.pinned import Pinned, floating_state
-from walkerlab.physics.contact.terrain import cell_edges, order_matters
+from walkerlab.physics.contact.terrain import cell_edges
 from walkerlab.physics.contact.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.physics.multibody.tree import sines_cosines
 from walkerlab.physics.system import State
@@ -19,8 +20,9 @@ from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first
 from walkerlab.solvers.stepping import interpolate
 
 # signals of each foot
-HEIGHT, LEFT_EDGE, RIGHT_EDGE, FULL_DAMPING, STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(8)
-PER_FOOT = 8
+HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
+STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
+PER_FOOT = 9
 # signals of the walker
 PASSING, FALL = 2 * PER_FOOT, 2 * PER_FOOT + 1
 SIGNALS = 2 * PER_FOOT + 2
@@ -112,6 +114,7 @@ def sample_foot(
     values[first + HEIGHT, j] = motion.height
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
+    values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
     values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
     sample_slip(walker.friction, motion.slip, first, j, finder)
 
@@ -155,9 +158,20 @@ def frictionless_joins(law: Frictionless) -> int:
 
 @inlined
 def earliest_event(
-    system: Any, walker: ContactWalker, terrain: Any, frame: Frame, carried: Any, at_zero: Any, finder: CrossingFinder
+    system: Any,
+    walker: ContactWalker,
+    frame: Frame,
+    watch_order: bool,
+    carried: Any,
+    at_zero: Any,
+    finder: CrossingFinder,
 ) -> tuple[float, int]:
-    """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none."""
+    """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none.
+
+    watch_order  whether it matters that the feet pass each other
+    carried      (2,) whether there is ground under each foot
+    at_zero      (signals,) which signals the last event left at zero
+    """
     best, signal = NO_CROSSING, -1
     for foot in range(2):
         first = foot * PER_FOOT
@@ -165,13 +179,13 @@ def earliest_event(
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
         inside = feels_ground(system, carried[foot] != 0, lowest)
-        last = joins(walker.friction) if inside and frame.locate_joins else FULL_DAMPING
+        last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
         for index in range(first, first + last):
             edge = index == first + LEFT_EDGE or index == first + RIGHT_EDGE
             at = first_crossing(finder, index, FALLING if edge else 0, 0.0, at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
-    if order_matters(terrain):
+    if watch_order:
         at = first_crossing(finder, PASSING, 0, 0.0, at_zero[PASSING] != 0)
         if at < best:
             best, signal = at, PASSING
@@ -184,4 +198,4 @@ def earliest_event(
 @inlined
 def is_join(signal: int) -> bool:
     """Whether an event is a mere join of the force law."""
-    return signal < 2 * PER_FOOT and signal % PER_FOOT >= FULL_DAMPING
+    return signal < 2 * PER_FOOT and signal % PER_FOOT >= RELEASE

@@ -5,7 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any, NamedTuple
 
-from walkerlab.gait.contact_observer import observe_contact, observe_edge
+from walkerlab.gait.contact_observer import ContactObserver, observe, observe_edge
 from walkerlab.gait.contact_signals import (
     FALL,
     HEIGHT,
@@ -100,18 +100,18 @@ def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
 
 
 @by_type
-def ends_at_touch(system: Any) -> bool:
-    """Whether the first step ends this part of the walk: the hinge is released."""
+def is_hinged(system: Any) -> bool:
+    """Whether a hinge carries the walker, until its first step releases it."""
 
 
-@ends_at_touch.case(OnGround)
-def free_goes_on(system: OnGround) -> bool:
+@is_hinged.case(OnGround)
+def free_is_not(system: OnGround) -> bool:
     """No."""
     return False
 
 
-@ends_at_touch.case(Pinned)
-def hinge_released(system: Pinned) -> bool:
+@is_hinged.case(Pinned)
+def pinned_is(system: Pinned) -> bool:
     """Yes."""
     return True
 
@@ -124,12 +124,15 @@ def walk_part(
     frame: Frame,
     method: Any,
     finder: CrossingFinder,
-    observer: Any,
+    observer: ContactObserver,
     ledger: Ledger,
     t: float,
     y: State,
+    stop_passing_after: int,
 ) -> int:
     """Walk from state y at time t (s) until the ledger is full, the hinge is released, or the walk ends.
+
+    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
 
     Returns the outcome's number; the method stands at the end.
     """
@@ -137,6 +140,7 @@ def walk_part(
     begin(method, mode, t, y, method.clock[H_NEXT])
     arriving, refinements, signal = False, 0, -1
     target = deadline(frame, ledger)
+    watch_order = order_matters(terrain) or stop_passing_after >= 0
     while ledger.feet[STEPS] < ledger.touch_time.size:
         status = advance(method, mode, target)
         if status != STEP_DONE:
@@ -146,33 +150,39 @@ def walk_part(
         if arriving and method.clock[T] < target:
             arriving = False
         if not arriving:
-            fraction, signal = earliest_event(mode, walker, terrain, frame, ledger.carried, ledger.at_zero, finder)
+            fraction, signal = earliest_event(
+                mode, walker, frame, watch_order, ledger.carried, ledger.at_zero, finder
+            )
             if fraction <= 1.0:
-                target = method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD])
+                wait = fraction * (method.clock[T] - method.clock[T_OLD])
+                target = method.clock[T_OLD] + max(wait, EVENT_TIME)
                 arriving, refinements = True, 0
                 if target < method.clock[T]:
                     rewind(method, mode)
                     continue
-        elif not is_join(signal) and refinements < REFINEMENTS:
+        elif refinements < REFINEMENTS:
             wait = time_to_zero(method, finder, signal)
             if abs(wait) > EVENT_TIME and target + wait > method.clock[T_OLD]:
                 target += wait
                 refinements += 1
                 rewind(method, mode)
                 continue
-        observe_contact(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
+        observe(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
         outcome = judge(mode, walker, terrain, frame, method, ledger)
         if outcome != GOES_ON:
             return outcome
-        for i in range(ledger.at_zero.size):
-            ledger.at_zero[i] = 0
+        if method.clock[T] - method.clock[T_OLD] > 2.0 * EVENT_TIME:
+            # of events at one and the same time each is found once
+            for i in range(ledger.at_zero.size):
+                ledger.at_zero[i] = 0
         if arriving:
             end = walker_state(mode, end_state(method, mode))
             steps = ledger.feet[STEPS]
             outcome = happen(walker, terrain, observer, ledger, signal, method.clock[T], end)
             if outcome != GOES_ON:
                 return outcome
-            if ends_at_touch(system) and ledger.feet[STEPS] > steps:
+            released = is_hinged(system) and ledger.feet[STEPS] > steps
+            if released or (signal == PASSING and 0 <= stop_passing_after <= ledger.feet[STEPS]):
                 return WALKED
             if not is_join(signal):
                 mode = in_mode(system, ledger)
@@ -208,7 +218,7 @@ def judge(mode: Any, walker: ContactWalker, terrain: Any, frame: Frame, method: 
     """End the walk if it has flown, slid or taken too long; note when a foot was last on the ground."""
     t = method.clock[T]
     feet = feet_motion(walker, walker_state(mode, end_state(method, mode)))
-    grounded = ends_at_touch(mode)
+    grounded = is_hinged(mode)
     for foot in range(2):
         grounded = grounded or feels_ground(mode, ledger.carried[foot] != 0, feet[foot].height)
     if grounded:
@@ -226,7 +236,7 @@ def judge(mode: Any, walker: ContactWalker, terrain: Any, frame: Frame, method: 
 
 @inlined
 def happen(
-    walker: ContactWalker, terrain: Any, observer: Any, ledger: Ledger, signal: int, t: float, y: State
+    walker: ContactWalker, terrain: Any, observer: ContactObserver, ledger: Ledger, signal: int, t: float, y: State
 ) -> int:
     """Let an event change the ledger; returns an outcome if it ends the walk."""
     if signal == FALL:

@@ -59,7 +59,7 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
         pendulum_time=math.sqrt(parts.leg_length_m / config.gravity_m_s2),
         hip_x=tuple(float(x) for x in hip[:, 0]),
         hip_y=tuple(float(x) for x in hip[:, 1]),
-        locate_joins=False,
+        locate_joins=True,
     )
     terrain = Checkerboard(pitch, (-pitch, 0.0)) if contact.terrain == "checkerboard" else AfterMidSwing(pitch)
     pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None

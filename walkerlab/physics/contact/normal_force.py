@@ -44,6 +44,22 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 
 
 @inlined
+def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
+    """A measure of the force before it is kept from pulling: where it falls through zero the ground lets go.
+
+    The force divided by d^min(e, 2), which has a finite limit at the surface: (k d^e + c d') d^-min(e, 2).
+    """
+    power = min(law.exponent, 2.0)
+    d = max(penetration, 0.0)
+    spring = law.stiffness * (d ** (law.exponent - power) if law.exponent > power else 1.0)
+    share = d / law.full_damping_penetration
+    if share >= 1.0:
+        return spring + law.damping * penetration_rate / d**power
+    damping = law.damping * (3.0 - 2.0 * share) / law.full_damping_penetration**2
+    return spring + damping * penetration_rate * (d ** (2.0 - power) if power < 2.0 else 1.0)
+
+
+@inlined
 def elastic_energy(penetration: float, law: NormalLaw) -> float:
     """Energy stored in the contact's spring (J): k d^(e+1) / (e+1)."""
     if penetration <= 0.0:

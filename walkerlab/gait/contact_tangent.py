@@ -1,0 +1,83 @@
+"""How a walk on compliant ground changes with its start: the variational equations along the steps taken.
+
+On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
+method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
+is continuous at its joins and at touch and lift, so no jump enters there; a foot that leaves its pad under load would
+need one, and a gait has none.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.kernels import inlined
+from walkerlab.physics.system import jacobian
+from walkerlab.solvers.linear import factor, solve
+from walkerlab.solvers.radau5 import C
+from walkerlab.solvers.stepping import T_OLD, T, interpolate
+
+ROOT6 = 6.0**0.5
+# Radau IIA, Hairer and Wanner II (5.6)
+A = np.array(
+    [
+        [(88.0 - 7.0 * ROOT6) / 360.0, (296.0 - 169.0 * ROOT6) / 1800.0, (-2.0 + 3.0 * ROOT6) / 225.0],
+        [(296.0 + 169.0 * ROOT6) / 1800.0, (88.0 + 7.0 * ROOT6) / 360.0, (-2.0 - 3.0 * ROOT6) / 225.0],
+        [(16.0 - ROOT6) / 36.0, (16.0 + ROOT6) / 36.0, 1.0 / 9.0],
+    ]
+)
+
+
+class Tangent(NamedTuple):
+    """The derivative Phi and the memory to carry it along."""
+
+    Phi: Any  # (n, directions); no directions if the tangent is not wanted
+    stages: Any  # (3, n, n) Jacobians at the stages
+    system: Any  # (3 n, 3 n)
+    pivots: Any  # (3 n,)
+    rates: Any  # (3 n,) stage derivatives of one direction
+
+
+def new_tangent(n: int, directions: int) -> Tangent:
+    """Memory for `directions` directions of a system of n equations; none for zero directions."""
+    m = n if directions else 0
+    return Tangent(
+        np.zeros((n, directions)),
+        np.zeros((3, m, m)),
+        np.zeros((3 * m, 3 * m)),
+        np.zeros(3 * m, np.int64),
+        np.zeros(3 * m),
+    )
+
+
+@inlined
+def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
+    """Carry Phi over the last step of `method`."""
+    n = tangent.Phi.shape[0]
+    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    for i in range(3):
+        jacobian(system, t + C[i] * h, interpolate(method, system, C[i]), tangent.stages[i])
+    for i in range(3):
+        for j in range(3):
+            for row in range(n):
+                for column in range(n):
+                    same = 1.0 if i == j and row == column else 0.0
+                    tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
+    factor(tangent.system, tangent.pivots)
+    for direction in range(tangent.Phi.shape[1]):
+        carry_direction(tangent, direction, h)
+
+
+@inlined
+def carry_direction(tangent: Tangent, direction: int, h: float) -> None:
+    """One column of Phi: stage derivatives K = J (Phi + h A K), then the step's sum."""
+    n = tangent.Phi.shape[0]
+    for i in range(3):
+        for row in range(n):
+            total = 0.0
+            for k in range(n):
+                total += tangent.stages[i, row, k] * tangent.Phi[k, direction]
+            tangent.rates[i * n + row] = total
+    solve(tangent.system, tangent.pivots, tangent.rates)
+    for row in range(n):
+        change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
+        tangent.Phi[row, direction] += h * change
