@@ -151,6 +151,22 @@ def test_no_gait_for_an_impossible_walker():
     assert "random starting values" in search.reason
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"foot_to_mass": 1e-9, "hip_mass": 0.0},
+        {"foot_to_mass": 1.0 - 1e-9, "leg_mass": 1e-6, "hip_mass": 1e4},
+        {"foot_to_mass": 0.6, "hip_mass": 0.0, "leg_mass": 1e5},
+        {"foot_to_mass": 1.0 - 1e-9, "leg_inertia": 1e6},
+        {"leg_mass": 1e-6, "hip_mass": 1e6, "leg_inertia": 1e-9},
+    ],
+)
+def test_degenerate_walkers_are_searched_without_a_mishap(changes):
+    for gait in find_gaits(PAPER._replace(**changes)).gaits:
+        assert np.isfinite(gait.state).all()
+        assert gait.residual <= 1e-11
+
+
 def test_a_slope_with_unstable_gaits_only_says_so():
     search = find_gaits(on_slope(5.0))
     assert not search.gait.stable

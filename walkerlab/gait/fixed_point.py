@@ -33,8 +33,8 @@ class SearchSettings:
     """How hard to look.
 
     random_starts  starting values to draw
-    rtol, atol     tolerances while looking; gaits are then solved with `solved_rtol`, `solved_atol`
-    residual       of an acceptable gait
+    rtol, atol     tolerances while looking; gaits are then solved with the `solved_` ones, down to that residual
+    residual       of an acceptable gait, which may be rounding on a steep slope
     budget         right-hand sides for one call of the solver
     """
 
@@ -43,6 +43,7 @@ class SearchSettings:
     atol: float = 1e-11
     solved_rtol: float = 1e-13
     solved_atol: float = 1e-16
+    solved_residual: float = 1e-14
     residual: float = 1e-11
     budget: int = 20_000
 
@@ -153,7 +154,7 @@ class Search:
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
         z = np.array(z)
-        status, period, residual, _ = newton(self.solving, z, 0.0)
+        status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
         if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
             return False
         for found in self.found:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from walkerlab.physics.rigid.heel_strike import impact_matrices
@@ -30,6 +31,7 @@ LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
 SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
 LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
 SHORT_AMPLITUDE = 0.002
+MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
 # on a slope of one radian: the state of (z, 1), z itself, and theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 COORDINATES = np.eye(3, 4)
@@ -54,30 +56,32 @@ class Modes(NamedTuple):
     V: Vector  # (2, 2), a mode a column, oscillating first
 
 
-def linear_modes(walker: RigidWalker) -> Modes:
-    """Modes of the swing phase about both legs upright."""
+def linear_modes(walker: RigidWalker) -> Modes | None:
+    """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
     c = swing_constants(walker)
     D = np.array([[c.d11, -c.mLb], [-c.mLb, c.d22]])
     stiffness = walker.gravity * np.diag([-c.mb, c.K])
-    rates, V = np.linalg.eig(np.linalg.solve(D, stiffness))
-    order = np.argsort(rates)
-    return Modes(math.sqrt(-rates[order[0]]), math.sqrt(rates[order[1]]), V[:, order])
+    try:
+        rates, V = eigh(stiffness, D)
+    except np.linalg.LinAlgError:
+        return None
+    return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
 
 
 def seeds(walker: RigidWalker) -> tuple[Seed, ...]:
     """The small-slope gaits that `walker` has; its own slope plays no part."""
     modes = linear_modes(walker)
-    long = long_period_seed(walker, modes)
-    if long is None:
+    long = None if modes is None else long_period_seed(walker, modes)
+    if modes is None or long is None:
         return ()
     short = short_period_seed(walker, modes, long.period)
     return (long,) if short is None else (long, short)
 
 
 def long_period_seed(walker: RigidWalker, modes: Modes) -> Seed | None:
-    """The symmetric gait at LONG_AMPLITUDE; None if the legs never come together again within a swing of the leg."""
+    """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
     half = symmetric_half_period(modes)
-    if half is None:
+    if half is None or modes.fall * half > MOST_GROWTH:
         return None
     at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
     rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])
@@ -107,13 +111,16 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed | None:
     """The gait that is proportional to the slope, of less than `longest` (s); None if there is none."""
-    step = LinearStep(walker, modes)
-    period = first_root(step.mismatch, longest)
-    if period is None:
+    try:
+        step = LinearStep(walker, modes)
+        period = first_root(step.mismatch, longest)
+        z = None if period is None else step.periodic_state(period)
+    except np.linalg.LinAlgError:  # masses that all sit in one place leave a heel strike undetermined
         return None
-    z = step.periodic_state(period)
+    if period is None or z is None or z[0] <= -1.0:
+        return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
-    return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3)) if slope > 0.0 else None
+    return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
 class LinearStep:
@@ -165,7 +172,8 @@ class LinearStep:
 
 def first_root(f: Callable[[Vector], Vector], longest: float) -> float | None:
     """The smallest root of f in (0, longest), bracketed by samples; None if f keeps its sign."""
-    samples = np.linspace(longest / SCAN, longest, SCAN)
+    # the end itself is left out: there the short gait's conditions degenerate into the long one's
+    samples = longest * np.arange(1, SCAN) / SCAN
     values = f(samples)
     turns = np.flatnonzero(values[:-1] * values[1:] < 0.0)
     if turns.size == 0:
