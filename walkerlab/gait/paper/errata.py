@@ -191,8 +191,8 @@ def of_the_results(study: PaperStudy) -> Iterator[Erratum]:
         f"above {study.fastest * min(late):.2g} rad at the same time",
         "Table 3's own step periods differ; a leg that arrives late is off by its velocity times the delay",
         f"the periods differ by {1e3 * late[0]:.0f} and {1e3 * late[1]:.0f} ms; at up to {study.fastest:.2f} rad/s "
-        f"this is {study.fastest * late[0]:.3f} and {study.fastest * late[1]:.3f} rad, and {study.largest_jump:.2f} rad/s "
-        "while one model has had its heel strike and the other has not",
+        f"this is {study.fastest * late[0]:.3f} and {study.fastest * late[1]:.3f} rad, and {study.largest_jump:.2f} "
+        "rad/s while one model has had its heel strike and the other has not",
     )
     yield Erratum(
         "Table 3, step periods",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import walkerlab.physics.rigid.swing  # noqa: F401 (what a walk of the rigid model integrates)
 from walkerlab.gait.comparison import Array
 from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
 from walkerlab.gait.rigid_measures import energies
@@ -81,7 +82,7 @@ class RigidModel:
     steps          that were walked, of ten
     step_length    m, between the feet at that state
     energy_least   J, least and largest energy during the walk
-    energy_drift   J, largest change from the start of a swing
+    energy_drift   J, largest spread within a swing
     """
 
     state: State
