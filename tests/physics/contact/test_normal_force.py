@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.integrate import trapezoid
 
 from walkerlab.physics.contact.normal_force import NormalLaw, elastic_energy, impact_normal_force
 from walkerlab.physics.contact.smooth_step import smooth_step
@@ -74,7 +75,7 @@ def test_elastic_energy_is_the_work_of_the_spring():
     law = NormalLaw(3e8, 2.2, 0.0, 1e-4)
     depth = np.linspace(0.0, 2e-3, 20001)
     force = np.array([0.0, *(impact_normal_force(d, 0.0, law).force for d in depth[1:])])
-    work = np.trapezoid(force, depth) if hasattr(np, "trapezoid") else np.trapz(force, depth)
+    work = trapezoid(force, depth)
     assert elastic_energy(2e-3, law) == pytest.approx(work, rel=1e-7)
     assert elastic_energy(-1e-3, law) == 0.0
 
