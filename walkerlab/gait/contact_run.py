@@ -215,6 +215,7 @@ def walk_contact(
     methods: MethodSettings,
     steps: int,
     interval_s: float | None,
+    booked: bool = True,
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
@@ -223,6 +224,7 @@ def walk_contact(
     start       state of the free walker (8); its angles and angular velocities start the hinged one
     methods     how to integrate
     interval_s  time between samples, or None for none
+    booked      whether to keep the energy's books
 
     The room for samples doubles until the whole walk fits.
     """
@@ -230,7 +232,7 @@ def walk_contact(
     room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
     while True:
         ledger = new_ledger(walker, ground.terrain, stance, steps, start)
-        observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked=True)
+        observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked)
         outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
         if room == 0 or observer.recorded[0] < room:
             return gather(outcome, stopped, ledger, observer, walker)
@@ -253,14 +255,16 @@ def run_parts(
         method = methods.new(len(pinned.blank))
         angles = len(pinned.tree.arm_x)
         hinged = (*start[2 : 2 + angles], *start[4 + angles :])
-        outcome = Outcome(walk_hinged(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
+        hinged_walk = walk_hinged if methods.method.compiled else walk_hinged.py_func
+        outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
         if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
             return outcome, Stopped(t, y, spent)
     method = methods.new(len(walker.blank))
     ledger.times[AIRBORNE_SINCE] = t
-    outcome = Outcome(walk_free(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
+    free_walk = walk_free if methods.method.compiled else walk_free.py_func
+    outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
 
 

@@ -17,12 +17,12 @@ from walkerlab.physics.contact.walker import ContactWalker, FootMotion, foot_mot
 from walkerlab.physics.multibody.tree import sines_cosines
 from walkerlab.physics.system import State
 from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
-from walkerlab.solvers.stepping import interpolate
 
 # signals of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
-PER_FOOT = 9
+ALONG = 9  # no event: where the foot is
+PER_FOOT = 10
 # signals of the walker
 PASSING, FALL = 2 * PER_FOOT, 2 * PER_FOOT + 1
 SIGNALS = 2 * PER_FOOT + 2
@@ -92,17 +92,22 @@ def hip_height(walker: ContactWalker, frame: Frame, y: State) -> float:
 
 @inlined
 def sample_signals(
-    method: Any, system: Any, walker: ContactWalker, terrain: Any, frame: Frame, cells: Any, finder: CrossingFinder
+    system: Any,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    cells: Any,
+    state: State,
+    node: int,
+    finder: CrossingFinder,
 ) -> None:
-    """Values of all signals along the last step."""
-    edges_0, edges_1 = cell_edges(terrain, 0, cells[0]), cell_edges(terrain, 1, cells[1])
-    for j in range(finder.nodes.size):
-        y = walker_state(system, interpolate(method, system, finder.nodes[j]))
-        feet = feet_motion(walker, y)
-        sample_foot(walker, feet[0], edges_0, 0, j, finder)
-        sample_foot(walker, feet[1], edges_1, PER_FOOT, j, finder)
-        finder.values[PASSING, j] = feet[1].along - feet[0].along
-        finder.values[FALL, j] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
+    """Values of all signals at one node of a step, where the system's state is `state`."""
+    y = walker_state(system, state)
+    feet = feet_motion(walker, y)
+    sample_foot(walker, feet[0], cell_edges(terrain, 0, cells[0]), 0, node, finder)
+    sample_foot(walker, feet[1], cell_edges(terrain, 1, cells[1]), PER_FOOT, node, finder)
+    finder.values[PASSING, node] = feet[1].along - feet[0].along
+    finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
 
 
 @inlined
@@ -112,6 +117,7 @@ def sample_foot(
     """One foot's signals at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
+    values[first + ALONG, j] = motion.along
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
@@ -147,7 +153,7 @@ def joins(law: Any) -> int:
 @joins.case(Coulomb)
 def coulomb_joins(law: Coulomb) -> int:
     """All."""
-    return PER_FOOT
+    return ALONG
 
 
 @joins.case(Frictionless)
@@ -157,7 +163,7 @@ def frictionless_joins(law: Frictionless) -> int:
 
 
 @inlined
-def earliest_event(
+def earliest_crossing(
     system: Any,
     walker: ContactWalker,
     frame: Frame,

@@ -6,7 +6,9 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 from typing import Any, NamedTuple
 
 from walkerlab.gait.contact_observer import ContactObserver, observe, observe_edge
+from walkerlab.gait.contact_scan import Feet, Scene, scan
 from walkerlab.gait.contact_signals import (
+    ALONG,
     FALL,
     HEIGHT,
     LEFT_EDGE,
@@ -14,11 +16,9 @@ from walkerlab.gait.contact_signals import (
     PER_FOOT,
     RIGHT_EDGE,
     Frame,
-    earliest_event,
     feels_ground,
     feet_motion,
     is_join,
-    sample_signals,
     walker_state,
 )
 from walkerlab.gait.outcome import Outcome
@@ -140,19 +140,18 @@ def walk_part(
     begin(method, mode, t, y, method.clock[H_NEXT])
     arriving, refinements, signal = False, 0, -1
     target = deadline(frame, ledger)
-    watch_order = order_matters(terrain) or stop_passing_after >= 0
+    scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
+    feet = Feet(ledger.carried, ledger.cells, ledger.at_zero)
     while ledger.feet[STEPS] < ledger.touch_time.size:
         status = advance(method, mode, target)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
         prepare_dense(method, mode)
-        sample_signals(method, mode, walker, terrain, frame, ledger.cells, finder)
+        fraction, found = scan(method, mode, scene, feet, finder)
         if arriving and method.clock[T] < target:
             arriving = False
         if not arriving:
-            fraction, signal = earliest_event(
-                mode, walker, frame, watch_order, ledger.carried, ledger.at_zero, finder
-            )
+            signal = found
             if fraction <= 1.0:
                 wait = fraction * (method.clock[T] - method.clock[T_OLD])
                 target = method.clock[T_OLD] + max(wait, EVENT_TIME)
@@ -168,7 +167,7 @@ def walk_part(
                 rewind(method, mode)
                 continue
         observe(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
-        outcome = judge(mode, walker, terrain, frame, method, ledger)
+        outcome = judge(mode, scene, method, finder, ledger)
         if outcome != GOES_ON:
             return outcome
         if method.clock[T] - method.clock[T_OLD] > 2.0 * EVENT_TIME:
@@ -214,22 +213,28 @@ def time_to_zero(method: Any, finder: CrossingFinder, signal: int) -> float:
 
 
 @inlined
-def judge(mode: Any, walker: ContactWalker, terrain: Any, frame: Frame, method: Any, ledger: Ledger) -> int:
-    """End the walk if it has flown, slid or taken too long; note when a foot was last on the ground."""
-    t = method.clock[T]
-    feet = feet_motion(walker, walker_state(mode, end_state(method, mode)))
+def judge(mode: Any, scene: Scene, method: Any, finder: CrossingFinder, ledger: Ledger) -> int:
+    """End the walk if it has flown, slid or taken too long; note when a foot was last on the ground.
+
+    The signals of the last step are sampled; their last node is its end.
+    """
+    t, end = method.clock[T], finder.nodes.size - 1
+    pendulum_time = scene.frame.pendulum_time
     grounded = is_hinged(mode)
     for foot in range(2):
-        grounded = grounded or feels_ground(mode, ledger.carried[foot] != 0, feet[foot].height)
+        height = finder.values[foot * PER_FOOT + HEIGHT, end]
+        grounded = grounded or feels_ground(mode, ledger.carried[foot] != 0, height)
     if grounded:
         ledger.times[AIRBORNE_SINCE] = t
     stance = ledger.feet[STANCE]
-    slide = abs(feet[stance].along - ledger.foothold[stance])
-    if feels_ground(mode, ledger.carried[stance] != 0, feet[stance].height) and slide > SLIDE * stride_measure(terrain):
+    height = finder.values[stance * PER_FOOT + HEIGHT, end]
+    slide = abs(finder.values[stance * PER_FOOT + ALONG, end] - ledger.foothold[stance])
+    loaded = feels_ground(mode, ledger.carried[stance] != 0, height)
+    if loaded and slide > SLIDE * stride_measure(scene.terrain):
         return SLID
-    if t >= ledger.times[LAST_TOUCH] + LONGEST_STEP * frame.pendulum_time:
+    if t >= ledger.times[LAST_TOUCH] + LONGEST_STEP * pendulum_time:
         return NO_HEEL_STRIKE
-    if t >= ledger.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * frame.pendulum_time:
+    if t >= ledger.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * pendulum_time:
         return LIFTED_OFF
     return GOES_ON
 

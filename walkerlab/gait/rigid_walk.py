@@ -20,7 +20,10 @@ from walkerlab.physics.rigid.walker import (
     swing_foot_height,
 )
 from walkerlab.physics.system import State
-from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.dop853 import Dop853
+from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing, value_at
+from walkerlab.solvers.radau5 import Radau5
+from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
     H_NEXT,
     OUT_OF_BUDGET,
@@ -37,8 +40,8 @@ from walkerlab.solvers.stepping import (
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
-HEEL_STRIKE, FALL = 0, 1  # signals of the finder
-SIGNALS = 2
+HEEL_STRIKE, FALL, AHEAD = 0, 1, 2  # signals of the finder
+SIGNALS = 3
 NO_FORCE = 1e300  # above any normal force
 WALKED, FELL = int(Outcome.WALKED), int(Outcome.FELL)
 NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
@@ -182,24 +185,56 @@ def may_end(walker: RigidWalker, method: Any, y: State) -> bool:
 
 
 @inlined
-def sample_signals(method: Any, system: Any, walker: RigidWalker, finder: CrossingFinder) -> None:
-    """Values of the heel-strike and the fall signal along the dense output."""
-    for j in range(finder.nodes.size):
-        y = interpolate(method, system, finder.nodes[j])
-        finder.values[HEEL_STRIKE, j] = feet_on_slope(walker, y[0], y[1])
-        finder.values[FALL, j] = hip_above_fall(walker, y)
+def sample_signals(walker: RigidWalker, y: State, node: int, finder: CrossingFinder) -> None:
+    """Values of the signals at one node of a step, where the state is y."""
+    finder.values[HEEL_STRIKE, node] = feet_on_slope(walker, y[0], y[1])
+    finder.values[FALL, node] = hip_above_fall(walker, y)
+    finder.values[AHEAD, node] = y[0] - y[1]
 
 
 @inlined
-def heel_strike_in_step(method: Any, system: Any, finder: CrossingFinder, at_start: bool) -> float:
-    """Fraction of the last step at which the feet come down together with the swing leg ahead, or NO_CROSSING."""
-    fraction = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
-    while fraction <= 1.0:
-        y = interpolate(method, system, fraction)
-        if y[0] > y[1]:
-            return fraction
-        fraction = first_crossing(finder, HEEL_STRIKE, FALLING, fraction + 1e-12, at_start)
-    return NO_CROSSING
+def events_in_step(finder: CrossingFinder, at_start: bool) -> tuple[float, float]:
+    """Fractions of a sampled step at which the swing foot strikes with its leg ahead, and at which the walker falls."""
+    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
+    while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
+        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, at_start)
+    return strike, first_crossing(finder, FALL, FALLING, 0.0, False)
+
+
+@by_type
+def scan_swing(
+    method: Any, system: Any, walker: RigidWalker, finder: CrossingFinder, at_start: bool
+) -> tuple[float, float]:
+    """`events_in_step` of the last step of a method; its dense output is ready."""
+
+
+@scan_swing.case(Dop853)
+@scan_swing.case(Radau5)
+def scan_compiled(
+    method: Any, system: Any, walker: RigidWalker, finder: CrossingFinder, at_start: bool
+) -> tuple[float, float]:
+    """Compiled with the walk."""
+    for node in range(finder.nodes.size):
+        sample_signals(walker, interpolate(method, system, finder.nodes[node]), node, finder)
+    return events_in_step(finder, at_start)
+
+
+@kernel
+def scan_states(walker: RigidWalker, states: Any, finder: CrossingFinder, at_start: bool) -> tuple[float, float]:
+    """`events_in_step` of a step whose states at the nodes are the rows of `states`."""
+    for node in range(finder.nodes.size):
+        y = (states[node, 0], states[node, 1], states[node, 2], states[node, 3])
+        sample_signals(walker, y, node, finder)
+    return events_in_step(finder, at_start)
+
+
+@scan_swing.case(ScipyMethod)
+def scan_scipy(
+    method: ScipyMethod, system: Any, walker: RigidWalker, finder: CrossingFinder, at_start: bool
+) -> tuple[float, float]:
+    """A walk in Python hands the step's states to compiled code at once."""
+    strike, fall = scan_states(walker, method.states_at(finder.nodes), finder, at_start)
+    return strike, fall
 
 
 @inlined
@@ -225,9 +260,7 @@ def swing(
             prepare_dense(method, system)
         strike, fall = NO_CROSSING, NO_CROSSING
         if near:
-            sample_signals(method, system, walker, finder)
-            strike = heel_strike_in_step(method, system, finder, at_start)
-            fall = first_crossing(finder, FALL, FALLING, 0.0, False)
+            strike, fall = scan_swing(method, system, walker, finder, at_start)
         observe(observer, method, system, walker, min(1.0, strike, fall), step)
         if fall < strike:
             return FELL

@@ -91,6 +91,12 @@ def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: f
 
 
 @inlined
+def value_at(finder: CrossingFinder, signal: int, fraction: float) -> float:
+    """Value of a sampled signal at a fraction of the step."""
+    return evaluate(finder.stack, 0, set_root_piece(finder, signal, False), fraction)
+
+
+@inlined
 def spans_zero(finder: CrossingFinder, signal: int) -> bool:
     """Whether a signal could cross: false where it stays further from zero than its own variation could carry it."""
     smallest, largest = finder.values[signal, 0], finder.values[signal, 0]

@@ -88,7 +88,11 @@ class ScipyMethod:
         self.counts[BUDGET] = budget
         self.solver: Any = None
         self.dense: Any = None
-        self.failure = ""
+
+    def states_at(self, fractions: Any) -> Any:
+        """States (fractions, n) at fractions of the last step."""
+        t_old, t = self.clock[T_OLD], self.clock[T]
+        return np.ascontiguousarray(self.dense(t_old + fractions * (t - t_old)).T)
 
 
 def new_scipy_method(name: str) -> Callable[[int, float, float, int], ScipyMethod]:
