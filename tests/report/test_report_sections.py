@@ -1,0 +1,295 @@
+"""What the report says: the verdict first, and of everything else what there are results of."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from synthetic_results import (
+    EVERYTHING,
+    LENGTH,
+    PAPER_ROWS,
+    PERIOD,
+    SLOPE,
+    compare,
+    config,
+    contact_sim,
+    fixedpoint,
+    paper_row,
+    simulate,
+    stored,
+)
+
+from walkerlab.report.blocks import Code, Findings, Paragraph, Player, Section, Shares, Table
+from walkerlab.report.lead import lead
+from walkerlab.report.registry import SECTIONS, sections_of
+from walkerlab.report.results import Absent, Results
+
+NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
+WITHOUT_GAIT = (
+    Absent("fixedpoint", NO_GAIT, failed=True),
+    Absent("simulate", f"it needs fixedpoint: {NO_GAIT}"),
+    Absent("contact-sim", f"it needs fixedpoint: {NO_GAIT}"),
+)
+
+
+def sections(stages=None, *, absent=(), sets=(), **changed):
+    made = {name: make() for name, make in EVERYTHING.items() if stages is None or name in stages} | changed
+    found = sections_of(Results(config(*sets), made, (), absent))
+    return {section.anchor: section for section in found}
+
+
+def plain(text):
+    return text.replace("\u00a0", " ").replace("\u202f", " ")
+
+
+def texts(section):
+    """Everything that a section says, in one string."""
+    return plain(repr(section.blocks).replace("\\xa0", " "))
+
+
+def blocks(section, kind):
+    return [block for block in section.blocks if isinstance(block, kind)]
+
+
+def rows(section, index=0):
+    return {
+        row[0].text: [plain(cell.text) for cell in row[1:]]
+        for body in blocks(section, Table)[index].bodies
+        for row in body.rows
+    }
+
+
+def test_the_verdict_comes_first_and_the_provenance_last():
+    anchors = list(sections())
+    assert anchors[0] == "verdict"
+    assert anchors[-2:] == ["left-out", "provenance"]
+
+
+def test_each_result_brings_its_sections():
+    assert {"gait"} <= sections(["fixedpoint"]).keys()
+    assert {"assumptions", "steps", "motion"} <= sections(["simulate"]).keys()
+    assert {"contact", "steps", "motion"} <= sections(["contact-sim"]).keys()
+    assert {"paper-numbers", "errata"} <= sections(["compare"]).keys()
+
+
+def test_without_contact_nothing_is_said_of_contact():
+    found = sections(["fixedpoint", "simulate"], sets=("contact=null",))
+    assert not {"contact", "paper-numbers", "errata"} & found.keys()
+    spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
+    assert "contact" not in spoken
+    assert "contact" not in " ".join(lead(Results(config("contact=null")), "rigid-only")).lower()
+
+
+def test_a_slope_without_a_gait_is_said_in_words_first():
+    first = sections([], absent=WITHOUT_GAIT)["verdict"].blocks[0]
+    assert isinstance(first, Paragraph)
+    assert first.tone == "bad"
+    assert NO_GAIT in first.text
+    assert "simulate and contact-sim" in first.text
+
+
+def test_what_was_never_wanted_is_no_failure():
+    absent = [Absent("contact-sim", "the config has no contact block")]
+    assert not blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
+
+
+def test_all_that_is_missing_is_listed_with_its_reason():
+    walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs"}])
+    found = sections([], absent=WITHOUT_GAIT, simulate=walk)["left-out"]
+    assert rows(found)["simulate"] == [f"it needs fixedpoint: {NO_GAIT}"]
+    assert rows(found)["forces"] == ["not among the outputs"]
+
+
+def test_nothing_missing_is_said_too():
+    assert "Nothing" in texts(sections()["left-out"])
+
+
+def test_a_walker_that_fell_says_so_before_one_that_walked():
+    (walks, *_) = blocks(sections(**{"contact-sim": contact_sim("fell", 3, hip=0.4999)})["verdict"], Findings)
+    fallen, walked = walks.items
+    assert (fallen.about, fallen.badge, fallen.tone) == ("Contact model", "fell", "bad")
+    assert (walked.about, walked.badge, walked.tone) == ("Rigid model", "walked", "good")
+    for part in ("3 of 4 steps", "2.1 s", "0.5 m above the slope", "Start nearer to a gait"):
+        assert part in plain(fallen.text)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "changed", "said"),
+    [
+        ("slid", {"slips_m": [0.001, -0.12]}, "−0.12 m"),
+        ("off-pad", {"step_lengths_m": [0.36, 0.35]}, "30 mm behind"),
+        ("no-heel-strike", {}, "3.19 s"),
+        ("budget-exhausted", {"rhs_evaluations": 4_000_000}, "4 000 000 right-hand sides"),
+        ("lifted-off", {"min_normal_force_N": -17.0}, "pull with 17 N"),
+        ("rejected", {"step_periods_s": [], "step_lengths_m": [], "slips_m": []}, "2 of 4 steps"),
+    ],
+)
+def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
+    walk = contact_sim(outcome, 2, **changed)
+    (walks, *_) = blocks(sections(["simulate"], **{"contact-sim": walk})["verdict"], Findings)
+    assert said in plain(walks.items[0].text)
+
+
+def test_the_papers_numbers_are_counted_by_verdict():
+    verdict = sections()["verdict"]
+    (shares,) = blocks(verdict, Shares)
+    assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("refuted", 2, "bad"))
+    assert shares.total == len(PAPER_ROWS)
+
+
+def test_the_verdict_says_which_numbers_fared_how():
+    said = {finding.about: finding.text for finding in blocks(sections()["verdict"], Findings)[1].items}
+    assert list(said) == ["Reproduced", "Explained", "Refuted"]
+    assert said["Refuted"].startswith("Table 3 (all 2). ")
+
+
+def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
+    (error,) = blocks(sections()["verdict"], Findings)[-1].items
+    assert "A.5 row 2" in error.about
+    assert "energy drifts by 0.13 J" in error.text
+
+
+def test_a_scene_that_is_not_the_papers_is_said_before_its_numbers_are_judged():
+    other = stored("compare", {}, {**compare().summary, "departures": ["slope_rad 0.05"]})
+    (said,) = blocks(sections([], compare=other)["verdict"], Paragraph)[:1]
+    assert "slope_rad 0.05" in said.text
+    assert said.tone == "fair"
+
+
+def test_the_papers_tables_stand_beside_ours_without_empty_columns():
+    first, third = blocks(sections()["tables"], Table)
+    assert [column.title for column in first.columns] == ["row", "quantity", "paper", "used here", "where"]
+    assert [column.title for column in third.columns] == ["row", "paper, MATLAB", "corrected"]
+    assert third.bodies[0].rows[0][0].text == "left step period, t_left (s)"
+
+
+def test_the_difference_of_the_models_is_given_in_every_way_it_was_taken():
+    assert rows(sections()["models"]) == {
+        "at the same time": ["0.11", "0.11"],
+        "at the same phase of each step": ["0.017", "0.017"],
+    }
+
+
+def test_every_number_of_the_paper_is_listed_under_where_it_stands():
+    (table,) = blocks(sections()["paper-numbers"], Table)
+    assert [(body.title, len(body.rows)) for body in table.bodies] == [("eq. 11", 1), ("Table 3", 2), ("Table 2", 1)]
+
+
+def test_a_model_without_any_number_has_no_column():
+    rows_without = [paper_row("eq. 11", "x", "1", "reproduced", "", corrected=1.0)]
+    (table,) = blocks(sections([], compare=compare(rows_without))["paper-numbers"], Table)
+    heads = [column.title for column in table.columns]
+    assert "corrected" in heads
+    assert "contact model" not in heads
+
+
+def test_errata_stand_with_what_was_measured():
+    assert rows(sections()["errata"])["A.5 row 2"][-1] == "energy drifts by 0.13 J"
+
+
+def test_both_sets_of_equations_stand_side_by_side():
+    found = rows(sections()["gait"])
+    assert found["stable"] == ["no", "yes"]
+    assert found["step period T (s)"] == ["0.700000"] * 2
+    assert found["multipliers λ₁"] == ["0.3626 + 0.4603i"] * 2
+
+
+def test_a_set_of_equations_without_a_gait_is_left_away():
+    summary = dict(fixedpoint().summary)
+    summary["equation_sets"] = {"corrected": summary["equation_sets"]["corrected"], "as-printed": {"gaits_found": 0}}
+    (table,) = blocks(sections([], fixedpoint=stored("fixedpoint", {}, summary))["gait"], Table)
+    assert [column.title for column in table.columns] == ["quantity", "corrected"]
+
+
+def test_assumptions_are_judged():
+    good = rows(sections()["assumptions"])
+    assert [row[-1] for row in good.values()] == ["holds", "holds", "ignored", "holds"]
+    walk = simulate(min_normal_force_N=-1.0, energy_drift_J=0.13, max_friction_ratio=2.0)
+    bad = rows(sections([], simulate=walk)["assumptions"])
+    assert [row[-1] for row in bad.values()] == ["does not hold", "does not hold", "ignored", "does not hold"]
+
+
+def test_steps_of_both_models_stand_side_by_side_with_dashes_behind_the_shorter():
+    found = rows(sections(**{"contact-sim": contact_sim("fell", 2)})["steps"])
+    assert found["2"] == ["0.70000", "0.70000", "0.37000", "0.37000", "0.930"]
+    assert found["4"] == ["0.70000", "–", "0.37000", "–", "–"]
+
+
+def test_of_a_very_long_walk_the_first_and_last_steps_are_listed():
+    found = rows(sections(["x"], simulate=stored("simulate", {}, simulate(steps=2000).summary))["steps"])
+    assert 10 < len(found) < 40
+    assert {"1", "2000"} <= found.keys()
+
+
+def test_the_contact_walk_has_its_numbers():
+    found = rows(sections()["contact"])
+    assert found["static penetration"][0] == "58.8 µm"
+    assert found["damping ratio"][0] == "3.71"
+    assert found["energy balance residual"][0] == "7 × 10⁻⁹ J"
+
+
+def test_the_config_can_be_run_again_from_the_page(tmp_path):
+    asked = ("slope_deg=3", "contact.stiffness=1e6")
+    code = blocks(sections(sets=asked)["provenance"], Code)[0].text
+    file = tmp_path / "again.yaml"
+    file.write_text(code)
+    assert config(file=file) == config(*asked)
+
+
+def test_provenance_names_key_digest_commit_and_command_of_each_result():
+    made = simulate()
+    said = texts(sections([], simulate=made)["provenance"])
+    for part in (made.identity.key, made.digest(), "0123456789abcdef", "walkerlab report", "1.25"):
+        assert part in said
+
+
+def test_stick_figures_stand_where_the_walker_stood():
+    (player,) = sections(["simulate"])["motion"].blocks
+    assert isinstance(player, Player)
+    frames = np.array(player.walkers[0].frames) / 1000
+    instants = np.array(player.instants)
+    legs = frames.reshape(-1, 3, 2)
+    for foot in (0, 2):
+        assert np.allclose(np.hypot(*(legs[:, 1] - legs[:, foot]).T), 1.0, atol=2e-3)
+    # The first leg swings from a step behind the foothold to a step ahead, where it then stands.
+    assert legs[0, 0, 0] == pytest.approx(-LENGTH, abs=2e-3)
+    second = np.abs(instants - 1.5 * PERIOD).argmin()
+    assert legs[second, 0] == pytest.approx([LENGTH, 0.0], abs=4e-3)
+    assert legs[0, 2] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+def test_the_picture_holds_the_whole_walk():
+    (player,) = sections()["motion"].blocks
+    left, top, width, height = player.view
+    points = np.array([frame for walker in player.walkers for frame in walker.frames]).reshape(-1, 2)
+    x = points[:, 0] * np.cos(SLOPE) + points[:, 1] * np.sin(SLOPE)
+    y = points[:, 0] * np.sin(SLOPE) - points[:, 1] * np.cos(SLOPE)
+    assert left <= x.min()
+    assert x.max() <= left + width
+    assert top <= y.min()
+    assert y.max() <= top + height
+
+
+def test_a_walk_without_stored_states_has_no_picture():
+    walk = simulate()
+    assert "motion" not in sections([], simulate=stored("simulate", {}, walk.summary))
+
+
+def test_a_section_is_one_function_and_one_entry():
+    extra = Section("accuracy", "Accuracy", (Paragraph("Measured."),))
+    assert extra in sections_of(Results(config()), (*SECTIONS, lambda results: extra))
+    assert extra not in sections_of(Results(config()), (*SECTIONS, lambda results: None))
+
+
+def test_the_report_loads_no_plotting_and_no_compiler():
+    heavy = ("matplotlib", "numba", "scipy", "walkerlab.physics", "walkerlab.scene")
+    code = f"import sys, walkerlab.stages.report; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_paragraph_under_the_title_names_config_change_slope_and_equations():
+    said = plain(" ".join(lead(Results(config("slope_deg=3", "equations=as-printed")), "paper@slope_deg=3")))
+    for part in ("Config paper", "changed by slope_deg=3", "0.05236 rad (3°)", "as the paper prints them", "2 strides"):
+        assert part in said

@@ -1,0 +1,63 @@
+"""What was run, in the paragraphs under the page's title."""
+
+from __future__ import annotations
+
+import math
+
+from walkerlab.config.schema import Config
+from walkerlab.report.numbers import count, length, listed, number, quantity
+from walkerlab.report.results import Results
+
+CONTENTS = {
+    "fixedpoint": "the periodic gait of the rigid model",
+    "simulate": "its walk",
+    "contact-sim": "the walk of the assembled model on ground as ADAMS has it",
+    "compare": "both compared with each other and with every number of the paper",
+}
+"""What the result of a stage brings into the report."""
+
+
+def title(run: str) -> str:
+    """The page's heading."""
+    return f"Passive walking: {run}"
+
+
+def lead(results: Results, run: str) -> tuple[str, ...]:
+    """What was run and what is in the report."""
+    return (scene(results.config, run), contents(results))
+
+
+def scene(config: Config, run: str) -> str:
+    """The walker, its slope and what it was to do."""
+    walker = config.walker
+    _, _, change = run.partition("@")
+    changed = f", changed by {change.replace(',', ', ')}" if change else ""
+    start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
+    models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
+    return (
+        f"Config {config.name}{changed}: a compass walker with legs of {length(walker.leg_length_m)} and "
+        f"{quantity(walker.leg_mass_kg, 'kg')} and a hip of {quantity(walker.hip_mass_kg, 'kg')} on a slope of "
+        f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
+        f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
+    )
+
+
+def equations(config: Config) -> str:
+    """Which equations of motion."""
+    if config.equations == "as-printed":
+        return "equations of motion as the paper prints them, misprint of eq. A.5 included"
+    return "corrected equations of motion"
+
+
+def state(start: tuple[float, ...]) -> str:
+    """Four numbers of a state."""
+    return f"({', '.join(number(value) for value in start)}) rad and rad/s"
+
+
+def contents(results: Results) -> str:
+    """What is in the report."""
+    there = [text for stage, text in CONTENTS.items() if stage in results.stored]
+    if not there:
+        return "There are no results to show; the verdict says why."
+    pictures = f" {count(len(results.pictures), 'figure')} show it." if results.pictures else ""
+    return f"In it: {listed(there)}.{pictures}"

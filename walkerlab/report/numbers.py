@@ -1,0 +1,84 @@
+"""Numbers as the report prints them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+MINUS = "−"
+NONE = "–"
+SPACE = "\u00a0"
+"""Between a number and what belongs to it: no line ends there."""
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
+"""Magnitudes that are written without a power of ten."""
+
+
+def number(value: float | None, digits: int = 5) -> str:
+    """A number with `digits` significant digits, trailing zeros dropped; a dash for none."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    if value != 0 and not PLAIN_FROM <= abs(value) < PLAIN_BELOW:
+        return power_of_ten(value, min(digits, 3))
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}".replace("-", MINUS) if "e" in text else text.replace("-", MINUS)
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """A number with so many decimals, for columns; a dash for none."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0 else text.replace("-", MINUS)
+
+
+def power_of_ten(value: float, digits: int = 3) -> str:
+    """A number as in 1.2 × 10⁻⁹."""
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"{mantissa}{SPACE}×{SPACE}10{str(int(exponent)).translate(SUPERSCRIPTS)}".replace("-", MINUS, 1)
+
+
+def quantity(value: float | None, unit: str, digits: int = 5) -> str:
+    """A number with its unit, as in 0.70365 s, on one line."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    return f"{number(value, digits)}{SPACE}{unit}" if unit not in ("", "1") else number(value, digits)
+
+
+def length(value_m: float | None, digits: int = 4) -> str:
+    """A length in the unit in which it is easiest read: m, mm or µm."""
+    if value_m is None or not math.isfinite(value_m):
+        return NONE
+    magnitude = abs(value_m)
+    if magnitude >= 0.1 or magnitude == 0:
+        return quantity(value_m, "m", digits)
+    if magnitude >= 1e-4:
+        return quantity(1e3 * value_m, "mm", digits)
+    return quantity(1e6 * value_m, "µm", digits)
+
+
+def whole(value: int) -> str:
+    """An integer with its thousands set apart, as in 27 087."""
+    return f"{value:,}".replace(",", "\u202f")
+
+
+def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
+    """Equal numbers as one, others as 'least to largest', with their unit."""
+    listed = list(values)
+    if not listed:
+        return NONE
+    least, largest = number(min(listed), digits), number(max(listed), digits)
+    spoken = least if least == largest else f"{least} to {largest}"
+    return f"{spoken}{SPACE}{unit}" if unit else spoken
+
+
+def count(how_many: int, what: str, several: str = "") -> str:
+    """A number of things, as in '1 step' or '10 steps'."""
+    return f"{how_many} {what if how_many == 1 else several or what + 's'}"
+
+
+def listed(parts: Iterable[str]) -> str:
+    """Words in a row: 'a', 'a and b', 'a, b and c'."""
+    words = list(parts)
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

@@ -1,0 +1,47 @@
+"""What a section may draw on: the stored results of a run, the figures drawn from them, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from walkerlab.config.schema import Config
+from walkerlab.report.blocks import Picture
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Group
+
+
+@dataclass(frozen=True)
+class Absent:
+    """Something that was not computed, and why; `failed` if it was tried and has no answer."""
+
+    what: str
+    why: str
+    failed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A run as the report sees it.
+
+    config    what was asked for
+    stored    results by stage: those that are there and current
+    pictures  the figures that `plot` drew, embedded
+    absent    what there is no result of
+    """
+
+    config: Config
+    stored: Mapping[str, Stored] = field(default_factory=dict)
+    pictures: tuple[Picture, ...] = ()
+    absent: tuple[Absent, ...] = ()
+
+    def summary(self, stage: str) -> Mapping[str, Any] | None:
+        """The summary of a stage's result; None if there is none."""
+        result = self.stored.get(stage)
+        return None if result is None else result.summary
+
+    def group(self, stage: str, path: str) -> Group | None:
+        """A group of a stage's result; None if there is no such result or group."""
+        result = self.stored.get(stage)
+        return None if result is None else result.groups.get(path)

@@ -1,0 +1,72 @@
+"""What the rigid model assumes, and how far its own walk bears that out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.blocks import Cell, Column, Section, table
+from walkerlab.report.numbers import length, number, power_of_ten, quantity
+from walkerlab.report.results import Results
+
+HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
+ROUNDING = 1e-6
+"""Relative drift of an energy that counts as constant."""
+
+
+def section(results: Results) -> Section | None:
+    """The paper's assumptions, checked along the rigid walk."""
+    summary = results.summary("simulate")
+    if summary is None:
+        return None
+    rows = [row for row in (pull(summary), grip(results, summary), scuff(summary), energy(summary)) if row]
+    columns = [Column("assumption"), Column("measured", wide=True), Column("value", numeric=True), Column("verdict")]
+    caption = "What the rigid model assumes (sections 3.1 and 3.2), and what its walk says"
+    return Section("assumptions", "Assumptions, checked", (table(caption, columns, rows, wordy=True),))
+
+
+def pull(summary: Mapping[str, Any]) -> list[str | Cell] | None:
+    """The ground never pulls."""
+    least = summary.get("min_normal_force_N")
+    if least is None:
+        return None
+    measured = "smallest normal force of the ground on the stance foot"
+    return ["The ground reaction stays upward", measured, quantity(least, "N", 4), HOLDS if least > 0 else FAILS]
+
+
+def grip(results: Results, summary: Mapping[str, Any]) -> list[str | Cell] | None:
+    """Friction is enough."""
+    ratio = summary.get("max_friction_ratio")
+    if ratio is None:
+        return None
+    contact = results.config.contact
+    measured = "largest ratio of tangential to normal force: the friction coefficient it takes not to slip"
+    if contact is None or contact.friction == "none":
+        return ["The stance foot does not slip", measured, number(ratio, 4), Cell(f"needs {number(ratio, 2)}", "fair")]
+    enough = ratio <= contact.static_friction
+    return ["The stance foot does not slip", measured, number(ratio, 4), HOLDS if enough else FAILS]
+
+
+def scuff(summary: Mapping[str, Any]) -> list[str | Cell] | None:
+    """Scuffing is not considered."""
+    depth = summary.get("max_scuff_depth_m")
+    if depth is None:
+        return None
+    measured = "deepest that the swing foot passes below the ground in mid-swing"
+    return ["Scuffing is not considered", measured, length(depth, 3), NOTED if depth > 0 else HOLDS]
+
+
+def energy(summary: Mapping[str, Any]) -> list[str | Cell] | None:
+    """The equations keep the energy within a swing."""
+    drift = summary.get("energy_drift_J")
+    if drift is None:
+        return None
+    scale = abs(summary.get("mean_energy_J") or 1.0)
+    measured = "largest change of the mechanical energy within a swing, from its start"
+    verdict = HOLDS if drift <= ROUNDING * scale else FAILS
+    return ["No energy is lost or won while a leg swings", measured, f"{small(drift)} J", verdict]
+
+
+def small(value: float) -> str:
+    """A number that may be of the order of rounding."""
+    return number(value, 3) if value >= 1e-3 or value == 0 else power_of_ten(value, 2)

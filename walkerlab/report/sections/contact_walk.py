@@ -1,0 +1,116 @@
+"""The contact model on its ground: how it stands, walks, slips and loses energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.blocks import Cell, Column, Paragraph, Section, table
+from walkerlab.report.numbers import count, length, number, power_of_ten, quantity, span, whole
+from walkerlab.report.outcomes import CONTACT, tone
+from walkerlab.report.results import Results
+
+Row = list[str | Cell]
+
+
+def section(results: Results) -> Section | None:
+    """The numbers of the contact walk."""
+    summary = results.summary(CONTACT)
+    if summary is None:
+        return None
+    rows: list[Row] = [
+        ["outcome", Cell(summary["outcome"], tone(summary["outcome"])), "how the walk ended"],
+        ["steps", str(summary["steps"]), f"of {2 * results.config.strides} asked for"],
+        *gait(summary),
+        *standing(summary),
+        *slipping(summary),
+        *energies(summary),
+        *cost(summary),
+    ]
+    columns = [Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True)]
+    numbers = table("The contact model's walk", columns, rows, wordy=True)
+    return Section("contact", "The contact walk", (Paragraph(ground_in_words(results, summary)), numbers))
+
+
+def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
+    """What the walker walks on."""
+    contact = results.config.contact
+    if contact is None:
+        return ""
+    si = contact.in_si()
+    friction = (
+        f"Coulomb friction as ADAMS has it, with a coefficient of {number(si.static_friction)} at a slip of "
+        f"{quantity(si.stiction_velocity_m_s, 'm/s')} and {number(si.dynamic_friction)} from "
+        f"{quantity(si.friction_velocity_m_s, 'm/s')} on"
+        if contact.friction == "coulomb"
+        else "no friction"
+    )
+    pitch = f", {length(summary.get('pitch_m'))} apart" if summary.get("pitch_m") else ""
+    terrain = {
+        "checkerboard": f"a checkerboard of pads{pitch}",
+        "after-mid-swing": "a plane that a swing foot touches only once it has passed the stance foot",
+    }[contact.terrain]
+    return (
+        f"The normal force is k dᵉ + c(d) ḋ with k = {quantity(si.stiffness_N_per_m_e, 'N/mᵉ')}, "
+        f"e = {number(si.exponent)} and c rising to {quantity(si.damping_N_s_m, 'N s/m')} at "
+        f"{length(si.full_damping_penetration_m)}; there is {friction}. The walker walks on {terrain}."
+    )
+
+
+def gait(summary: Mapping[str, Any]) -> list[Row]:
+    """Periods and lengths."""
+    if not summary["step_periods_s"]:
+        return []
+    return [
+        ["step period", span(summary["step_periods_s"], "s"), "from touch to touch"],
+        ["step length", span(summary["step_lengths_m"], "m"), "along the slope, from touch to touch"],
+    ]
+
+
+def standing(summary: Mapping[str, Any]) -> list[Row]:
+    """Penetration and damping."""
+    ratio = summary.get("damping_ratio")
+    rows: list[Row] = [["largest penetration", length(summary.get("max_penetration_m")), "of either foot"]]
+    if summary.get("static_penetration_m") is not None:
+        rows.append(["static penetration", length(summary["static_penetration_m"]), "the whole weight on one foot"])
+    if ratio is not None:
+        meaning = "over-damped: a foot does not bounce" if ratio >= 1 else "under-damped: a foot bounces"
+        rows.append(["damping ratio", number(ratio, 3), f"about that rest, of the whole mass; {meaning}"])
+    return rows
+
+
+def slipping(summary: Mapping[str, Any]) -> list[Row]:
+    """Slip of the stance foot."""
+    mean = length(summary.get("slip_per_step_m"))
+    rows: list[Row] = [["slip a step", mean, "net, downhill positive, mean over the steps"]]
+    if summary.get("slips_m"):
+        slips = [1e3 * slip for slip in summary["slips_m"]]
+        rows.append(["slip, step by step", span(slips, "mm", 3), "of the stance foot, from its touch to its lift"])
+    return rows
+
+
+def energies(summary: Mapping[str, Any]) -> list[Row]:
+    """Where the energy went, and whether the books balance."""
+    residual = summary["energy_balance_residual_J"]
+    rows: list[Row] = [
+        ["energy balance residual", f"{residual_in_words(residual)} J", "largest, of mechanical and dissipated energy"]
+    ]
+    names = {"damping": "in damping", "friction": "in friction", "edges": "at pads' edges"}
+    for key, value in (summary.get("dissipated_J") or {}).items():
+        rows.append([f"energy lost {names.get(key, key)}", f"{residual_in_words(value)} J", "over the whole walk"])
+    return rows
+
+
+def residual_in_words(value: float) -> str:
+    """A number that may be of the order of rounding."""
+    return number(value, 4) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)
+
+
+def cost(summary: Mapping[str, Any]) -> list[Row]:
+    """What the solver did for it."""
+    evaluations = summary.get("rhs_evaluations")
+    if evaluations is None:
+        return []
+    accepted, rejected = summary.get("accepted_steps"), summary.get("rejected_steps")
+    steps = "" if accepted is None else f"; {count(accepted, 'solver step')} accepted, {rejected} rejected"
+    return [["work", whole(evaluations), f"right-hand sides{steps}"]]

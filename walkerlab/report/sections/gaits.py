@@ -1,0 +1,112 @@
+"""The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.blocks import Block, Column, Paragraph, Section, Table, body, table
+from walkerlab.report.numbers import MINUS, fixed, number, power_of_ten, quantity
+from walkerlab.report.results import Results
+from walkerlab.store.content import Group
+
+STATE = ("θ₁, swing leg (rad)", "θ₂, stance leg (rad)", "θ̇₁ (rad/s)", "θ̇₂ (rad/s)")
+SETS = {"as-printed": "as printed", "corrected": "corrected"}
+"""The sets of equations, as they are stored and as they are called."""
+
+
+def section(results: Results) -> Section | None:
+    """The gait of this walker on this slope."""
+    summary = results.summary("fixedpoint")
+    if summary is None:
+        return None
+    sets = {name: found for name in SETS if (found := set_of(summary, name)) is not None}
+    blocks: list[Block] = [Paragraph(in_words(summary))]
+    if sets:
+        blocks.append(gait_table(sets))
+    every = found_gaits(results)
+    if every is not None:
+        blocks.append(every)
+    return Section("gait", "The gait", tuple(blocks))
+
+
+def set_of(summary: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
+    """The gait under one set of equations; None if it has none."""
+    sets = summary.get("equation_sets", {summary.get("equations"): summary})
+    found: Mapping[str, Any] | None = sets.get(name)
+    return found if found and found.get("state") else None
+
+
+def in_words(summary: Mapping[str, Any]) -> str:
+    """The gait in a sentence or two."""
+    stable = "stable: small disturbances die out" if summary["stable"] else "unstable: small disturbances grow"
+    return (
+        f"With the {SETS[summary['equations']]} equations the rigid model repeats its step every "
+        f"{quantity(summary['period_s'], 's', 6)} over {quantity(summary['step_length_m'], 'm', 6)}. The gait is "
+        f"{stable}, by a factor of {number(summary['spectral_radius'], 4)} a step at the slowest. A state is given "
+        "just after the heel strike, angles absolute, from the vertical."
+    )
+
+
+def gait_table(sets: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Fixed point and multipliers, the sets side by side."""
+    rows = [[label, *(fixed(gait["state"][i], 6) for gait in sets.values())] for i, label in enumerate(STATE)]
+    for key, label, digits in (("period_s", "step period T (s)", 6), ("step_length_m", "step length S (m)", 6)):
+        rows.append([label, *(fixed(gait[key], digits) for gait in sets.values())])
+    for i, label in enumerate(("multipliers λ₁", "λ₂", "λ₃")):
+        rows.append([label, *(complex_number(*gait["multipliers"][i]) for gait in sets.values())])
+    rows.append(["spectral radius", *(fixed(gait["spectral_radius"], 5) for gait in sets.values())])
+    rows.append(["stable", *("yes" if gait["stable"] else "no" for gait in sets.values())])
+    rows.append(["energy from the stance foot (J)", *(fixed(gait["energy_J"], 3) for gait in sets.values())])
+    rows.append(["residual of the step map", *(power_of_ten(gait["residual"], 2) for gait in sets.values())])
+    columns = [Column("quantity"), *(Column(SETS[name], numeric=True) for name in sets)]
+    return table(
+        "Fixed point of the step map and its multipliers, under both sets of equations",
+        columns,
+        rows,
+        note="As printed: Appendix A with its misprint in eq. A.5, which the paper's own code had too; "
+        "corrected: without it.",
+    )
+
+
+def complex_number(real: float, imaginary: float) -> str:
+    """A multiplier, as 0.3626 + 0.4603i."""
+    if imaginary == 0:
+        return fixed(real, 4)
+    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"
+
+
+def found_gaits(results: Results) -> Table | None:
+    """All gaits that the search found, if it was more than one of a set."""
+    groups = {name: results.group("fixedpoint", f"{name}/gaits") for name in SETS}
+    bodies = [body(gait_rows(group), SETS[name]) for name, group in groups.items() if group is not None]
+    if all(len(one.rows) < 2 for one in bodies):
+        return None
+    heads = ("gait", "T (s)", "S (m)", "θ₁", "θ₂", "θ̇₁", "θ̇₂", "spectral radius", "stable", "remark")
+    columns = tuple(Column(head, numeric=index not in (8, 9)) for index, head in enumerate(heads))
+    return Table("Every gait of one step that was found", columns, tuple(bodies))
+
+
+def objection(group: Group, index: int) -> str:
+    """Why a gait cannot be walked; empty if it can."""
+    return str(group["objections"][index]) if "objections" in group.variables else ""
+
+
+def gait_rows(group: Group) -> list[list[str]]:
+    """One row a gait."""
+    chosen = group.attrs.get("chosen")
+    rows = []
+    for index in range(group["period_s"].size):
+        state = [fixed(value, 4) for value in group["state"][index]]
+        rows.append(
+            [
+                str(index + 1),
+                fixed(group["period_s"][index], 5),
+                fixed(group["step_length_m"][index], 5),
+                *state,
+                fixed(group["spectral_radius"][index], 4),
+                "yes" if group["stable"][index] else "no",
+                "chosen" if index == chosen else objection(group, index),
+            ]
+        )
+    return rows

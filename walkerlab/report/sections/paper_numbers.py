@@ -1,0 +1,68 @@
+"""Every number that the paper prints, beside what is computed here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from walkerlab.report.blocks import Cell, Column, Section, Table, Tone, body
+from walkerlab.report.numbers import NONE, number
+from walkerlab.report.results import Results
+from walkerlab.report.symbols import in_signs
+
+TONES: dict[str, Tone] = {"reproduced": "good", "explained": "fair", "refuted": "bad"}
+"""The verdicts, and how each is set."""
+
+MODELS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
+"""What a number of the paper is compared with."""
+
+
+def section(results: Results) -> Section | None:
+    """All the paper's numbers with their verdicts."""
+    rows = paper_numbers(results)
+    if not rows:
+        return None
+    places: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        places.setdefault(str(row["where"]), []).append(row)
+    models = {key: head for key, head in MODELS.items() if any(row.get(key) is not None for row in rows)}
+    columns = (
+        Column("quantity"),
+        Column("printed", numeric=True),
+        *(Column(head, numeric=True) for head in models.values()),
+        Column("verdict"),
+        Column("evidence", wide=True),
+    )
+    bodies = tuple(body([row_of(row, tuple(models)) for row in found], where) for where, found in places.items())
+    numbers = Table("What the paper prints, and what its equations give", columns, bodies, wordy=True)
+    return Section("paper-numbers", "The paper’s numbers", (numbers,))
+
+
+def paper_numbers(results: Results) -> Sequence[Mapping[str, Any]]:
+    """The rows that `compare` made; none without it."""
+    rows: Sequence[Mapping[str, Any]] = (results.summary("compare") or {}).get("paper_numbers", ())
+    return rows
+
+
+def row_of(row: Mapping[str, Any], models: Sequence[str]) -> list[str | Cell]:
+    """A number of the paper as a row."""
+    quantity = in_signs(f"{row['quantity']}{unit_of(row)}")
+    verdict = str(row["verdict"])
+    values = [shown(row, key) for key in ("printed", *models)]
+    return [quantity, *values, Cell(verdict, TONES.get(verdict, "plain")), in_signs(str(row["evidence"]))]
+
+
+def unit_of(row: Mapping[str, Any]) -> str:
+    """The unit of a number in brackets; empty for a pure number."""
+    unit = str(row.get("unit") or "")
+    if unit == "not given":
+        return " (unit not given)"
+    return f" ({unit})" if unit not in ("", "1") else ""
+
+
+def shown(row: Mapping[str, Any], key: str) -> str:
+    """A value of a row: as its text says, or as a number."""
+    value = row.get(f"{key}_text", row.get(key))
+    if value is None or value == "":
+        return NONE
+    return in_signs(value) if isinstance(value, str) else number(float(value), 5)

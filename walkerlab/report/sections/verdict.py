@@ -1,0 +1,120 @@
+"""The verdict, first of all: what has no answer, how the walkers fared, and what of the paper stands."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from walkerlab.report.blocks import Block, Finding, Findings, Paragraph, Section, Shares
+from walkerlab.report.numbers import count, listed
+from walkerlab.report.outcomes import MODELS, finding
+from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
+from walkerlab.report.symbols import in_signs
+
+HEADLINES = {
+    "A.5 row 2": "The equations of motion have a sign error",
+    "eq. 11": "The paper’s gait is that of the misprinted equations",
+    "Table 3, step periods": "The two steps of a cycle are equal",
+    "Table 3, velocity": "The walker is much faster than printed",
+    "Table 2, ADAMS start": "The raised velocities do not start a gait",
+    "Fig. 8": "The models do not agree to 10⁻⁴",
+    "section 4, Fig. 4b": "The contact’s numbers are meant in N, mm and s",
+}
+"""The errata that matter most, by how their place begins, and what they come to in a few words."""
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def section(results: Results) -> Section:
+    """What a reader should know who reads no further."""
+    blocks: list[Block] = [Paragraph(failure, "bad") for failure in failures(results)]
+    walks = [found for stage in MODELS if (found := finding(results, stage)) is not None]
+    if walks:
+        blocks.append(Findings(tuple(sorted(walks, key=lambda walk: walk.tone == "good"))))
+    rows = paper_numbers(results)
+    if rows:
+        blocks += of_the_paper(results, rows)
+    elif not blocks:
+        blocks.append(Paragraph("There are no results to judge."))
+    return Section("verdict", "Verdict", tuple(blocks))
+
+
+def failures(results: Results) -> list[str]:
+    """What has no answer, and what is missing for that reason."""
+    return [failure(results, absent) for absent in results.absent if absent.failed]
+
+
+def failure(results: Results, absent: Absent) -> str:
+    """Why a stage has no answer, and which others have none for that reason."""
+    lost = [other.what for other in results.absent if not other.failed and absent.why in other.why]
+    without = f" What needs it is left out: {listed(lost)}." if lost else ""
+    return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
+
+
+def of_the_paper(results: Results, rows: Rows) -> list[Block]:
+    """How the paper's numbers fared, and its gravest errors."""
+    summary = results.summary("compare") or {}
+    blocks: list[Block] = []
+    departures = summary.get("departures")
+    if departures:
+        differs = in_signs("; ".join(str(departure) for departure in departures))
+        said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
+        blocks.append(Paragraph(said, "fair"))
+    blocks += [shares(rows), Findings(by_verdict(rows))]
+    gravest = headlines(results)
+    if gravest:
+        blocks += [Paragraph("What is behind it, measured on the paper’s own walker:"), Findings(gravest)]
+    return blocks
+
+
+def shares(rows: Rows) -> Shares:
+    """How many numbers came out in which way."""
+    verdicts = Counter(str(row["verdict"]) for row in rows)
+    parts = [(name, verdicts[name], TONES.get(name, "plain")) for name in dict.fromkeys([*TONES, *verdicts])]
+    title = f"Of {count(len(rows), 'number')} that the paper prints"
+    return Shares(title, tuple(part for part in parts if part[1]))
+
+
+def by_verdict(rows: Rows) -> tuple[Finding, ...]:
+    """Which numbers fared how, by where they stand."""
+    all_there = Counter(str(row["where"]) for row in rows)
+    found = []
+    for verdict, tone in TONES.items():
+        here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
+        if here:
+            said = "; ".join(share(where, here[where], all_there[where]) for where in here)
+            found.append(Finding(verdict.capitalize(), f"{said}. {MEANINGS[verdict]}", tone=tone))
+    return tuple(found)
+
+
+MEANINGS = {
+    "reproduced": "They come out to the printed digits; parameters that are used as printed are among them.",
+    "explained": "They do not come out, or not by themselves, and what was measured says why.",
+    "refuted": "They contradict what was measured, or the paper’s own numbers.",
+}
+"""What a verdict says."""
+
+
+def share(where: str, some: int, every: int) -> str:
+    """How many of the numbers of one place."""
+    if some == every:
+        return where if every == 1 else f"{where} (all {every})"
+    return f"{where} ({some} of {every})"
+
+
+def headlines(results: Results) -> tuple[Finding, ...]:
+    """The gravest errata that were found, with what was measured for them."""
+    errata: Rows = (results.summary("compare") or {}).get("errata", ())
+    found = []
+    for start, words in HEADLINES.items():
+        found += [headline(words, erratum) for erratum in errata if str(erratum["where"]).startswith(start)]
+    return tuple(found)
+
+
+def headline(words: str, erratum: Mapping[str, Any]) -> Finding:
+    """An erratum in sentences."""
+    parts = {"Printed": "printed", "Right": "right", "Why": "evidence", "Measured": "measured"}
+    text = " ".join(f"{label}: {erratum[name]}." for label, name in parts.items())
+    return Finding(in_signs(f"{words} ({erratum['where']})"), in_signs(text), tone="fair")

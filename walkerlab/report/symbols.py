@@ -1,0 +1,44 @@
+"""Formulas written in plain letters, as results hold them, in the signs that a reader expects."""
+
+from __future__ import annotations
+
+import re
+
+LETTERS = {"theta": "θ", "omega": "ω", "phi": "φ", "mu": "μ", "lambda": "λ"}
+SUBSCRIPTS = str.maketrans("0123456789+-aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉₊₋ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ")
+SUPERSCRIPTS = str.maketrans("0123456789+-en", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ᵉⁿ")
+DOT = "\u0307"
+
+RULES = (
+    (
+        re.compile(r"\bd(theta|omega|phi)_(\d)\b"),
+        lambda found: f"{LETTERS[found[1]]}{DOT}{found[2].translate(SUBSCRIPTS)}",
+    ),
+    (re.compile(r"\b(theta|omega|phi|mu|lambda)(?:_(\d))?\b"), lambda found: letter(found[1], found[2])),
+    (re.compile(r"\b([A-Za-z])_(\d+|[ape])\b"), lambda found: found[1] + found[2].translate(SUBSCRIPTS)),
+    (re.compile(r"\^(-?\d+|[en])\b"), lambda found: found[1].translate(SUPERSCRIPTS)),
+    (re.compile(r"\b(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b"), lambda found: f"{found[1]} × 10{exponent(found[2], found[3])}"),
+    (re.compile(r"\+-"), lambda _: "±"),
+    (re.compile(r"(?<![\w)\]-])-(?=[\w.(])|(?<= )-(?= )"), lambda _: "−"),
+)
+"""Patterns and what they become, applied in this order."""
+
+
+def in_signs(text: str) -> str:
+    """The text with Greek letters, subscripts, exponents and minus signs for their plain spellings.
+
+    'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'; hyphens and ranges stay what they are.
+    """
+    for pattern, sign in RULES:
+        text = pattern.sub(sign, text)
+    return text
+
+
+def letter(name: str, index: str | None) -> str:
+    """A Greek letter with its index."""
+    return LETTERS[name] + (index or "").translate(SUBSCRIPTS)
+
+
+def exponent(sign: str, digits: str) -> str:
+    """A power of ten in superscript."""
+    return f"{sign.strip('+')}{digits}".translate(SUPERSCRIPTS)
