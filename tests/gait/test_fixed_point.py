@@ -30,7 +30,7 @@ def shooting(walker):
     return new_shooting(walker, method, finder_for(method, SIGNALS))
 
 
-# science notes, section 4: two independent prototypes
+# from two other integrations of the same equations
 KNOWN = {
     1.0: ((-0.2044455, 0.1695390, -0.6057394, -0.8617140), 0.7036485, 0.3718088, 0.36256 + 0.46032j, 0.21568),
     3.0: ((-0.3233886, 0.2186688, -0.3773739, -1.0923836), 0.7343464, 0.5354454, -0.19973 + 0.54448j, 0.13157),
@@ -143,6 +143,13 @@ def test_no_gait_where_the_ground_would_have_to_pull():
     assert search.gait is None
     assert "pull" in search.reason
     assert all(gait.objections for gait in search.gaits)
+
+
+def test_at_fifteen_degrees_what_repeats_itself_cannot_be_walked():
+    search = find_gaits(on_slope(15.0))
+    assert search.gait is None
+    assert {gait.found_by[0] for gait in search.gaits} == {SHORT_PERIOD, LONG_PERIOD}
+    assert all(any("grows" in objection for objection in gait.objections) for gait in search.gaits)
 
 
 def test_no_gait_for_an_impossible_walker():

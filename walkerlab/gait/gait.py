@@ -13,6 +13,9 @@ from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.physics.system import State
 
 
+FASTEST_GROWTH = 10.0  # spectral radius beyond which rounding alone ends a walk within a few strides
+
+
 @dataclass(frozen=True)
 class Gait:
     """A fixed point of the step map, SI units."""
@@ -41,12 +44,14 @@ class Gait:
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """What the gait demands that no ground can give; empty if it can be walked."""
+        """Why nobody walks this gait: what no ground can give, or a disturbance that at once takes over; else empty."""
         found = []
         if self.min_normal_force < 0.0:
             found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
         if self.state[2] + self.state[3] > 0.0:
             found.append("the foot behind would have to leave through the ground")
+        if self.spectral_radius > FASTEST_GROWTH:
+            found.append(f"a disturbance grows {self.spectral_radius:.3g}-fold every step, so that no walker stays on it")
         return tuple(found)
 
 
