@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.report.blocks import Finding, Tone
-from walkerlab.report.numbers import count, length, quantity, span, whole
+from walkerlab.report.numbers import count, length, number, quantity, span, whole
 from walkerlab.report.results import Results
 
 RIGID, CONTACT = "simulate", "contact-sim"
@@ -68,13 +68,16 @@ def end_sentence(results: Results, stage: str) -> str:
             height = float(trajectory["hip_height_m"][-1])
     if end is None:
         return ""
-    where = "" if height is None else f", with the hip {quantity(height, 'm', 3)} above the slope"
+    where = "" if height is None else f"; the last sample has the hip {quantity(height, 'm', 3)} above the slope"
     return f"The walk ended at {quantity(end, 's', 4)}{where}."
 
 
-def fall(config: Config, _summary: Mapping[str, Any]) -> list[str]:
-    """The height at which a walker counts as fallen."""
-    return [f"A walker has fallen when its hip is below {quantity(0.5 * config.walker.leg_length_m, 'm')}."]
+def fall(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+    """Whether the ground threw it."""
+    ratio = summary.get("damping_ratio")
+    if ratio is None or ratio >= 1.0:
+        return []
+    return [f"The contact is under-damped, with a damping ratio of {number(ratio, 2)}: feet bounce on it."]
 
 
 def lift(_config: Config, summary: Mapping[str, Any]) -> list[str]:

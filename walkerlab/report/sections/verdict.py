@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import Block, Finding, Findings, Paragraph, Section, Shares
-from walkerlab.report.numbers import count, listed
+from walkerlab.report.numbers import count, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, finding
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
@@ -30,9 +30,9 @@ Rows = Sequence[Mapping[str, Any]]
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
     blocks: list[Block] = [Paragraph(failure, "bad") for failure in failures(results)]
-    walks = [found for stage in MODELS if (found := finding(results, stage)) is not None]
-    if walks:
-        blocks.append(Findings(tuple(sorted(walks, key=lambda walk: walk.tone == "good"))))
+    fared = [found for found in (*(finding(results, stage) for stage in MODELS), gait(results)) if found is not None]
+    if fared:
+        blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad"))))
     rows = paper_numbers(results)
     if rows:
         blocks += of_the_paper(results, rows)
@@ -51,6 +51,19 @@ def failure(results: Results, absent: Absent) -> str:
     lost = [other.what for other in results.absent if not other.failed and absent.why in other.why]
     without = f" What needs it is left out: {listed(lost)}." if lost else ""
     return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
+
+
+def gait(results: Results) -> Finding | None:
+    """The periodic gait in a sentence; None if there is none."""
+    summary = results.summary("fixedpoint")
+    if summary is None:
+        return None
+    size = f"{quantity(summary['period_s'], 's')} and {quantity(summary['step_length_m'], 'm')}"
+    factor = number(summary["spectral_radius"], 3)
+    text = f"Its steps take {size}; a small disturbance is in the long run multiplied by {factor} a step."
+    if summary["stable"]:
+        return Finding("Periodic gait", text, "stable", "good")
+    return Finding("Periodic gait", text, "unstable", "fair")
 
 
 def of_the_paper(results: Results, rows: Rows) -> list[Block]:
@@ -85,7 +98,7 @@ def by_verdict(rows: Rows) -> tuple[Finding, ...]:
         here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
         if here:
             said = "; ".join(share(where, here[where], all_there[where]) for where in here)
-            found.append(Finding(verdict.capitalize(), f"{said}. {MEANINGS[verdict]}", tone=tone))
+            found.append(Finding(verdict.capitalize(), f"{said[:1].upper()}{said[1:]}. {MEANINGS[verdict]}", tone=tone))
     return tuple(found)
 
 
