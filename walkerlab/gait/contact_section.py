@@ -46,7 +46,7 @@ class SectionStep:
     DP: Floats  # (6, 6) its derivative
     period_s: float
     length_m: float  # how far the walker went
-    slip_m: float  # of the foot that stood first
+    slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
     books_J: Floats  # (3,) dissipated by damping, by friction, at edges  # noqa: N815 (a unit's capital)
     height_lost_J: float  # potential energy given up  # noqa: N815
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
@@ -106,6 +106,7 @@ def step_from_section(
     finder = finder_for(method, SIGNALS)
     outcome = Outcome(walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1))
     end = method.y.copy()
+    landed = feet_motion(walker, tuple(end.tolist()))[1 - stance].along - ledger.foothold[1 - stance]
     DP = section_derivative(walker, ledger, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
@@ -115,7 +116,7 @@ def step_from_section(
         DP,
         float(method.clock[T]),
         float(end[ALONG] - start[ALONG]),
-        float(ledger.slip[0]),
+        float(ledger.slip[0] + landed),
         observer.books.copy(),
         float(lost),
         method.counts[:4].copy(),
@@ -173,26 +174,27 @@ def find_contact_gait(
     z: Any,
     pitch_m: float,
     tolerance: float = 1e-10,
-    most_iterations: int = 40,
+    most_steps: int = 60,
 ) -> ContactGait | SectionStep:
     """Newton on the step map with its exact derivative, from section coordinates z (6,).
 
-    pitch_m  the pads' pitch to begin with; each iteration lays them for the step it has just taken
+    pitch_m     the pads' pitch to begin with; each iteration lays them for the step it has just taken
+    most_steps  how many steps may be walked in search of it
 
     Returns the gait, or the last step that could be walked if no gait is near.
     """
     z = np.asarray(z, float).copy()
     step = step_from_section(walker, ground, methods, z, pitch_m, booked=True)
-    for iteration in range(most_iterations):
-        if step.outcome is not Outcome.WALKED:
-            return step
+    iteration, walked = 0, 1
+    while step.outcome is Outcome.WALKED and walked < most_steps:
         residual = float(np.max(np.abs(step.z - z)))
         if residual <= tolerance:
-            multipliers = np.linalg.eigvals(step.DP)
+            multipliers = np.linalg.eigvals(step.DP).astype(np.complex128)
             order = np.argsort(-np.abs(multipliers), kind="stable")
             return ContactGait(z, step, multipliers[order], residual, iteration)
         move = np.linalg.solve(np.eye(COORDINATES) - step.DP, step.z - z)
-        z, step = damped(walker, ground, methods, z, move, residual, step)
+        z, step, tried = damped(walker, ground, methods, z, move, residual, step)
+        iteration, walked = iteration + 1, walked + tried
     return step
 
 
@@ -204,13 +206,17 @@ def damped(
     move: Floats,
     residual: float,
     step: SectionStep,
-) -> tuple[Floats, SectionStep]:
-    """Take Newton's move, halved until the next step is walked and its residual is no worse than double."""
-    scale = 1.0
+) -> tuple[Floats, SectionStep, int]:
+    """Take Newton's move, halved until the next step is walked and its residual is no worse than double.
+
+    Returns the new coordinates, the step from there, and how many steps were walked to find them.
+    """
+    scale, tried = 1.0, 0
     while True:
+        tried += 1
         candidate = z + scale * move
         ahead = step_from_section(walker, ground, methods, candidate, step.length_m, booked=True)
         fine = ahead.outcome is Outcome.WALKED and float(np.max(np.abs(ahead.z - candidate))) < 2.0 * residual
         if fine or scale < 1e-3:
-            return candidate, ahead
+            return candidate, ahead, tried
         scale *= 0.5

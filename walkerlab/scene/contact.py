@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from walkerlab.gait.contact_gait import GaitAnswer, find_gait_from
+from walkerlab.gait.contact_run import Ground, MethodSettings
 from walkerlab.gait.contact_signals import Frame
 from walkerlab.physics.contact.compass import (
     STANCE_FOOT,
@@ -21,9 +23,13 @@ from walkerlab.physics.contact.pinned import Pinned, floating_state
 from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
 from walkerlab.physics.contact.walker import ContactWalker
 from walkerlab.physics.system import State
+from walkerlab.solvers.registry import method_named
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import CompassWalker, Config, Contact
+
+GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-9, 1e-11  # the tangent is exact for this method
+GAIT_BUDGET = 10_000_000  # right-hand sides
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,11 @@ class ContactScene:
     pinned: Pinned | None  # the hinged first step, if the config wants one
     pitch_m: float
     left_out: tuple[dict[str, str], ...]
+
+    @property
+    def ground(self) -> Ground:
+        """What a walk happens on and is judged by."""
+        return Ground(self.terrain, self.frame)
 
 
 def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
@@ -50,9 +61,7 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     parts = compass_parts(config.walker)
     assembly = compass_assembly(parts)
-    walker = contact_walker(
-        assembly, normal_law(contact), friction_law(contact), config.gravity_m_s2, config.slope_rad
-    )
+    walker = contact_walker(assembly, normal_law(contact), friction_law(contact), config.gravity_m_s2, config.slope_rad)
     hip = centre_to(assembly, "leg 2", (0.0, 0.0))
     frame = Frame(
         leg_length=parts.leg_length_m,
@@ -62,8 +71,23 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
         locate_joins=True,
     )
     terrain = Checkerboard(pitch, (-pitch, 0.0)) if contact.terrain == "checkerboard" else AfterMidSwing(pitch)
-    pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
+    pinned = hinged_walker(config, walker) if contact.stance == "pinned" else None
     return ContactScene(walker, terrain, frame, pinned, pitch, left_out(config, contact))
+
+
+def hinged_walker(config: Config, walker: ContactWalker) -> Pinned:
+    """The walker with a revolute joint at its first stance foot."""
+    return pinned_walker(compass_assembly(compass_parts(config.walker)), walker, STANCE_FOOT, 0.0)
+
+
+def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+    """The contact model's own gait on pads of its own step length, searched for from a rigid start state.
+
+    rigid_step_length_m  what the pads are laid for to begin with
+    """
+    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
+    methods = MethodSettings(method_named(GAIT_METHOD), GAIT_RTOL, GAIT_ATOL, GAIT_BUDGET)
+    return find_gait_from(scene.walker, scene.ground, methods, start_state(scene, rigid_state))
 
 
 def compass_parts(walker: CompassWalker) -> CompassParts:

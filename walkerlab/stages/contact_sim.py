@@ -12,7 +12,6 @@ from walkerlab.errors import NoAnswer
 from walkerlab.gait.contact_run import (
     ContactSamples,
     ContactWalkResult,
-    Ground,
     MethodSettings,
     sampled_energies,
     sampled_feet,
@@ -20,7 +19,7 @@ from walkerlab.gait.contact_run import (
 )
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.terrain import Checkerboard
-from walkerlab.scene.contact import ContactScene, contact_scene, scene_measures, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -33,7 +32,7 @@ TIME, LEG = "time", "leg"
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Walk `config.strides` strides on compliant ground; raises NoAnswer if the solver gives none."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    scene = contact_scene(config, rigid_step)
+    scene = contact_scene(config, rigid_step, own_pitch(config, rigid_step, rigid_state))
     settings = config.solver.contact
     methods = MethodSettings(
         method_named(settings.method), settings.rtol, settings.atol, 2 * config.strides * BUDGET_PER_STEP
@@ -43,7 +42,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     progress.start("contact-sim", 1)
     result = walk_contact(
         scene.walker,
-        Ground(scene.terrain, scene.frame),
+        scene.ground,
         scene.pinned,
         STANCE_FOOT,
         start_state(scene, rigid_state),
@@ -55,7 +54,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     content = Content(groups(config, scene, result), summary(scene, result))
     if not result.outcome.answered:
         raise NoAnswer(
-            f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps at t = {result.end_time_s:.4g} s",
+            f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
             result.outcome.advice,
             partial=content,
         )
@@ -73,6 +72,17 @@ def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, t
         raise ValueError("neither a start state nor a fixed point")
     state = tuple(float(x) for x in given)
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
+
+
+def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
+    """Step length (m) of the contact gait, if the pads are laid for it; raises NoAnswer if there is no such gait."""
+    contact = config.contact
+    if contact is None or contact.pad_pitch != "own" or contact.terrain != "checkerboard":
+        return None
+    answer = contact_gait(config, rigid_step, rigid_state)
+    if answer.gait is None:
+        raise NoAnswer(f"contact-sim: no contact gait to lay the pads for: {answer.reason}", answer.advice)
+    return answer.gait.step.length_m
 
 
 def summary(scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
@@ -160,7 +170,9 @@ def trajectory_group(config: Config, scene: ContactScene, samples: ContactSample
             "penetration_m": Variable(depth, per_leg, "m", "depth of the foot in the ground that carries it"),
             "normal_force_N": Variable(feet[:, :, 2], per_leg, "N", "normal force of the ground on the foot"),
             "friction_force_N": Variable(feet[:, :, 3], per_leg, "N", "friction on the foot, positive downhill"),
-            "slip_velocity_m_s": Variable(feet[:, :, 4], per_leg, "m/s", "velocity of the foot's lowest material point"),
+            "slip_velocity_m_s": Variable(
+                feet[:, :, 4], per_leg, "m/s", "velocity of the foot's lowest material point"
+            ),
         }
     return Group(variables)
 
