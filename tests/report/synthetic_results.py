@@ -162,11 +162,9 @@ def compare(rows=PAPER_ROWS):
             "measured": texts(["energy drifts by 0.13 J"], "row"),
         }
     )
-    found = [{name: errata[name][0] for name in errata.variables}]
     numbers = {"raw": 0.11, "aligned": 0.017, "per_leg": {"raw": [0.1, 0.11]}}
     summary = {
         "paper_numbers": rows,
-        "errata": found,
         "table1": {"L": {"quantity": "length", "unit": "m", "paper": 1.0, "used": 1.0, "where": "Table 1"}},
         "table3": {"t_left": {"unit": "s", "paper_matlab": 0.6, "as_printed": None, "corrected": 0.7036}},
         "max_angle_error_rad": numbers,

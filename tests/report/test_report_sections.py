@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from walkerlab.report.blocks import Code, Findings, Paragraph, Player, Section, 
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections.verdict import HEADLINES
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
@@ -152,8 +155,13 @@ def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
     assert "energy drifts by 0.13 J" in error.text
 
 
+def test_every_headline_is_of_an_erratum_that_is_looked_for():
+    places = Path(find_spec("walkerlab.gait.paper").submodule_search_locations[0]) / "errata.py"
+    assert [start for start in HEADLINES if f'"{start}' not in places.read_text()] == []
+
+
 def test_a_scene_that_is_not_the_papers_is_said_before_its_numbers_are_judged():
-    other = stored("compare", {}, {**compare().summary, "departures": ["slope_rad 0.05"]})
+    other = stored("compare", compare().groups, {**compare().summary, "departures": ["slope_rad 0.05"]})
     (said,) = blocks(sections([], compare=other)["verdict"], Paragraph)[:1]
     assert "slope_rad 0.05" in said.text
     assert said.tone == "fair"

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from walkerlab.report.numbers import NONE
+
 Tone = Literal["plain", "good", "fair", "bad"]
 
 
@@ -67,6 +69,11 @@ class Cell:
 
     text: str
     tone: Tone | None = None
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to say."""
+        return self.text in ("", NONE)
 
 
 @dataclass(frozen=True)

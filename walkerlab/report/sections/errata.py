@@ -18,11 +18,19 @@ COLUMNS = {
 
 def section(results: Results) -> Section | None:
     """The errata, each with what it was measured by."""
-    group = results.group("compare", "errata")
-    if group is None:
+    rows = [[in_signs(erratum[name]) for name in COLUMNS] for erratum in errata(results)]
+    if not rows:
         return None
-    kept = {name: head for name, head in COLUMNS.items() if name in group.variables}
-    columns = [Column(head, wide=index > 0) for index, head in enumerate(kept.values())]
-    rows = [[in_signs(str(text)) for text in row] for row in zip(*(group[name].tolist() for name in kept), strict=True)]
+    columns = [Column(head, wide=index > 0) for index, head in enumerate(COLUMNS.values())]
     found = table("What is printed, and what is right", columns, rows, wordy=True)
     return Section("errata", "Errata of the paper", (found,))
+
+
+def errata(results: Results) -> list[dict[str, str]]:
+    """The errata that `compare` found, by the names of their parts; none without it."""
+    group = results.group("compare", "errata")
+    if group is None:
+        return []
+    return [
+        dict(zip(COLUMNS, row, strict=True)) for row in zip(*(group[name].tolist() for name in COLUMNS), strict=True)
+    ]

@@ -10,6 +10,7 @@ from walkerlab.report.blocks import Block, Finding, Findings, Paragraph, Section
 from walkerlab.report.numbers import count, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, finding
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections.errata import errata
 from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
 from walkerlab.report.symbols import in_signs
 
@@ -119,14 +120,16 @@ def share(where: str, some: int, every: int) -> str:
 
 def headlines(results: Results) -> tuple[Finding, ...]:
     """The gravest errata that were found, with what was measured for them."""
-    errata: Rows = (results.summary("compare") or {}).get("errata", ())
-    found = []
-    for start, words in HEADLINES.items():
-        found += [headline(words, erratum) for erratum in errata if str(erratum["where"]).startswith(start)]
-    return tuple(found)
+    found = errata(results)
+    return tuple(
+        headline(words, erratum)
+        for start, words in HEADLINES.items()
+        for erratum in found
+        if erratum["where"].startswith(start)
+    )
 
 
-def headline(words: str, erratum: Mapping[str, Any]) -> Finding:
+def headline(words: str, erratum: Mapping[str, str]) -> Finding:
     """An erratum in sentences."""
     parts = {"Printed": "printed", "Right": "right", "Why": "evidence", "Measured": "measured"}
     text = " ".join(f"{label}: {erratum[name]}." for label, name in parts.items())
