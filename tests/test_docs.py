@@ -1,0 +1,70 @@
+"""README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
+
+import re
+import runpy
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from walkerlab.cli.main import program
+from walkerlab.stages.graph import PIPELINE
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+MAKER = runpy.run_path(str(ROOT / "scripts" / "refresh_docs.py"))
+LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+COMMAND = re.compile(r"\bwalkerlab (?:[a-z-]+)(?: [^`&|\n#]*)?")
+ANSWER_AT_ONCE = ("status", "show", "schema")
+BUG, USAGE, BAD_CONFIG = 1, 2, 3
+
+
+def text_of(path):
+    return path.read_text(encoding="utf-8")
+
+
+def code_in(path):
+    """What stands in backticks or in a fenced block."""
+    text = text_of(path)
+    yield from re.findall(r"^ *```[a-z]*\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE)
+    yield from re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text)
+
+
+def commands():
+    names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean"}
+    found = {command.strip() for path in DOCUMENTS for code in code_in(path) for command in COMMAND.findall(code)}
+    return sorted(command for command in found if shlex.split(command)[1] in names)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_to_files_that_are_there(path):
+    relative = [link for link in LINK.findall(text_of(path)) if "://" not in link]
+    assert [link for link in relative if not (path.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("command", commands())
+def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.yaml").write_text("extends: paper\n", encoding="utf-8")
+    stands_for = {"STAGE": "fixedpoint", "FILE": "my.yaml"}
+    words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
+    dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
+    done = CliRunner().invoke(program(), [*words, *dry])
+    assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory):
+    return MAKER["Results"](tmp_path_factory.mktemp("runs"))
+
+
+@pytest.mark.parametrize("name", MAKER["DOCUMENTS"])
+def test_tables_are_what_the_tool_gives(name, results):
+    text = text_of(ROOT / name)
+    assert MAKER["refreshed"](text, results) == text, "run: python scripts/refresh_docs.py"
+
+
+def test_every_part_has_a_maker_and_a_place():
+    placed = [part for name in MAKER["DOCUMENTS"] for _, part, _, _ in MAKER["PART"].findall(text_of(ROOT / name))]
+    assert sorted(placed) == sorted(MAKER["PARTS"])

@@ -1,0 +1,55 @@
+"""README's promises: its commands are those that are checked from empty environments."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import walkerlab
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CHECK = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+
+
+def test_the_first_block_is_installation_and_report():
+    assert BLOCKS[0].strip() == "pip install . && walkerlab report"
+
+
+def test_the_second_block_is_installation_and_tests():
+    assert BLOCKS[1].strip() == "pip install '.[test]' && pytest"
+
+
+def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
+    parts = re.findall(r'^ +part \d+ "README: [^"]+" (.*)$', CHECK, re.MULTILINE)
+    assert " && ".join(parts[-2:]) == BLOCKS[0].strip()
+    between = CHECK[CHECK.index(parts[-2]) : CHECK.index(parts[-1])]
+    assert 'mkdir "$scratch/empty"' in between
+    assert 'cd "$scratch/empty"' in between
+
+
+def test_the_check_runs_the_second_command_to_the_letter():
+    assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
+    assert 'part 900 "README: test" bash -euc "$readme_test"' in CHECK
+
+
+def test_the_check_names_no_place_to_install_from():
+    assert not re.search(r"https?://|index-url|--extra-index|--find-links", CHECK)
+
+
+def test_versions_agree():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["version"] == walkerlab.__version__
+    assert f"## {walkerlab.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_least_python_is_the_one_that_is_promised():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["requires-python"] == ">=3.11"
+    assert "Python 3.11 or newer" in README
+
+
+def test_the_picture_is_small():
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
+    assert pictures
+    assert all((ROOT / picture).stat().st_size < 300_000 for picture in pictures)
