@@ -107,10 +107,62 @@ def multipliers(pairs: Sequence[Sequence[float]]) -> str:
     return ", ".join([*double, *real])
 
 
+COLUMNS = ("paper_matlab", "as_printed", "corrected", "paper_adams", "contact")
+START_ROWS = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+RESULT_ROWS = {
+    "t_left": "left step, t_left (s)",
+    "t_right": "right step, t_right (s)",
+    "v_com": "speed, v_com (m/s)",
+    "E_avg": "mean energy, E_avg (J)",
+}
+
+
+def paper_and_ours(results: Results) -> str:
+    """What the paper prints beside what the tool computes: starts, steps, stability."""
+    compared, walk = results.summary("compare"), results.summary("contact-sim")
+    table_2, table_3 = compared["table2"], compared["table3"]
+    rows = [
+        beside(f"start {name} ({table_2[name]['unit']})", table_2[name], 2 if name.startswith("d") else 4)
+        for name in START_ROWS
+    ]
+    rows += [beside(title, table_3[name], 4 if name == "v_com" else 2) for name, title in RESULT_ROWS.items()]
+    gaits = results.summary("fixedpoint")["equation_sets"]
+    lengths = [f"{gaits[name]['step_length_m']:.4f}" for name in ("as-printed", "corrected")]
+    radii = [f"{gaits[name]['spectral_radius']:.3f}" for name in ("as-printed", "corrected")]
+    rows.insert(6, ["step length (m)", "0.0342", *lengths, "", f"{walk['step_lengths_m'][-1]:.4f}"])
+    rows.append(["largest multiplier", "below 1", *radii, "", ""])
+    rows.append(["slip of the stance foot a step (mm)", "0", "0", "0", "", f"{1e3 * walk['slip_per_step_m']:.2f}"])
+    rows.append(["steps walked of those asked for", "", "", "", "", f"{walk['steps']}, {walk['outcome']}"])
+    head = ["", "paper: MATLAB", "rigid, as printed", "rigid, corrected", "paper: ADAMS", "contact as in ADAMS"]
+    return table(head, rows)
+
+
+def beside(title: str, row: dict[str, Any], printed_digits: int) -> list[str]:
+    """A row of the paper's tables: its own columns with the digits it prints, ours with four."""
+    cells = [number(row[name], printed_digits if name.startswith("paper") else 4) for name in COLUMNS]
+    return [title, *cells]
+
+
+def errata(results: Results) -> str:
+    """The paper's errata."""
+    rows = [
+        [cell(entry[name]) for name in ("where", "printed", "right", "evidence")]
+        for entry in results.summary("compare")["errata"]
+    ]
+    return table(["where", "printed", "right", "because"], rows)
+
+
+def cell(text: str) -> str:
+    """A text that may stand in a table's cell."""
+    return text.replace("|", "\\|").replace("*", "\\*")
+
+
 PARTS: dict[str, Callable[[Results], str]] = {
     "stages": stages,
     "config-keys": config_keys,
     "gaits": gaits,
+    "paper-and-ours": paper_and_ours,
+    "errata": errata,
 }
 
 
