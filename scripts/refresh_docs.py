@@ -108,33 +108,34 @@ def multipliers(pairs: Sequence[Sequence[float]]) -> str:
 
 
 COLUMNS = ("paper_matlab", "as_printed", "corrected", "paper_adams", "contact")
-START_ROWS = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-RESULT_ROWS = {
-    "t_left": "left step, t_left (s)",
-    "t_right": "right step, t_right (s)",
-    "v_com": "speed, v_com (m/s)",
-    "E_avg": "mean energy, E_avg (J)",
-}
+OURS = ("as_printed", "corrected", "contact")
+PRINTED_DIGITS = {"theta_1": 4, "theta_2": 4, "dtheta_1": 2, "dtheta_2": 2}
 
 
 def paper_and_ours(results: Results) -> str:
-    """What the paper prints beside what the tool computes: starts, steps, stability."""
+    """What the paper prints beside what the tool computes: starts, steps, energy, stability, slip."""
     compared, walk = results.summary("compare"), results.summary("contact-sim")
-    table_2, table_3 = compared["table2"], compared["table3"]
+    starts, ends = compared["table2"], compared["table3"]
+    single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
     rows = [
-        beside(f"start {name} ({table_2[name]['unit']})", table_2[name], 2 if name.startswith("d") else 4)
-        for name in START_ROWS
+        *(beside(f"start {name} ({starts[name]['unit']})", starts[name], PRINTED_DIGITS[name]) for name in starts),
+        beside("left step, t_left (s)", ends["t_left"], 2),
+        beside("right step, t_right (s)", ends["t_right"], 2),
+        printed_once("step length (m)", single["length of one complete step"]),
+        beside("speed, v_com (m/s)", ends["v_com"], 4),
+        beside("mean energy, E_avg (J)", ends["E_avg"], 2),
+        printed_once("largest multiplier", single["largest eigenvalue of P of a stable gait"]),
+        ["slip of the stance foot in a step (mm)", *[""] * 4, number(1e3 * walk["slip_per_step_m"], 2)],
+        ["steps", *[""] * 4, f"{walk['steps']}, {walk['outcome']}"],
     ]
-    rows += [beside(title, table_3[name], 4 if name == "v_com" else 2) for name, title in RESULT_ROWS.items()]
-    gaits = results.summary("fixedpoint")["equation_sets"]
-    lengths = [f"{gaits[name]['step_length_m']:.4f}" for name in ("as-printed", "corrected")]
-    radii = [f"{gaits[name]['spectral_radius']:.3f}" for name in ("as-printed", "corrected")]
-    rows.insert(6, ["step length (m)", "0.0342", *lengths, "", f"{walk['step_lengths_m'][-1]:.4f}"])
-    rows.append(["largest multiplier", "below 1", *radii, "", ""])
-    rows.append(["slip of the stance foot a step (mm)", "0", "0", "0", "", f"{1e3 * walk['slip_per_step_m']:.2f}"])
-    rows.append(["steps walked of those asked for", "", "", "", "", f"{walk['steps']}, {walk['outcome']}"])
     head = ["", "paper: MATLAB", "rigid, as printed", "rigid, corrected", "paper: ADAMS", "contact as in ADAMS"]
     return table(head, rows)
+
+
+def printed_once(title: str, entry: dict[str, Any]) -> list[str]:
+    """A row of a number that the paper prints for both of its models in one."""
+    ours = {name: "" if entry[name] is None else number(entry[name], 4) for name in OURS}
+    return [title, entry["printed"], ours["as_printed"], ours["corrected"], entry["printed"], ours["contact"]]
 
 
 def beside(title: str, row: dict[str, Any], printed_digits: int) -> list[str]:

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from walkerlab.cli.main import program
+from walkerlab.config.loader import load
 from walkerlab.stages.graph import PIPELINE
 
 ROOT = Path(__file__).parent.parent
@@ -52,6 +53,15 @@ def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
     dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
     done = CliRunner().invoke(program(), [*words, *dry])
     assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
+
+
+@pytest.mark.parametrize(
+    "text", re.findall(r"^```yaml\n(.*?)^```$", text_of(ROOT / "README.md"), re.DOTALL | re.MULTILINE)
+)
+def test_a_documented_config_is_accepted(text, tmp_path):
+    path = tmp_path / "my.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert load(path, ()).config
 
 
 @pytest.fixture(scope="session")
