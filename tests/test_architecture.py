@@ -70,3 +70,8 @@ def test_compiled_functions_stand_where_the_cache_key_looks(path):
     names = set(imported_modules(path))
     assert "numba" not in names
     assert not names & {f"walkerlab.kernels.{name}" for name in COMPILING}
+
+
+def test_no_two_modules_of_tests_have_one_name():
+    names = [path.name for path in Path(__file__).parent.rglob("*.py")]
+    assert {name for name in names if names.count(name) > 1} <= {"conftest.py", "__init__.py"}

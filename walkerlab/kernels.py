@@ -92,6 +92,11 @@ def inlined(function: F) -> F:
     return cast(F, register_jitable(**PART_FLAGS)(function))
 
 
+def uncompiled(compiled: F) -> F:
+    """The Python function that a kernel was made of: the same source, for methods that are not compiled themselves."""
+    return cast(F, cast(Any, compiled).py_func)
+
+
 class ByType:
     """A function whose body is chosen by the type of its first argument, in Python and in compiled code alike."""
 

@@ -2,8 +2,8 @@
 
 from fractions import Fraction
 
-import appendix_a
 import numpy as np
+import numpy_walker
 import pytest
 from numpy.testing import assert_allclose
 
@@ -43,8 +43,8 @@ def found(study):
 @pytest.mark.parametrize(("name", "sign"), [("as_printed", 1.0), ("corrected", -1.0)])
 def test_energy_drift_is_that_of_another_integration(study, name, sign):
     model = getattr(study, name)
-    swing = appendix_a.swing(model.state, sign, SLOPE)
-    record = np.array([appendix_a.energy(swing.sol(t)) for t in np.linspace(0.0, swing.t[-1], 400)])
+    swing = numpy_walker.swing(model.state, sign, SLOPE)
+    record = np.array([numpy_walker.energy(swing.sol(t)) for t in np.linspace(0.0, swing.t[-1], 400)])
     assert model.energy_drift == pytest.approx(np.ptp(record), abs=1e-5)
     assert (model.energy_least, model.energy_most) == pytest.approx((record.min(), record.max()), abs=1e-5)
     assert swing.t[-1] == pytest.approx(model.table_3.t_left, abs=1e-9)
@@ -53,7 +53,7 @@ def test_energy_drift_is_that_of_another_integration(study, name, sign):
 @pytest.mark.parametrize(("name", "sign"), [("as_printed", 1.0), ("corrected", -1.0)])
 def test_fixed_points_come_back_after_a_step_of_another_integration(study, name, sign):
     model = getattr(study, name)
-    before = tuple(appendix_a.swing(model.state, sign, SLOPE).y[:, -1])
+    before = tuple(numpy_walker.swing(model.state, sign, SLOPE).y[:, -1])
     after = velocities_after_impact(walker_of_the_paper(CORRECTED), before, RIGHT)
     assert_allclose((before[1], before[0], after[1], after[0]), model.state, atol=1e-9)
 
@@ -93,7 +93,7 @@ def test_gradient_of_the_foot_is_its_difference(row_2):
 def test_foot_of_x_p_is_on_the_slope_only_with_the_right_row():
     walker, (theta_1, theta_2) = walker_of_the_paper(CORRECTED), (X_P[0].value, X_P[1].value)
     assert_allclose(
-        swing_foot(walker, theta_1, theta_2, RIGHT), appendix_a.positions((theta_1, theta_2))[3], atol=1e-15
+        swing_foot(walker, theta_1, theta_2, RIGHT), numpy_walker.positions((theta_1, theta_2))[3], atol=1e-15
     )
     assert abs(height_over_slope(walker, theta_1, theta_2, RIGHT)) < 1e-15
     assert abs(height_over_slope(walker, theta_1, theta_2, MISPRINTED)) > 0.01
@@ -109,8 +109,8 @@ def test_fixed_point_with_both_misprints_is_the_one_of_another_prototype():
 def test_inertia_of_the_impact_gives_the_masses_energy_for_angles_first(study):
     walker, rates = walker_of_the_paper(CORRECTED), np.array([-0.6, -0.84, 0.3, -0.2])
     q, h = np.array([-0.2022, 0.1674]), 1e-6
-    ahead = appendix_a.positions(q + h * rates[:2], h * rates[2:])[:3]
-    behind = appendix_a.positions(q - h * rates[:2], -h * rates[2:])[:3]
+    ahead = numpy_walker.positions(q + h * rates[:2], h * rates[2:])[:3]
+    behind = numpy_walker.positions(q - h * rates[:2], -h * rates[2:])[:3]
     kinetic = sum(
         0.5 * m * np.sum(((one - other) / (2 * h)) ** 2)
         for m, one, other in zip((5.0, 10.0, 5.0), ahead, behind, strict=True)
@@ -122,16 +122,16 @@ def test_inertia_of_the_impact_gives_the_masses_energy_for_angles_first(study):
 
 def test_adams_start_has_the_energy_of_its_masses(study):
     start = [row.adams.value for row in TABLE_2]
-    assert study.adams.energy == pytest.approx(appendix_a.energy(start), rel=1e-8)
+    assert study.adams.energy == pytest.approx(numpy_walker.energy(start), rel=1e-8)
     assert study.adams.energy > 1.4 * 150.14
 
 
 def test_the_ground_would_have_to_pull_on_the_adams_start(study):
     start = [row.adams.value for row in TABLE_2]
-    fall, h = appendix_a.fall(start, -1.0, longest=0.3), 1e-5
+    fall, h = numpy_walker.fall(start, -1.0, longest=0.3), 1e-5
 
     def normal_force(t):
-        force = (appendix_a.momentum(fall.sol(t + h)) - appendix_a.momentum(fall.sol(t - h))) / (2 * h)
+        force = (numpy_walker.momentum(fall.sol(t + h)) - numpy_walker.momentum(fall.sol(t - h))) / (2 * h)
         force += np.array([0.0, 20.0 * 9.81])
         return force @ [np.sin(study.adams.slope), np.cos(study.adams.slope)]
 

@@ -18,7 +18,7 @@ from walkerlab.gait.contact_walk import (
     walk_part,
 )
 from walkerlab.gait.outcome import Outcome
-from walkerlab.kernels import kernel
+from walkerlab.kernels import kernel, uncompiled
 from walkerlab.physics.contact.energy import book_energy, kinetic_energy, potential_energy
 from walkerlab.physics.contact.motion import OnGround
 from walkerlab.physics.contact.pinned import Pinned, floating_state
@@ -84,12 +84,20 @@ def walk_free(
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
     """
     system = OnGround(walker, (True, True))
-    return walk_part(system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after)
+    return walk_part(
+        system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after
+    )
 
 
 @kernel
 def walk_hinged(
-    pinned: Pinned, ground: Ground, method: Any, finder: CrossingFinder, observer: ContactObserver, ledger: Ledger, y: State
+    pinned: Pinned,
+    ground: Ground,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    y: State,
 ) -> int:
     """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
     return walk_part(
@@ -99,7 +107,7 @@ def walk_hinged(
 
 @kernel
 def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies: Any) -> None:
-    """Kinetic energy, potential energy and energy of the books (J) of every sampled state into energies (samples, 3)."""
+    """Kinetic, potential and book energy (J) of every sampled state into energies (samples, 3)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
         energies[i, 0] = kinetic_energy(walker, y)
@@ -109,7 +117,7 @@ def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies:
 
 @kernel
 def sampled_feet(walker: ContactWalker, states: Any, carried: Any, feet: Any) -> None:
-    """Position along and height (m), normal and friction force (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
+    """Position along, height (m), normal force, friction (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
         motions = feet_motion(walker, y)
@@ -130,7 +138,7 @@ class ContactSamples:
     states: Floats  # (samples, 8)
     carried: NDArray[np.int8]  # (samples, 2)
     stance: NDArray[np.int64]  # (samples,)
-    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges  # noqa: N815 (a unit's capital)
+    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges
 
 
 @dataclass(frozen=True)
@@ -144,8 +152,8 @@ class ContactWalkResult:
     end_time_s: float
     end_state: State
     max_penetration_m: float
-    energy_balance_residual_J: float  # noqa: N815
-    dissipated_J: Floats  # (3,)  # noqa: N815
+    energy_balance_residual_J: float
+    dissipated_J: Floats  # (3,)
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     samples: ContactSamples | None
 
@@ -171,8 +179,19 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
     at_zero = np.zeros(SIGNALS, np.int8)
     at_zero[[HEIGHT, PER_FOOT + HEIGHT]] = 1
     foothold = np.array([motion.along for motion in feet])
-    record = [np.zeros(steps) for _ in range(3)]
-    return Ledger(*record, carried, cells, cells.copy(), foothold, at_zero, np.zeros(2), np.array([stance, 0]))
+    touch_time, touch_along, slip = (np.zeros(steps) for _ in range(3))
+    return Ledger(
+        touch_time,
+        touch_along,
+        slip,
+        carried,
+        cells,
+        cells.copy(),
+        foothold,
+        at_zero,
+        np.zeros(2),
+        np.array([stance, 0]),
+    )
 
 
 def new_observer(
@@ -255,7 +274,7 @@ def run_parts(
         method = methods.new(len(pinned.blank))
         angles = len(pinned.tree.arm_x)
         hinged = (*start[2 : 2 + angles], *start[4 + angles :])
-        hinged_walk = walk_hinged if methods.method.compiled else walk_hinged.py_func
+        hinged_walk = walk_hinged if methods.method.compiled else uncompiled(walk_hinged)
         outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
@@ -263,7 +282,7 @@ def run_parts(
             return outcome, Stopped(t, y, spent)
     method = methods.new(len(walker.blank))
     ledger.times[AIRBORNE_SINCE] = t
-    free_walk = walk_free if methods.method.compiled else walk_free.py_func
+    free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
     outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
 

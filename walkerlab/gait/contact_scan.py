@@ -40,9 +40,7 @@ def sample(system: Any, scene: Scene, feet: Feet, state: State, node: int, finde
 @inlined
 def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
     """The first event of the sampled step."""
-    return earliest_crossing(
-        system, scene.walker, scene.frame, scene.watch_order, feet.carried, feet.at_zero, finder
-    )
+    return earliest_crossing(system, scene.walker, scene.frame, scene.watch_order, feet.carried, feet.at_zero, finder)
 
 
 @by_type

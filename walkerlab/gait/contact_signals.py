@@ -34,8 +34,8 @@ class Frame(NamedTuple):
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)
-    hip_x: tuple[float, float]  # m, lever of the hip from the centre of mass, body by body
-    hip_y: tuple[float, float]
+    hip_x: tuple[float, ...]  # m, lever of the hip from the centre of mass, body by body
+    hip_y: tuple[float, ...]
     locate_joins: bool  # end steps at the joins of the force law
 
 

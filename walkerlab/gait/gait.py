@@ -12,7 +12,6 @@ from walkerlab.gait.step_map import on_section
 from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.physics.system import State
 
-
 FASTEST_GROWTH = 10.0  # spectral radius beyond which rounding alone ends a walk within a few strides
 
 
@@ -51,7 +50,9 @@ class Gait:
         if self.state[2] + self.state[3] > 0.0:
             found.append("the foot behind would have to leave through the ground")
         if self.spectral_radius > FASTEST_GROWTH:
-            found.append(f"a disturbance grows {self.spectral_radius:.3g}-fold every step, so that no walker stays on it")
+            found.append(
+                f"a disturbance grows {self.spectral_radius:.3g}-fold every step, so that no walker stays on it"
+            )
         return tuple(found)
 
 

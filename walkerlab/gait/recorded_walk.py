@@ -28,6 +28,7 @@ from walkerlab.gait.rigid_walk import (
     observe_start,
     walk,
 )
+from walkerlab.kernels import uncompiled
 from walkerlab.physics.rigid.walker import RigidWalker, step_length
 from walkerlab.physics.system import State
 from walkerlab.solvers.registry import finder_for
@@ -134,7 +135,7 @@ class Recorder:
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, SIGNALS)
         # a library's method is integrated with in Python
-        self.walk: Callable[..., tuple[int, int]] = walk.py_func if isinstance(method, ScipyMethod) else walk
+        self.walk: Callable[..., tuple[int, int]] = uncompiled(walk) if isinstance(method, ScipyMethod) else walk
         first = new_observer(np.zeros(0))
         observe_start(first, walker, start)
         self.energy_at_start = float(first.energy[LATEST])
@@ -171,12 +172,12 @@ class Recorder:
         if not self.sampled:
             return np.zeros(0)
         most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
-        return np.arange(self.grid_index, self.grid_index + most) * self.interval - self.time
+        return self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
         found = int(observer.recorded[0])
-        grid = np.arange(self.grid_index, self.grid_index + found) * self.interval
+        grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
         self.grid_index += found
         events = np.append(strikes, self.time) if self.steps else strikes
         kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)

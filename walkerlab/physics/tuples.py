@@ -12,7 +12,7 @@ Vector = tuple[float, ...]
 
 def put(vector: Vector, index: int, value: float) -> Vector:
     """A copy of `vector` with one number replaced."""
-    return vector[:index] + (value,) + vector[index + 1 :]
+    return (*vector[:index], value, *vector[index + 1 :])
 
 
 @overload(put, jit_options=PART_FLAGS)

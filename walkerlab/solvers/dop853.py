@@ -221,7 +221,9 @@ def interpolate_dop853(method: Dop853, system: Any, fraction: float) -> State:
     weights = (1.0, w1, w2, w3, w4, w4 * s, w4 * s * r, w4 * s * r * s)
     rows = (load(d, 0, like), load(d, 1, like), load(d, 2, like), load(d, 3, like))
     more = (load(d, 4, like), load(d, 5, like), load(d, 6, like))
-    return combine(weights, (load(method.y_old, 0, like), rows[0], rows[1], rows[2], rows[3], more[0], more[1], more[2]))
+    return combine(
+        weights, (load(method.y_old, 0, like), rows[0], rows[1], rows[2], rows[3], more[0], more[1], more[2])
+    )
 
 
 @end_state.case(Dop853)

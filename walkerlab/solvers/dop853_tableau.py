@@ -5,6 +5,7 @@ the authors' Fortran code dop853.f. Rows are named as in the book: A_s holds the
 A_13 those of the solution of order 8. `nonzero` drops what a row does not use; dop853.py names the stages it does.
 """
 
+# fmt: off
 C = (
     0.0, 0.526001519587677318785587544488e-01, 0.789002279381515978178381316732e-01,
     0.118350341907227396726757197510, 0.281649658092772603273242802490, 0.333333333333333333333333333333, 0.25,
@@ -113,6 +114,7 @@ D_7 = (
     -0.43533456590011143754432175058e+2, 0.96324553959188282948394950600e+2, -0.39177261675615439165231486172e+2,
     -0.14972683625798562581422125276e+3,
 )
+# fmt: on
 
 
 def nonzero(row: tuple[float, ...]) -> tuple[float, ...]:

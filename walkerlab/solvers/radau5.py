@@ -176,7 +176,7 @@ def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> fl
 
 @inlined
 def solve_stages(method: Radau5, system: Any, t: float, y: State, h: float) -> int:
-    """Iterate until the stages are accurate to a part of the tolerance; returns the iterations used, 0 if they diverge."""
+    """Iterate until the stages are accurate to a part of the tolerance; the iterations used, 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
     size_old, rate = 0.0, method.control[RATE]

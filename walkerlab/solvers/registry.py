@@ -33,7 +33,8 @@ OWN = (
     Method("radau5", new_radau5, compiled=True, implicit=True),
 )
 SCIPY = tuple(
-    Method(name, new_scipy_method(name), compiled=False, implicit=entry.implicit) for name, entry in SCIPY_CLASSES.items()
+    Method(name, new_scipy_method(name), compiled=False, implicit=entry.implicit)
+    for name, entry in SCIPY_CLASSES.items()
 )
 METHODS = {method.name: method for method in (*OWN, *SCIPY)}
 

@@ -1,4 +1,4 @@
-"""Small state vectors held in registers: tuples of floats, and the linear combinations that Runge-Kutta steps are made of.
+"""Small state vectors held in registers: tuples of floats, and the combinations that Runge-Kutta steps are made of.
 
 With arrays every stage of a step waits for memory: measured, three times the time a right-hand side takes.
 """
@@ -40,8 +40,8 @@ def shifted(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
     """The state y + h times the sum of weights[j] vectors[j]: a stage of a Runge-Kutta step."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        state, step, *rest = arguments
-        sums = _sums(builder, *rest, y.count)
+        state, step, factors, columns = arguments
+        sums = _sums(builder, factors, columns, y.count)
         start = cgutils.unpack_tuple(builder, state)
         moved = [builder.fma(step, total, value) for total, value in zip(sums, start, strict=True)]
         return context.make_tuple(builder, signature.return_type, moved)

@@ -1,9 +1,8 @@
 """The compass walker described by its parts, and the walker on compliant ground assembled from any such description."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
-
-import math
 
 from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.normal_force import NormalLaw

@@ -79,7 +79,7 @@ def on_ground_derivative(system: OnGround, t: float, y: State) -> State:
 
 @inlined
 def ground_gradients(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before division by the masses."""
+    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
     motion = foot_motion(walker, foot, s, c, y)
     if motion.height >= 0.0:
         return

@@ -49,7 +49,7 @@ def mass_matrix(tree: Tree, s: Vector, c: Vector) -> Vector:
 
 @inlined
 def with_centrifugal(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, torques: Vector) -> Vector:
-    """Torques (n) plus the centrifugal terms of the angular velocities y[first], ...: the right-hand side of M alpha."""
+    """Torques (n) and the centrifugal terms of the angular velocities y[first], ...: the right-hand side of M alpha."""
     n = len(s)
     for k in range(n):
         for l in range(n):

@@ -93,4 +93,5 @@ def variation_derivative(system: SwingVariation, t: float, y: State) -> State:
     walker = system.walker
     alpha_1, alpha_2 = accelerations(walker, y[0], y[1], y[2], y[3])
     row_1, row_2 = acceleration_gradients(walker, y[0], y[1], y[2], y[3])
-    return (y[2], y[3], alpha_1, alpha_2) + y[10:16] + rate_row(row_1, y) + rate_row(row_2, y)
+    rates = (y[2], y[3], alpha_1, alpha_2)
+    return rates + y[10:16] + rate_row(row_1, y) + rate_row(row_2, y)

@@ -116,5 +116,5 @@ def swing_foot_height(walker: RigidWalker, theta_1: float, theta_2: float) -> fl
 
 @inlined
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Distance from swing foot to stance foot along the slope (m) with both feet on it: 2 L sin((theta_2 - theta_1)/2)."""
+    """Distance between the feet along the slope (m) with both on it: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
