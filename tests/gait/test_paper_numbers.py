@@ -214,3 +214,11 @@ def test_a_slope_without_gaits_has_no_columns_of_the_rigid_model(rows):
     found = rows(Departures(("slope_rad -0.1 instead of 0.0174",), ()), models={})
     assert all(found[entry].as_printed is found[entry].corrected is None for entry in X_P)
     assert "no gait" in found[E_AVG.matlab].evidence
+
+
+def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
+    elsewhere = Departures(("slope_rad 0.05 instead of 0.0174",), ("slope_rad 0.05 instead of 0.0174",))
+    for row in rows(elsewhere).values():
+        assert row.verdict != Verdict.REFUTED or "about the paper's own numbers, not about this scene" in row.evidence
+        assert row.verdict == Verdict.REPRODUCED or "slope_rad 0.05" in row.evidence
+    assert not any("this scene" in row.evidence for row in rows().values())

@@ -51,7 +51,7 @@ def gaits(study):
     return Content({}, {**sets["corrected"], "equation_sets": sets})
 
 
-def contact_walk(rigid, steps, *leave_out, outcome="walked"):
+def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
     """The rigid walk, a little slower and without samples at its heel strikes, laid out as a contact walk."""
     done, trajectory = rigid["steps"], rigid["trajectory"]
     touches = SLOWER * done["heel_strike_time_s"][:steps]
@@ -66,7 +66,7 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked"):
         "mechanical_J": (trajectory["mechanical_J"], ("time",), "J"),
     }
     variables = {
-        name: Variable(values[kept], dims, units, name)
+        name: Variable(values[kept][:samples], dims, units, name)
         for name, (values, dims, units) in columns.items()
         if name not in leave_out
     }
@@ -90,10 +90,10 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked"):
 def compared(gaits):
     """Compare with a contact walk of so many steps, with parts of its record left out."""
 
-    def result(*sets, steps=10, leave_out=(), outcome="walked", fixedpoint=gaits):
+    def result(*sets, steps=10, leave_out=(), outcome="walked", samples=None, fixedpoint=gaits):
         config = load(None, sets).config
         rigid = simulate.run(load(None, ["solver.rigid.rtol=1e-9"]).config, {"fixedpoint": gaits}, Silent())
-        walk = contact_walk(rigid, steps, *leave_out, outcome=outcome)
+        walk = contact_walk(rigid, steps, *leave_out, outcome=outcome, samples=samples)
         inputs = {"fixedpoint": fixedpoint, "simulate": rigid, "contact-sim": walk}
         return compare.run(only(config, READS), inputs, Silent())
 
@@ -198,6 +198,12 @@ def test_without_states_and_energies_the_numbers_are_still_held_against_the_walk
     assert content.summary["table3"]["E_avg"]["contact"] is None
     assert content.summary["table3"]["t_left"]["contact"] is not None
     assert {"outputs" in entry["why"] for entry in content.summary["left_out"]} == {True}
+
+
+def test_a_walk_that_ended_at_once_has_no_motion_to_compare(compared):
+    content = compared(steps=0, outcome="off-pad", samples=1)
+    assert content.summary["max_angle_error_rad"]["raw"] is None
+    assert any("ended at once" in entry["why"] for entry in content.summary["left_out"])
 
 
 def test_a_set_of_equations_without_a_gait_leaves_its_column_empty(compared, gaits):

@@ -35,6 +35,7 @@ from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
 
 STEPS_OF_A_STRIDE = 2
+SAMPLES_OF_A_MOTION = 2
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
@@ -88,9 +89,9 @@ def verdicts(rows: tuple[Row, ...]) -> dict[str, int]:
 
 
 def motion_of(walk: Content) -> Motion | None:
-    """The legs of a stored walk in time; None if states were not stored."""
+    """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
     trajectory = walk.groups.get("trajectory")
-    if trajectory is None or "angle" not in trajectory.variables:
+    if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < SAMPLES_OF_A_MOTION:
         return None
     motion = Motion(trajectory["time"], trajectory["angle"], trajectory["velocity"], step_ends(walk))
     return sampled_at_step_ends(motion)
@@ -187,7 +188,7 @@ def left_out(inputs: Mapping[str, Content], measured: Measured, motion: Comparis
     ]
     contact = measured.contact
     if contact.table_3.t_cycle is None:
-        why = f"the walk completed {contact.steps} steps ({contact.outcome})"
+        why = f"the walk ended after {contact.steps} of the two steps it takes ({contact.outcome})"
         missing.append({"what": "a stride of the contact model in Table 3", "why": why})
     if contact.table_3.E_avg is None:
         why = "no step was completed" if contact.steps == 0 else "outputs does not ask for energies"

@@ -66,7 +66,7 @@ def largest(errors: Errors, of: Callable[[LegErrors], tuple[float, ...]]) -> dic
 def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
     """The contact model's walk less the rigid one's, in time, in phase, and as orbits."""
     if rigid is None or contact is None:
-        why = "the walks' states were not stored (outputs does not ask for states)"
+        why = "no record of both walks: outputs does not ask for states, or a walk ended at once"
         return Comparison(left_out=({"what": "differences of the walks", "why": why},))
     time, raw = difference_in_time(contact, rigid)
     groups = {"errors": in_time(time, raw)}

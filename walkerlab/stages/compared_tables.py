@@ -1,7 +1,7 @@
 """The paper's numbers, tables and errata as groups of an artifact.
 
-Where a model has no value there is none: a column of numbers has a dimension of its own, whose coordinate says which
-rows the numbers stand in. Beside it a column of texts has all the rows.
+Where a model has no value there is none: a model's column has a dimension of its own, whose coordinate says which rows
+its numbers stand in. Beside it a column of texts has all the rows.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def texts(values: Iterable[str], long_name: str) -> Variable:
 
 
 def numbers(name: str, values: Sequence[float | None], long_name: str) -> dict[str, Variable]:
-    """A column of numbers with gaps, and its texts."""
+    """A model's column, which may have gaps, and its texts."""
     rows = [row for row, value in enumerate(values) if value is not None]
     as_text = ["" if value is None else f"{value:.10g}" for value in values]
     column = {f"{name}_text": texts(as_text, f"{long_name}, as text")}
@@ -96,8 +96,10 @@ def table_group(table: Mapping[str, Mapping[str, Any]]) -> Group:
     variables = {ROW: row_numbers(len(rows)), "name": texts(table, "symbol of the row")}
     for name in rows[0]:
         values = [row[name] for row in rows]
-        if all(isinstance(value, str) for value in values):
+        if name in MODELS:
+            variables |= numbers(name, values, MEANINGS[name])
+        elif isinstance(values[0], str):
             variables[name] = texts(values, MEANINGS[name])
         else:
-            variables |= numbers(name, values, MEANINGS[name])
+            variables[name] = Variable(np.array(values, dtype=float), (ROW,), BY_ROW, MEANINGS[name])
     return Group(variables)

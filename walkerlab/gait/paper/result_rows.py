@@ -22,7 +22,7 @@ from walkerlab.gait.paper.printed import (
     ResultRow,
 )
 from walkerlab.gait.paper.study import PaperStudy
-from walkerlab.gait.paper.verdict import Row, Verdict, agreement, weigh
+from walkerlab.gait.paper.verdict import Row, Verdict, agreement, regardless, weigh
 
 STEPS_OF_A_STRIDE = 2
 AROUND = 2.0  # 'around 1e-4' is up to twice that
@@ -45,7 +45,7 @@ def strides_row(measured: Measured) -> Row:
     contact, models = measured.contact, measured.models
     strides = {name: float(model.steps // STEPS_OF_A_STRIDE) for name, model in models.items()}
     done = contact.steps // STEPS_OF_A_STRIDE
-    text = f"the contact model completed {done} strides and {contact.steps} steps ({contact.outcome})."
+    text = f"strides that the contact model completed: {done}; steps: {contact.steps} ({contact.outcome})."
     went_on = contact.outcome == "walked"
     if went_on and done < STRIDES.value:
         text += " The config asks for no more."
@@ -75,6 +75,7 @@ def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str)
     limit = AROUND * entry.value
     otherwise = Verdict.EXPLAINED if aligned is not None and aligned <= limit else Verdict.REFUTED
     verdict = Verdict.REPRODUCED if raw is not None and raw <= limit else otherwise
+    text = regardless(measured.departures.contact, text)
     return Row(entry, None, None, raw if aligned is None else aligned, verdict, text)
 
 
@@ -120,7 +121,7 @@ def velocity_difference_row(measured: Measured) -> Row:
     printed = speed_difference(T_CYCLE.matlab.value, T_CYCLE.adams.value)
     said = [f"the contact model is {off:.2f}% off the rigid one ({name} equations)" for name, off in found.items()]
     said.append(f"the paper's {printed:.1f}% takes its cycles; the sums of its own step periods give {sums:.1f}%")
-    text = "; ".join(said) + "."
+    text = regardless(measured.departures.contact, "; ".join(said) + ".")
     agrees = bool(found) and max(found.values()) < VELOCITY_DIFFERENCE.value
     refuted = Verdict.REFUTED if sums >= VELOCITY_DIFFERENCE.value else Verdict.EXPLAINED
     verdict = Verdict.REPRODUCED if agrees else refuted
@@ -199,7 +200,7 @@ def adams_row(entry: ResultRow, measured: Measured) -> Row:
     """A number of Table 3's ADAMS column against the contact model."""
     rigid, contact = columns(entry, measured)
     text = f"{contact_in_words(entry, measured)}; {rigid_in_words(entry, measured)}."
-    otherwise = Verdict.REFUTED
+    otherwise = Verdict.EXPLAINED if contact is None else Verdict.REFUTED
     if entry in (*STEP_PERIODS, T_CYCLE):
         total = T_LEFT.adams.value + T_RIGHT.adams.value
         text += f" The column contradicts itself: its step periods sum to {total:.2f}, not {T_CYCLE.adams.text} s."

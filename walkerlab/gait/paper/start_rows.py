@@ -24,7 +24,7 @@ from walkerlab.gait.paper.printed import (
     StartRow,
 )
 from walkerlab.gait.paper.study import PaperStudy
-from walkerlab.gait.paper.verdict import Row, Verdict, agreement, weigh
+from walkerlab.gait.paper.verdict import Row, Verdict, agreement, regardless, weigh
 
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 HOW = {
@@ -106,7 +106,7 @@ def unitless_row(entry: Printed, value: float, measured: Measured) -> Row:
 def walked(measured: Measured) -> str:
     """How far the contact model walked."""
     contact = measured.contact
-    return f"the contact model took {contact.steps} steps ({contact.outcome})"
+    return f"the contact model took {contact.steps} step{'' if contact.steps == 1 else 's'} ({contact.outcome})"
 
 
 def lost_balance_row(measured: Measured) -> Row:
@@ -150,6 +150,7 @@ def raised_row(entry: Printed, table_row: StartRow, measured: Measured) -> Row:
     text = f"{'; '.join(said)}. Ours: {walked(measured)}, {started(measured)}."
     agrees = bool(agreement(entry, percent_of(table_row).of_matlab))
     verdict = Verdict.REPRODUCED if agrees else Verdict.REFUTED
+    text = regardless(measured.departures.contact, text)
     return Row(entry, None, None, raised_percent(measured, TABLE_2.index(table_row)), verdict, text)
 
 
@@ -163,7 +164,8 @@ def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> Row
         verdict, text = Verdict.EXPLAINED, text + ": divided by the value after the change instead of before"
     else:
         verdict, text = Verdict.REFUTED, text + ": neither is the printed percentage"
-    return Row(entry, None, None, raised_percent(measured, coordinate), verdict, text + ".")
+    text = regardless(measured.departures.contact, text + ".")
+    return Row(entry, None, None, raised_percent(measured, coordinate), verdict, text)
 
 
 def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: PaperStudy) -> Row:
@@ -176,4 +178,4 @@ def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: 
     text += f". Ours: {walked(measured)}, {started(measured)}."
     otherwise = Verdict.EXPLAINED if is_angle or study.adams.starts_a_gait else Verdict.REFUTED
     verdict = Verdict.REPRODUCED if agreement(entry, value) else otherwise
-    return Row(entry, None, None, value, verdict, text)
+    return Row(entry, None, None, value, verdict, regardless(measured.departures.contact, text))

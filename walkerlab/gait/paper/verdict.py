@@ -53,3 +53,10 @@ def weigh(agrees: bool, otherwise: Verdict, departures: tuple[str, ...], evidenc
     if departures:
         return Verdict.EXPLAINED, f"Not the paper's scene ({'; '.join(departures)}). {evidence}"
     return otherwise, evidence
+
+
+def regardless(departures: tuple[str, ...], evidence: str) -> str:
+    """The evidence of a verdict that follows from the paper's own numbers, which another scene does not change."""
+    if not departures:
+        return evidence
+    return f"{evidence} The verdict is about the paper's own numbers, not about this scene ({'; '.join(departures)})."
