@@ -47,8 +47,8 @@ class SectionStep:
     period_s: float
     length_m: float  # how far the walker went
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
-    books_J: Floats  # (3,) dissipated by damping, by friction, at edges  # noqa: N815 (a unit's capital)
-    height_lost_J: float  # potential energy given up  # noqa: N815
+    books_J: Floats  # (3,) dissipated by damping, by friction, at edges
+    height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
 
 
