@@ -100,8 +100,18 @@ def test_what_was_never_wanted_is_no_failure():
 def test_all_that_is_missing_is_listed_with_its_reason():
     walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs"}])
     found = sections([], absent=WITHOUT_GAIT, simulate=walk)["left-out"]
-    assert rows(found)["simulate"] == [f"it needs fixedpoint: {NO_GAIT}"]
-    assert rows(found)["forces"] == ["not among the outputs"]
+    assert rows(found) == {
+        "fixedpoint": [NO_GAIT],
+        "simulate and contact-sim": ["for want of fixedpoint"],
+        "forces": ["not among the outputs"],
+    }
+
+
+def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
+    why = "the config has no contact block"
+    absent = [Absent("contact-sim", why), Absent("compare", why), Absent("figure 6", f"it needs contact-sim: {why}")]
+    found = sections([], absent=absent)["left-out"]
+    assert rows(found) == {"contact-sim and compare": [why], "figure 6": ["for want of contact-sim and compare"]}
 
 
 def test_nothing_missing_is_said_too():

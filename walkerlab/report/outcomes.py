@@ -44,6 +44,8 @@ def gait_sentence(summary: Mapping[str, Any]) -> str:
     periods, lengths = summary["step_periods_s"], summary["step_lengths_m"]
     if not periods:
         return ""
+    if len(periods) == 1:
+        return f"Its one step took {quantity(periods[0], 's')} over {quantity(lengths[0], 'm')}."
     spoken = f"Steps last {span(periods, 's')} and are {span(lengths, 'm')} long"
     if " to " not in spoken:
         return f"{spoken}."

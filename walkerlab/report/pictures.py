@@ -28,12 +28,18 @@ def pictures(stored: Mapping[str, Content], folder: Path) -> tuple[Picture, ...]
         width, height = pixels(svg)
         found.append(
             Picture(
-                title=f"Figure {figure['number']}. {figure['title']}.",
+                title=title_of(figure),
                 caption=str(figure["caption"]),
-                alt=f"Figure {figure['number']}: {figure['title']}. {figure['caption']}",
+                alt=f"{title_of(figure)} {figure['caption']}",
                 uri=data_uri(file),
                 width=width,
                 height=height,
             )
         )
     return tuple(found)
+
+
+def title_of(figure: Mapping[str, Any]) -> str:
+    """A figure's title, with its number if it is one of the paper's."""
+    number = f"Figure {figure['number']}. " if "number" in figure else ""
+    return f"{number}{figure['title']}."

@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from walkerlab.report.blocks import Column, Paragraph, Section, table
+from walkerlab.report.numbers import listed
 from walkerlab.report.results import Absent, Results
 
 
 def section(results: Results) -> Section:
     """Results that were not computed, and parts of results that were left out."""
-    rows = [[absent.what, absent.why] for absent in everything_absent(results)]
+    rows = rows_of(everything_absent(results))
     if not rows:
         said = Paragraph("Nothing: every result that the pipeline has is there.")
         return Section("left-out", "Left out", (said,))
     columns = [Column("what"), Column("why", wide=True)]
     missing = table("What was left out of this scene, and why", columns, rows, wordy=True)
     return Section("left-out", "Left out", (missing,))
+
+
+def rows_of(missing: Sequence[Absent]) -> list[list[str]]:
+    """What is missing for one reason in a row, and in a row below it what is missing for want of that."""
+    causes = dict.fromkeys(cause(absent.why, missing) for absent in missing)
+    rows = []
+    for why in causes:
+        first = listed(absent.what for absent in missing if absent.why == why)
+        further = listed(absent.what for absent in missing if absent.why != why and cause(absent.why, missing) == why)
+        rows += [[first, why], *([[further, f"for want of {first}"]] if further else [])]
+    return rows
+
+
+def cause(why: str, missing: Sequence[Absent]) -> str:
+    """The reason at the bottom of a reason, such as 'it needs simulate: it needs fixedpoint: no gait'."""
+    return min((absent.why for absent in missing if why.endswith(absent.why)), key=len)
 
 
 def everything_absent(results: Results) -> list[Absent]:
