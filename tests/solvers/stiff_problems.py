@@ -1,0 +1,114 @@
+"""Stiff and smooth problems as systems, and a kernel that drives Radau through them."""
+
+import math
+from typing import Any, NamedTuple
+
+from walkerlab.kernels import kernel
+from walkerlab.physics.system import blank, derivative, jacobian
+from walkerlab.solvers.stepping import STEP_DONE, T, advance, begin
+from walkerlab.solvers.vectors import load
+
+LINEAR, CURVE, VAN_DER_POL, EXPLOSION = range(4)
+ROBERTSON, HIRES = range(2)
+
+
+class Planar(NamedTuple):
+    """Problems in the plane; one type, so that they compile once."""
+
+    kind: int
+    real: float  # eigenvalue of LINEAR; of CURVE how strongly it is pulled to (sin t, cos t); eps of VAN_DER_POL
+    imaginary: float
+    told: float  # the part of the Jacobian that is told: 1 is all
+
+
+@blank.case(Planar)
+def planar_blank(system: Planar) -> Any:
+    return (0.0, 0.0)
+
+
+@derivative.case(Planar)
+def planar_derivative(system: Planar, t: float, y: Any) -> Any:
+    p, q = system.real, system.imaginary
+    if system.kind == LINEAR:
+        return (p * y[0] - q * y[1], q * y[0] + p * y[1])
+    if system.kind == CURVE:
+        return (p * (y[0] - math.sin(t)) + math.cos(t), p * (y[1] - math.cos(t)) - math.sin(t))
+    if system.kind == VAN_DER_POL:
+        return (y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / p)
+    return (y[0] * y[0], 0.0)
+
+
+@jacobian.case(Planar)
+def planar_jacobian(system: Planar, t: float, y: Any, J: Any) -> None:
+    p, q, told = system.real, system.imaginary, system.told
+    if system.kind == LINEAR:
+        J[0, 0], J[0, 1], J[1, 0], J[1, 1] = told * p, -told * q, told * q, told * p
+    elif system.kind == CURVE:
+        J[0, 0], J[0, 1], J[1, 0], J[1, 1] = told * p, 0.0, 0.0, told * p
+    elif system.kind == VAN_DER_POL:
+        J[0, 0], J[0, 1] = 0.0, told
+        J[1, 0], J[1, 1] = told * (-2.0 * y[0] * y[1] - 1.0) / p, told * (1.0 - y[0] * y[0]) / p
+    else:
+        J[0, 0], J[0, 1], J[1, 0], J[1, 1] = told * 2.0 * y[0], 0.0, 0.0, 0.0
+
+
+class Kinetics(NamedTuple):
+    """Chemical problems of the test set for initial value problem solvers, at most eight species."""
+
+    kind: int
+
+
+@blank.case(Kinetics)
+def kinetics_blank(system: Kinetics) -> Any:
+    return (0.0,) * 8
+
+
+@derivative.case(Kinetics)
+def kinetics_derivative(system: Kinetics, t: float, y: Any) -> Any:
+    if system.kind == ROBERTSON:
+        slow, fast, middle = 0.04 * y[0], 3e7 * y[1] * y[1], 1e4 * y[1] * y[2]
+        return (middle - slow, slow - middle - fast, fast, 0.0, 0.0, 0.0, 0.0, 0.0)
+    meeting = 280.0 * y[5] * y[7]
+    return (
+        -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
+        1.71 * y[0] - 8.75 * y[1],
+        -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
+        8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
+        -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6],
+        -meeting + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
+        meeting - 1.81 * y[6],
+        -meeting + 1.81 * y[6],
+    )
+
+
+@jacobian.case(Kinetics)
+def kinetics_jacobian(system: Kinetics, t: float, y: Any, J: Any) -> None:
+    for i in range(8):
+        for j in range(8):
+            J[i, j] = 0.0
+    if system.kind == ROBERTSON:
+        J[0, 0], J[0, 1], J[0, 2] = -0.04, 1e4 * y[2], 1e4 * y[1]
+        J[1, 0], J[1, 1], J[1, 2] = 0.04, -1e4 * y[2] - 6e7 * y[1], -1e4 * y[1]
+        J[2, 1] = 6e7 * y[1]
+        return
+    J[0, 0], J[0, 1], J[0, 2] = -1.71, 0.43, 8.32
+    J[1, 0], J[1, 1] = 1.71, -8.75
+    J[2, 2], J[2, 3], J[2, 4] = -10.03, 0.43, 0.035
+    J[3, 1], J[3, 2], J[3, 3] = 8.32, 1.71, -1.12
+    J[4, 4], J[4, 5], J[4, 6] = -1.745, 0.43, 0.43
+    J[5, 3], J[5, 4], J[5, 5], J[5, 6], J[5, 7] = 0.69, 1.71, -280.0 * y[7] - 0.43, 0.69, -280.0 * y[5]
+    J[6, 5], J[6, 6], J[6, 7] = 280.0 * y[7], -1.81, 280.0 * y[5]
+    J[7, 5], J[7, 6], J[7, 7] = -280.0 * y[7], 1.81, -280.0 * y[5]
+
+
+@kernel
+def drive(method: Any, system: Any, t: float, y: Any, h: float, t_end: float) -> int:
+    """Integrate from t to t_end; with h > 0 in fixed steps of that length, each begun anew."""
+    begin(method, system, t, load(y, 0, blank(system)), h)
+    while method.clock[T] < t_end:
+        status = advance(method, system, t_end if h == 0.0 else min(t_end, method.clock[T] + h))
+        if status != STEP_DONE:
+            return status
+        if h > 0.0 and method.clock[T] < t_end:
+            begin(method, system, method.clock[T], load(method.y, 0, blank(system)), h)
+    return STEP_DONE
