@@ -1,9 +1,10 @@
 """Make the parts of README and docs that follow from the code anew: results, gaits, stages, config keys.
 
-    python scripts/refresh_docs.py [--check]
+    python scripts/refresh_docs.py [--check | --picture]
 
 Each such part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing
-is written, and the exit code is 1 if a part is not what it would be made to.
+is written, and the exit code is 1 if a part is not what it would be made to. With --picture the README's picture is
+drawn too; its bytes depend on the version of matplotlib, so that it is not checked.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from walkerlab.store.runfolder import RunFolder
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
+PICTURE = "figure-06.png"
 PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -38,8 +40,13 @@ class Results:
 
     def _summary(self, stage: str, *sets: str) -> dict[str, Any]:
         loaded = load(None, sets)
-        report = execute(loaded.config, stage, RunFolder(self.runs, loaded.run_name))
-        return report.summary
+        return execute(loaded.config, stage, RunFolder(self.runs, loaded.run_name)).summary
+
+    def picture(self) -> bytes:
+        """The README's picture, as `walkerlab plot` draws it."""
+        loaded = load(None, ())
+        execute(loaded.config, "plot", RunFolder(self.runs, loaded.run_name))
+        return (RunFolder(self.runs, loaded.run_name).figures / PICTURE).read_bytes()
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -176,10 +183,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Refresh or check all documents; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is not current")
+    parser.add_argument("--picture", action="store_true", help="draw the README's picture too")
     parser.add_argument("--runs", type=Path, help="folder of runs to reuse; default: a temporary one")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as temporary:
         results = Results(options.runs or Path(temporary))
+        if options.picture:
+            (ROOT / "docs" / "images" / PICTURE).write_bytes(results.picture())
         stale = [path for name in DOCUMENTS if not refresh(path := ROOT / name, results, write=not options.check)]
     for path in stale:
         print(f"{path.relative_to(ROOT)}: {'not current' if options.check else 'made anew'}")
