@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import walkerlab.physics.rigid.swing  # noqa: F401 (the equations of a RigidWalker, found by its type)
 from walkerlab.gait.outcome import Outcome
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.physics.rigid.heel_strike import feet_on_slope, impact

@@ -41,7 +41,6 @@ class ContactScene:
     frame: Frame
     pinned: Pinned | None  # the hinged first step, if the config wants one
     pitch_m: float
-    left_out: tuple[dict[str, str], ...]
 
     @property
     def ground(self) -> Ground:
@@ -55,9 +54,7 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
     rigid_step_length_m  step length of the rigid gait: what pads and steps are measured by
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
     """
-    contact = config.contact
-    if contact is None:
-        raise ValueError("this config has no contact block")
+    contact = with_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     parts = compass_parts(config.walker)
     assembly = compass_assembly(parts)
@@ -72,7 +69,14 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
     )
     terrain = Checkerboard(pitch, (-pitch, 0.0)) if contact.terrain == "checkerboard" else AfterMidSwing(pitch)
     pinned = hinged_walker(config, walker) if contact.stance == "pinned" else None
-    return ContactScene(walker, terrain, frame, pinned, pitch, left_out(config, contact))
+    return ContactScene(walker, terrain, frame, pinned, pitch)
+
+
+def with_contact(config: Config) -> Contact:
+    """The contact block; ValueError if there is none."""
+    if config.contact is None:
+        raise ValueError("this config has no contact block")
+    return config.contact
 
 
 def hinged_walker(config: Config, walker: ContactWalker) -> Pinned:
@@ -143,8 +147,9 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*hinged[:4], rolled if scene.pinned is None else hinged[4], *hinged[5:])
 
 
-def left_out(config: Config, contact: Contact) -> tuple[dict[str, str], ...]:
-    """What this scene does without, and why."""
+def left_out(config: Config) -> tuple[dict[str, str], ...]:
+    """What the scene of a config does without, and why."""
+    contact = with_contact(config)
     rows: list[tuple[bool, str, str]] = [
         (contact.friction == "none", "tangential velocity and friction force", "contact.friction is none"),
         (

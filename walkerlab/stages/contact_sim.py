@@ -19,7 +19,7 @@ from walkerlab.gait.contact_run import (
 )
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.terrain import Checkerboard
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, left_out, scene_measures, start_state
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -51,7 +51,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
         interval,
     )
     progress.advance()
-    content = Content(groups(config, scene, result), summary(scene, result))
+    content = Content(groups(config, scene, result), summary(config, scene, result))
     if not result.outcome.answered:
         raise NoAnswer(
             f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
@@ -85,7 +85,7 @@ def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...])
     return answer.gait.step.length_m
 
 
-def summary(scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
+def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
     """What the command prints."""
     slips = result.slip_m
     return {
@@ -106,7 +106,7 @@ def summary(scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
         "jacobians": int(result.work[3]),
         "slope_rad": scene.walker.slope,
         **scene_measures(scene),
-        "left_out": list(scene.left_out),
+        "left_out": list(left_out(config)),
     }
 
 

@@ -121,11 +121,19 @@ PIPELINE = Graph(
         needs_contact=True,
     ),
     Stage(
+        "accuracy",
+        "walkerlab.stages.accuracy",
+        "Measure error against run time, method by method.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact"),
+        inputs=gait_for_start_or_pads,
+    ),
+    Stage(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
+        if_current=("accuracy",),
         draws=True,
     ),
     Stage(
@@ -133,7 +141,7 @@ PIPELINE = Graph(
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
         reads=EVERYTHING,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "plot"),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "accuracy", "plot"),
         draws=True,
     ),
 )
