@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from walkerlab.gait.outcome import Outcome
 from walkerlab.gait.rigid_walk import SIGNALS as RIGID_SIGNALS
 from walkerlab.gait.rigid_walk import Unobserved, walk
+from walkerlab.kernels import uncompiled
 from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.scene.user_script import walk_as_a_script
 from walkerlab.solvers.registry import METHODS, Method, finder_for
@@ -77,7 +78,7 @@ class RigidTrial:
         method = entry.new(4, rtol, atol, budget)
         finder = finder_for(method, RIGID_SIGNALS)
         after = np.zeros((self.steps, 4))
-        stride = walk if entry.compiled else walk.py_func
+        stride = walk if entry.compiled else uncompiled(walk)
         strikes, before = np.zeros(self.steps), np.zeros((self.steps, 4))
         status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after)
         return finished(Outcome(status), after[-1], method.counts)
