@@ -1,6 +1,8 @@
 """Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -27,6 +29,7 @@ LAYERS = (
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 IN_LAYERS = [path for path in SOURCES if path.parent != PACKAGE or path.stem in LAYERS]
 COMPILING = {"kernel", "inlined", "by_type"}
+LONGEST_FILE = 335
 
 
 def layer_of(path):
@@ -68,10 +71,50 @@ def test_compiled_functions_stand_where_the_cache_key_looks(path):
     if layer_of(path) in (*KERNEL_HOMES, "kernels"):
         return
     names = set(imported_modules(path))
-    assert "numba" not in names
+    assert not {name.split(".")[0] for name in names} & {"numba", "llvmlite"}
     assert not names & {f"walkerlab.kernels.{name}" for name in COMPILING}
+
+
+@pytest.mark.parametrize("path", [path for path in IN_LAYERS if layer_of(path) in KERNEL_HOMES], ids=named)
+def test_compiled_functions_are_made_only_of_what_the_cache_key_covers(path):
+    """A constant from elsewhere would be frozen into machine code that its change does not renew."""
+    assert imported_layers(path) <= {*KERNEL_HOMES, "kernels", "errors"}
+
+
+def test_no_file_is_long():
+    lengths = {path: len(path.read_text().splitlines()) for path in (*SOURCES, *Path(__file__).parent.rglob("*.py"))}
+    assert {path.name for path, length in lengths.items() if length > LONGEST_FILE} == set()
 
 
 def test_no_two_modules_of_tests_have_one_name():
     names = [path.name for path in Path(__file__).parent.rglob("*.py")]
     assert {name for name in names if names.count(name) > 1} <= {"conftest.py", "__init__.py"}
+
+
+RUN = """
+import sys
+from walkerlab.cli.main import main
+sys.argv = ["walkerlab", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+print(*sorted(name for name in sys.modules if name.startswith("walkerlab.")))
+"""
+
+
+def test_a_walk_of_the_rigid_model_never_loads_contact_code(tmp_path):
+    config = tmp_path / "rigid.yaml"
+    config.write_text("extends: rigid-only\nstrides: 1\n")
+    command = [sys.executable, "-c", RUN, "simulate", "--config", str(config), "--runs", str(tmp_path), "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    loaded = done.stdout.splitlines()[-1].split()
+    assert "walkerlab.gait.rigid_walk" in loaded
+    physical = (
+        "walkerlab.physics.contact",
+        "walkerlab.physics.multibody",
+        "walkerlab.gait.contact",
+        "walkerlab.scene.contact",
+    )
+    assert [name for name in loaded if name.startswith(physical)] == []

@@ -10,7 +10,6 @@ from contact_walks import (
     RIGID_STEP,
     faster,
     scene_of,
-    settings,
     walked,
 )
 from hypothesis import given
@@ -18,10 +17,8 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from walkerlab.gait.contact_run import Ground, sampled_feet, walk_contact
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.motion import OnGround
-from walkerlab.physics.contact.terrain import Checkerboard
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 
@@ -197,73 +194,6 @@ def test_a_budget_ends_the_walk_in_words():
     assert 2000 <= walk.work[0] < 2100
 
 
-# ---- what does not matter ----------------------------------------------------------------------------------------
-
-
-def test_where_the_walk_begins_does_not_matter():
-    scene, here = scene_of(), walked()
-    start = np.array(start_state(scene, FIXED_POINT))
-    start[0] += 64.0
-    lanes = tuple(lane + 64.0 for lane in scene.terrain.lanes)
-    ground = Ground(Checkerboard(scene.pitch_m, lanes), scene.frame)
-    there = walk_contact(scene.walker, ground, None, 1, tuple(start.tolist()), settings(), 10, None)
-    np.testing.assert_allclose(there.touch_time_s, here.touch_time_s, atol=1e-6)
-    np.testing.assert_allclose(there.touch_along_m - 64.0, here.touch_along_m, atol=1e-6)
-    assert there.outcome is here.outcome
-
-
-def test_which_leg_begins_does_not_matter():
-    scene, one = scene_of(), walked()
-    y = start_state(scene, FIXED_POINT)
-    exchanged = (y[0], y[1], y[3], y[2], y[4], y[5], y[7], y[6])
-    ground = Ground(Checkerboard(scene.pitch_m, scene.terrain.lanes[::-1]), scene.frame)
-    other = walk_contact(scene.walker, ground, None, 0, exchanged, settings(), 10, None)
-    np.testing.assert_allclose(other.touch_time_s, one.touch_time_s, atol=1e-6)
-    np.testing.assert_allclose(other.touch_along_m, one.touch_along_m, atol=1e-6)
-
-
-LENGTH, MASS, GRAVITY = 2.5, 0.3, 1.62 / 9.81
-FORCE, TIME = MASS * GRAVITY, math.sqrt(LENGTH / GRAVITY)
-
-
-def twin(static, dynamic):
-    """The paper's walker on the Moon: other leg length, masses and gravity, the contact scaled with them."""
-    speed = LENGTH / TIME
-    return (
-        f"walker.leg_length_m={LENGTH}",
-        f"walker.foot_to_mass_m={0.5 * LENGTH}",
-        f"walker.leg_mass_kg={5.0 * MASS}",
-        f"walker.hip_mass_kg={10.0 * MASS}",
-        f"walker.foot_radius_m={0.001 * LENGTH}",
-        f"gravity_m_s2={9.81 * GRAVITY}",
-        "contact.units=si",
-        f"contact.stiffness={1e5 * 1000**2.2 * FORCE / LENGTH**2.2!r}",
-        f"contact.damping={90e3 * FORCE / speed!r}",
-        f"contact.full_damping_penetration={1e-4 * LENGTH!r}",
-        f"contact.stiction_velocity={0.1 * speed!r}",
-        f"contact.friction_velocity={1.0 * speed!r}",
-        f"contact.static_friction={static}",
-        f"contact.dynamic_friction={dynamic}",
-    )
-
-
-@pytest.mark.parametrize(
-    ("factor", "mu"),
-    [(1.0, (0.9, 0.7)), (0.9, (0.9, 0.7)), (0.95, (0.9, 0.7)), (1.0, (0.3, 0.2)), (1.0, (0.05, 0.04))],
-    ids=["walks", "falls", "trips", "slips", "slides"],
-)
-def test_a_walker_and_its_scaled_twin_walk_and_end_alike(factor, mu):
-    friction = (f"contact.static_friction={mu[0]}", f"contact.dynamic_friction={mu[1]}")
-    walk = walked(*friction, start=faster(factor), tolerance=1e-8)
-    start = faster(factor)
-    scaled = (start[0], start[1], start[2] / TIME, start[3] / TIME)
-    other = walked(*twin(*mu), start=scaled, step=LENGTH * RIGID_STEP, tolerance=1e-8)
-    assert other.outcome is walk.outcome
-    np.testing.assert_allclose(other.touch_time_s / TIME, walk.touch_time_s, atol=1e-6)
-    np.testing.assert_allclose(other.touch_along_m / LENGTH, walk.touch_along_m, atol=1e-6)
-    assert other.end_time_s / TIME == pytest.approx(walk.end_time_s, abs=1e-5)
-
-
 # ---- the parts a scene can leave out ---------------------------------------------------------------------------------
 
 
@@ -288,41 +218,6 @@ def test_a_hinged_first_step_is_the_rigid_one_until_the_hinge_is_released():
     assert walk.periods_s[0] == pytest.approx(RIGID_PERIOD, abs=2e-6)
     assert walk.lengths_m[0] == pytest.approx(RIGID_STEP, abs=2e-6)
     assert walk.periods_s[1] > RIGID_PERIOD + 1e-3  # compliant ground from here on
-
-
-# ---- samples and bookkeeping -----------------------------------------------------------------------------------------
-
-
-def test_samples_do_not_change_the_walk():
-    seen, unseen = walked(interval=0.01), walked()
-    np.testing.assert_array_equal(seen.touch_time_s, unseen.touch_time_s)
-    assert unseen.samples is None
-    assert seen.samples.time_s[-1] <= seen.end_time_s < seen.samples.time_s[-1] + 0.011
-
-
-def test_samples_show_the_touches_where_they_were_found():
-    walk, scene = walked(interval=0.001, steps=4), scene_of()
-    samples = walk.samples
-    feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.carried, feet)
-    for step, (time, along) in enumerate(zip(walk.touch_time_s, walk.touch_along_m, strict=True)):
-        foot = step % 2  # leg 1 (foot 0) swings first
-        before, after = np.searchsorted(samples.time_s, time) - 1, np.searchsorted(samples.time_s, time)
-        assert feet[before, foot, 1] > 0.0
-        assert feet[before, foot, 0] == pytest.approx(along, abs=2e-3)
-        if after < samples.time_s.size:
-            assert feet[after, foot, 1] < 0.0
-    assert np.abs(np.diff(samples.stance)).sum() in (3, 4)
-    supporting = feet[:, :, 2].sum(axis=1)
-    assert np.median(supporting) == pytest.approx(20.0 * 9.81, rel=0.05)
-
-
-def test_deepest_penetration_is_what_the_samples_show():
-    walk, scene = walked(interval=0.001, steps=4), scene_of()
-    feet = np.zeros((walk.samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, walk.samples.states, walk.samples.carried, feet)
-    depth = np.where(walk.samples.carried > 0, -feet[:, :, 1], 0.0).max()
-    assert 0.8 * walk.max_penetration_m < depth <= walk.max_penetration_m * (1.0 + 1e-9)
 
 
 @examples(max_examples=25)

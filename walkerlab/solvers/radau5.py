@@ -11,6 +11,7 @@ import numpy as np
 from walkerlab.kernels import inlined
 from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.solvers.linear import factor, solve
+from walkerlab.solvers.radau5_tableau import ALPHA, BETA, ERROR, GAMMA, INV_1, INV_2, INV_3, P_1, P_2, P_3, T_1, T_2, C
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     BUDGET,
@@ -34,24 +35,6 @@ from walkerlab.solvers.stepping import (
     rewind,
 )
 from walkerlab.solvers.vectors import combine, load, store
-
-ROOT6 = math.sqrt(6.0)
-C = ((4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0)
-# eigenvalues of A^-1: one real, one complex pair; A^-1 = T Lambda T^-1, (8.5) and (8.12)
-GAMMA = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
-ALPHA = 3.0 + 0.5 * (3.0 ** (1.0 / 3.0) - 3.0 ** (2.0 / 3.0))
-BETA = 0.5 * (3.0 ** (5.0 / 6.0) + 3.0 ** (7.0 / 6.0))
-T_11, T_12, T_13 = 0.09443876248897524, -0.14125529502095421, 0.03002919410514742
-T_21, T_22, T_23 = 0.25021312296533332, 0.20412935229379994, -0.38294211275726192
-INV_1 = (4.17871859155190428, 0.32768282076106237, 0.52337644549944951)
-INV_2 = (-4.17871859155190428, -0.32768282076106237, 0.47662355450055044)
-INV_3 = (0.50287263494578682, -2.57192694985560522, 0.59603920482822492)
-# error estimate (8.19): h gamma_0 f(y_0) + sum e_i z_i, times gamma
-ERROR = ((-13.0 - 7.0 * ROOT6) / 3.0, (-13.0 + 7.0 * ROOT6) / 3.0, -1.0 / 3.0)
-# the collocation polynomial: z(s) = s (P_1 + s (P_2 + s P_3)), each a combination of z_1, z_2, z_3
-P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0)
-P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
-P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
 NEWTON_MOST = 7
 SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
@@ -168,8 +151,8 @@ def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> fl
         size += (d1 * scale) ** 2 + (d2 * scale) ** 2 + (d3 * scale) ** 2
         w1, w2, w3 = w[0, i] + d1, w[1, i] + d2, w[2, i] + d3
         w[0, i], w[1, i], w[2, i] = w1, w2, w3
-        z[0, i] = T_11 * w1 + T_12 * w2 + T_13 * w3
-        z[1, i] = T_21 * w1 + T_22 * w2 + T_23 * w3
+        z[0, i] = T_1[0] * w1 + T_1[1] * w2 + T_1[2] * w3
+        z[1, i] = T_2[0] * w1 + T_2[1] * w2 + T_2[2] * w3
         z[2, i] = w1 + w2
     return math.sqrt(size / (3 * n))
 
