@@ -1,0 +1,71 @@
+"""What an illustration is: its name, its words, what it needs, and how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from walkerlab.figures.canvas import png_of, settle, styled, svg_of
+from walkerlab.figures.needs import Need, Results, why_not
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """An illustration as files' bytes, with its words."""
+
+    svg: bytes
+    png: bytes
+    caption: str
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """An illustration drawn from stored results.
+
+    name     of its files, without suffix
+    title    a few words, without a full stop
+    needs    what it cannot be drawn without; what else is there is drawn too
+    caption  one or two sentences with numbers of the results
+    plot     the figure; called within the common style
+    number   the paper's; None if the paper has no such figure
+    """
+
+    name: str
+    title: str
+    needs: tuple[Need, ...]
+    caption: Callable[[Results], str]
+    plot: Callable[[Results], Figure]
+    number: int | None = None
+
+    @property
+    def called(self) -> str:
+        """What to call it in a sentence."""
+        return f"figure {self.name if self.number is None else self.number}"
+
+    def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
+        """Why it cannot be drawn, in words; None if it can.
+
+        absent  why results are not there, by stage
+        """
+        return why_not(self.needs, results, absent)
+
+    def drawn(self, results: Results) -> Drawing:
+        """Its files and words; the same results give the same bytes."""
+        title = self.title if self.number is None else f"Figure {self.number}. {self.title}"
+        with styled():
+            figure = self.plot(results)
+            settle(figure)
+            return Drawing(svg_of(figure, self.name, title), png_of(figure, title), self.caption(results))
+
+
+def paper_figure(
+    number: int,
+    title: str,
+    needs: tuple[Need, ...],
+    caption: Callable[[Results], str],
+    plot: Callable[[Results], Figure],
+) -> Illustration:
+    """A figure of the paper, drawn anew."""
+    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number)

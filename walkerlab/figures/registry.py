@@ -1,0 +1,15 @@
+"""The illustrations there are, in the order in which they are shown: one file and one entry each."""
+
+from __future__ import annotations
+
+from walkerlab.figures import figure_02, figure_06, figure_07, figure_08, figure_09, figure_10
+from walkerlab.figures.illustration import Illustration
+
+FIGURES: tuple[Illustration, ...] = (
+    figure_02.FIGURE,
+    figure_06.FIGURE,
+    figure_07.FIGURE,
+    figure_08.FIGURE,
+    figure_09.FIGURE,
+    figure_10.FIGURE,
+)

@@ -1,0 +1,187 @@
+"""Stick diagrams: a walker's postures over one gait cycle, to scale, on its slope."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from walkerlab.figures.canvas import blank
+from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
+from walkerlab.figures.walks import Array
+
+CYCLE = 2
+"""Steps of a gait cycle."""
+BETWEEN = 5
+"""Postures between two heel strikes."""
+FAINT, FULL = 0.8, 2.2
+"""Widths of legs between heel strikes and at them, pt."""
+HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
+"""Free space around the walker, leg lengths."""
+SHAPE = 0.68
+"""Height of the axes in parts of their width, unless the walker is taller or longer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sticks:
+    """Where the joints of a walker are; lengths in m along the slope (downhill) and normal to it.
+
+    time     (samples,) s
+    hip      (samples, 2)
+    feet     (samples, leg, 2)
+    strikes  (steps,) s
+    landings (1 + steps,) m along the slope: where the first stance foot stands and each step's foot comes down
+    slope    rad
+    """
+
+    time: Array
+    hip: Array
+    feet: Array
+    strikes: Array
+    landings: Array
+    slope: float
+
+    @property
+    def leg_length(self) -> float:
+        """Largest distance of a foot from the hip (m)."""
+        return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
+
+    def in_plane(self, points: Array) -> Array:
+        """Points of the slope's frame (..., 2) as horizontal and vertical position (m)."""
+        s, c = math.sin(self.slope), math.cos(self.slope)
+        along, normal = points[..., 0], points[..., 1]
+        return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
+
+    def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Samples at the start and the heel strikes of the first cycle, and evenly spaced ones between.
+
+        A cycle that was not completed is shown to the end of the walk.
+        """
+        strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
+        between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
+        if strikes.size <= CYCLE:
+            between.append(np.linspace(strikes[-1], self.time[-1], BETWEEN + 2)[1:])
+        return self._nearest(strikes), self._nearest(np.concatenate(between))
+
+    def _nearest(self, times: Array) -> NDArray[np.int64]:
+        right = np.clip(np.searchsorted(self.time, times), 1, self.time.size - 1)
+        left_is_nearer = times - self.time[right - 1] < self.time[right] - times
+        return np.asarray(right - left_is_nearer, dtype=np.int64)
+
+
+def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
+    """The walker over its first gait cycle, without the ground."""
+    figure, axes = framed(sticks)
+    at_strikes, between = sticks.postures()
+    draw_postures(axes, sticks, between, FAINT)
+    draw_postures(axes, sticks, at_strikes, FULL)
+    shown = slice(0, int(max(at_strikes.max(), between.max())) + 1)
+    axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
+    mark_landings(axes, sticks)
+    show_direction(axes, sticks, sticks.hip[shown])
+    return figure, axes
+
+
+def framed(sticks: Sticks) -> tuple[Figure, Axes]:
+    """Axes of equal scales that fit the cycle, and a figure that fits the axes."""
+    at_strikes, between = sticks.postures()
+    rows = np.concatenate((at_strikes, between))
+    seen = np.concatenate((sticks.hip[rows, None], sticks.feet[rows]), axis=1)
+    points = sticks.in_plane(seen).reshape(-1, 2)
+    length = sticks.leg_length
+    left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
+    right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
+    widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
+    left, right = left - widen, right + widen
+    figure = blank(1.05 + (WIDTH - 0.7) * (top - bottom) / (right - left))
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    axes.set_xlabel("horizontal position (m)")
+    axes.set_ylabel("height (m)")
+    return figure, axes
+
+
+def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
+    """Both legs from hip to foot at some samples, the legs told apart by colour, line and foot."""
+    hip, feet = sticks.in_plane(sticks.hip[rows]), sticks.in_plane(sticks.feet[rows])
+    for leg, look in enumerate(LEGS):
+        for start, end in zip(hip, feet[:, leg], strict=True):
+            axes.plot(
+                *np.stack((start, end), axis=1),
+                color=look.colour,
+                linestyle=look.style,
+                linewidth=width,
+                marker=look.marker,
+                markevery=[1],
+                markersize=2.0 + width,
+                zorder=look.order + width,
+            )
+    axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
+
+
+def mark_landings(axes: Axes, sticks: Sticks) -> None:
+    """Where and when feet came down, under the ground."""
+    times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
+    for along, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
+        x, y = sticks.in_plane(np.array([along, -0.03 * sticks.leg_length]))
+        axes.annotate(
+            f"{time:.3g} s" if time else "start",
+            (x, y),
+            xytext=(0.0, -9.0),
+            textcoords="offset points",
+            arrowprops={"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0},
+            ha="center",
+            va="top",
+            fontsize=8.0,
+        )
+
+
+def show_direction(axes: Axes, sticks: Sticks, path: Array) -> None:
+    """An arrow along the slope over the hip's path (samples, 2), and the slope in numbers."""
+    length = sticks.leg_length
+    height = path[:, 1].max() + 0.09 * length
+    middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
+    tail, head = sticks.in_plane(np.array([[middle - half, height], [middle + half, height]]))
+    axes.annotate("", xy=tuple(head), xytext=tuple(tail), arrowprops={"arrowstyle": "-|>", "color": BLACK})
+    slope = f"walking direction, slope {sticks.slope:.4g} rad = {math.degrees(sticks.slope):.3g}°"
+    axes.annotate(slope, tuple(0.5 * (head + tail)), xytext=(0.0, 7.0), textcoords="offset points", ha="center")
+
+
+def draw_slope(axes: Axes, sticks: Sticks) -> None:
+    """The ground as a plane, hatched underneath."""
+    left, right = axes.get_xlim()
+    depth = 0.02 * sticks.leg_length
+    ends = np.array([left, right])
+    top = -math.tan(sticks.slope) * ends
+    axes.plot(ends, top, color=BLACK, linewidth=0.9, zorder=2.5)
+    axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
+
+
+def entries() -> list[Artist]:
+    """Legend entries of the legs and of what else the walker is made of."""
+    legs = [
+        Line2D([], [], color=look.colour, linestyle=look.style, linewidth=1.6, marker=look.marker, label=look.label)
+        for look in LEGS
+    ]
+    strike = Line2D([], [], color=GREY, linewidth=FULL, label="at heel strike")
+    between = Line2D([], [], color=GREY, linewidth=FAINT, label="between")
+    hip = Line2D([], [], color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0, label="hip")
+    return [*legs, strike, between, hip]
+
+
+def cycle_caption(sticks: Sticks) -> str:
+    """How long the steps of the cycle take and how far they go."""
+    strikes = sticks.strikes[:CYCLE]
+    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
+    measures = ", ".join(f"{period:.4f} s and {length:.4f} m" for period, length in steps)
+    unfinished = "" if strikes.size == CYCLE else "; the cycle was not completed"
+    return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down."

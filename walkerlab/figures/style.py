@@ -1,0 +1,82 @@
+"""How things look, the same in every figure: sizes, fonts, colours, and the lines of models and legs.
+
+Colours are Okabe and Ito's, which colour-blind people tell apart; whatever is drawn over one another differs in
+brightness too, and in the line's style, so that figures survive a grey printer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from matplotlib.typing import LineStyleType
+
+BLACK: Final = "#000000"
+ORANGE: Final = "#E69F00"
+GREEN: Final = "#009E73"
+BLUE: Final = "#0072B2"
+VERMILLION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+GREY: Final = "#7F7F7F"
+PALE: Final = "#EDEDED"
+
+WIDTH: Final = 7.2
+"""Of every figure, in."""
+PNG_DPI: Final = 160
+
+RC: Final = {
+    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.useoffset": False,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9.0,
+    "axes.titlepad": 4.0,
+    "figure.constrained_layout.h_pad": 0.05,
+    "figure.constrained_layout.w_pad": 0.05,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "legend.borderaxespad": 0.2,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "lines.dash_capstyle": "butt",
+    "mathtext.fontset": "dejavusans",
+    "svg.fonttype": "none",
+    "xtick.labelsize": 8.0,
+    "xtick.major.width": 0.7,
+    "ytick.labelsize": 8.0,
+    "ytick.major.width": 0.7,
+}
+"""On top of matplotlib's own defaults, whatever the user's matplotlibrc says."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one series is drawn: `label` in legends, `width` in pt, `marker` at its heel strikes or feet."""
+
+    label: str
+    colour: str
+    style: LineStyleType
+    width: float
+    marker: str
+    order: int = 3
+
+
+RIGID: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)
+CONTACT: Final = Look("contact model", ORANGE, (0.0, (3.2, 1.4)), 1.5, "^", order=4)
+
+LEGS: Final = (
+    Look("leg 1 (swings first)", GREEN, "-", 1.0, "o", order=4),
+    Look("leg 2 (stands first)", PURPLE, (0.0, (5.0, 1.2)), 1.0, "s", order=3),
+)
+
+
+def brightness(colour: str) -> float:
+    """Grey level of a colour '#RRGGBB' on a grey printer, 0 black to 1 white (Rec. 601 luma)."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return 0.299 * red + 0.587 * green + 0.114 * blue

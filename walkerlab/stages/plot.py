@@ -1,0 +1,70 @@
+"""The figures: every one that there are results for, as SVG and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from walkerlab.config.schema import Config
+from walkerlab.figures.illustration import Illustration
+from walkerlab.figures.registry import FIGURES
+from walkerlab.stages.plan import LeftOut
+from walkerlab.stages.progress import Progress
+from walkerlab.store import index
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Content
+from walkerlab.store.files import make_folder, storing, write_atomically
+
+FOLDER = "figures"
+
+
+def run(
+    _config: Config,
+    inputs: Mapping[str, Stored],
+    progress: Progress,
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
+) -> Content:
+    """Draw into the run's folder.
+
+    inputs    results by stage: those that there are
+    left_out  the stages without a result, and why
+
+    Raises StorageError if a figure cannot be stored.
+    """
+    make_folder(folder / FOLDER)
+    absent = {entry.what: entry.why for entry in left_out}
+    reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
+    progress.start("plot", reasons.count(None))
+    drawn, missing = [], []
+    for figure, why in zip(FIGURES, reasons, strict=True):
+        if why is None:
+            drawn.append(draw(figure, inputs, folder))
+            progress.advance()
+        else:
+            remove(figure, folder)
+            missing.append({"what": figure.called, "why": why})
+    files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
+    return Content({index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing})
+
+
+def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int]:
+    """Draw a figure and store its files; its words and its files' paths in the run's folder."""
+    drawing = figure.drawn(results)
+    paths = paths_of(figure)
+    write_atomically(folder / paths["svg"], drawing.svg)
+    write_atomically(folder / paths["png"], drawing.png)
+    number = {} if figure.number is None else {"number": figure.number}
+    return {**number, "title": figure.title, **paths, "caption": drawing.caption}
+
+
+def remove(figure: Illustration, folder: Path) -> None:
+    """Take away what an earlier run drew, of results that are not there any more."""
+    for path in paths_of(figure).values():
+        with storing(folder / path):
+            (folder / path).unlink(missing_ok=True)
+
+
+def paths_of(figure: Illustration) -> dict[str, str]:
+    """Where a figure's files are in the run's folder."""
+    return {kind: f"{FOLDER}/{figure.name}.{kind}" for kind in ("svg", "png")}
