@@ -1,0 +1,107 @@
+"""The stage that draws: files, index, and what is left out."""
+
+import pytest
+from synthetic_walks import both_models, rigid_alone
+
+from walkerlab.config.canonical import only
+from walkerlab.config.schema import Config
+from walkerlab.stages import plot
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.plan import LeftOut
+from walkerlab.store import index
+
+WITHOUT_CONTACT = [LeftOut(name, "the config has no contact block") for name in ("contact-sim", "compare")]
+
+
+class Count:
+    """A progress that counts."""
+
+    def __init__(self):
+        self.total, self.done = None, 0
+
+    def start(self, label, total=None):
+        self.total = total
+
+    def advance(self, n=1):
+        self.done += n
+
+    def note(self, text):
+        pass
+
+
+def draw(folder, results, left_out=(), progress=None):
+    return plot.run(only(Config(), PIPELINE["plot"].reads), results, progress or Count(), folder, left_out)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder and the content of a run of both models."""
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, draw(folder, both_models())
+
+
+@pytest.fixture(scope="module")
+def rigid_only(tmp_path_factory):
+    """The same of a run without contact, in a folder where something was drawn before."""
+    folder = tmp_path_factory.mktemp("rigid")
+    (folder / "figures").mkdir()
+    for name in ("figure-06.svg", "figure-02.png", "figure-mine.svg"):
+        (folder / "figures" / name).write_text("drawn before")
+    progress = Count()
+    return folder, draw(folder, rigid_alone(), WITHOUT_CONTACT, progress), progress
+
+
+def names(folder):
+    return sorted(path.name for path in (folder / "figures").iterdir())
+
+
+def test_every_figure_is_an_svg_and_a_png(whole):
+    folder, content = whole
+    numbers = [2, 6, 7, 8, 9, 10]
+    assert names(folder) == [f"figure-{number:02d}.{kind}" for number in numbers for kind in ("png", "svg")]
+    assert [entry["number"] for entry in content.summary["figures"]] == numbers
+    assert content.summary["left_out"] == []
+
+
+def test_the_index_has_every_file_as_it_was_written(whole):
+    folder, content = whole
+    assert sorted(index.indexed_files(content)) == [f"figures/{name}" for name in names(folder)]
+    assert index.broken_file(folder, content) is None
+
+
+def test_each_entry_has_the_words_and_the_files_of_its_figure(whole):
+    folder, content = whole
+    for entry in content.summary["figures"]:
+        assert set(entry) == {"number", "title", "svg", "png", "caption"}
+        assert (folder / entry["svg"]).is_file()
+        assert (folder / entry["png"]).is_file()
+
+
+def test_figures_without_results_are_left_out_and_said_why(rigid_only):
+    _, content, _ = rigid_only
+    assert [entry["number"] for entry in content.summary["figures"]] == [2, 7, 9, 10]
+    why = "it needs {}: the config has no contact block"
+    assert content.summary["left_out"] == [
+        {"what": "figure 6", "why": why.format("contact-sim")},
+        {"what": "figure 8", "why": why.format("compare")},
+    ]
+
+
+def test_figures_of_results_that_are_gone_go_too_and_nothing_else(rigid_only):
+    folder, _, _ = rigid_only
+    assert "figure-06.svg" not in names(folder)
+    assert (folder / "figures" / "figure-mine.svg").read_text() == "drawn before"
+    assert (folder / "figures" / "figure-02.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_progress_counts_figures(rigid_only):
+    _, _, progress = rigid_only
+    assert progress.done == progress.total == 4
+
+
+def test_nothing_to_draw_is_no_failure(tmp_path):
+    left_out = [LeftOut("fixedpoint", "no gait"), LeftOut("simulate", "it needs fixedpoint: no gait")]
+    content = draw(tmp_path, {}, left_out)
+    assert content.summary["figures"] == []
+    assert names(tmp_path) == []
+    assert len(content.summary["left_out"]) == 6

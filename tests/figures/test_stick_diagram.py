@@ -1,0 +1,94 @@
+"""The geometry of the stick diagrams: legs keep their length, feet stand where they stand."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
+
+from walkerlab.figures import figure_02, figure_06
+from walkerlab.figures.canvas import styled
+from walkerlab.figures.style import LEGS
+
+ROUNDING = 1e-12
+
+
+@pytest.fixture(params=["rigid", "contact"])
+def sticks(request):
+    module = figure_02 if request.param == "rigid" else figure_06
+    return module.sticks_of(both_models())
+
+
+def test_legs_keep_their_length(sticks):
+    lengths = np.linalg.norm(sticks.feet - sticks.hip[:, None], axis=-1)
+    np.testing.assert_allclose(lengths, LEG_LENGTH, atol=ROUNDING)
+
+
+def test_the_hip_does_not_jump_when_legs_change_roles(sticks):
+    apart = np.linalg.norm(np.diff(sticks.hip, axis=0), axis=1)
+    at_once = np.diff(sticks.time) < 1e-9
+    assert apart[at_once].max(initial=0.0) < ROUNDING
+    assert apart.max() < 0.05
+
+
+def test_feet_come_down_one_step_length_ahead(sticks):
+    for step, strike in enumerate(sticks.strikes[:2]):
+        row = np.searchsorted(sticks.time, strike)
+        landed = sticks.feet[row, step % 2]
+        np.testing.assert_allclose(landed, [(step + 1) * STEP_LENGTH, 0.0], atol=1e-9)
+
+
+def test_the_plane_descends_in_walking_direction():
+    sticks = figure_02.sticks_of(rigid_alone())
+    x, y = sticks.in_plane(np.array([STEP_LENGTH, 0.0]))
+    assert np.arctan2(-y, x) == pytest.approx(SLOPE)
+    assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
+
+
+def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
+    results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
+    sticks = figure_02.sticks_of(results)
+    at_strikes, between = sticks.postures()
+    assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
+    assert sticks.time[between].max() == sticks.time[-1]
+    assert "not completed" in figure_02.FIGURE.caption(results)
+
+
+def drawn(figure, results):
+    with styled():
+        return figure.plot(results).axes[0]
+
+
+def test_lengths_are_drawn_to_scale():
+    assert drawn(figure_02.FIGURE, rigid_alone()).get_aspect() == 1.0
+
+
+def test_both_legs_of_every_posture_are_drawn_in_their_colours():
+    axes = drawn(figure_02.FIGURE, rigid_alone())
+    at_strikes, between = figure_02.sticks_of(rigid_alone()).postures()
+    for look in LEGS:
+        assert sum(line.get_color() == look.colour for line in axes.lines) == at_strikes.size + between.size
+
+
+def test_pads_in_sight_are_drawn_in_their_legs_colours():
+    axes = drawn(figure_06.FIGURE, both_models())
+    left, right = axes.get_xlim()
+    pads = both_models()["contact-sim"]["terrain"]
+    for leg, look in enumerate(LEGS):
+        outlines = [patch.get_path().vertices for patch in axes.patches if patch.get_hatch() and of(patch, look)]
+        expected = [
+            pad_left
+            for pad_left, pad_right, owner in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True)
+            if owner == leg and pad_right > left and pad_left < right
+        ]
+        assert [outline[0, 0] for outline in outlines] == pytest.approx(expected, abs=1e-3)
+
+
+def of(patch, look):
+    return to_hex(patch.get_edgecolor()).upper() == look.colour
+
+
+def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
+    results = both_models(**{"contact-sim": contact(pads=False)})
+    assert not [patch for patch in drawn(figure_06.FIGURE, results).patches if patch.get_hatch()]
+    assert "once it has passed the stance foot" in figure_06.FIGURE.caption(results)
+    assert "lane of pads" in figure_06.FIGURE.caption(both_models())
