@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.kernels import inlined
 from walkerlab.physics.system import jacobian
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.radau5 import C
+from walkerlab.solvers.radau5_tableau import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
 ROOT6 = 6.0**0.5
