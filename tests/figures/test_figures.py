@@ -78,6 +78,21 @@ def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
     assert figure_07.FIGURE.caption(results).endswith("The rigid model took 0 steps (no-heel-strike).")
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_walk_that_ended_where_it_began_can_be_drawn():
+    results = rigid_alone(simulate=first_sample_of(rigid(1, outcome="rejected", completed=0)))
+    for figure in (figure_07.FIGURE, figure_09.FIGURE, figure_10.FIGURE):
+        assert "0 steps (rejected)" in figure.drawn(results).caption
+
+
+def first_sample_of(result):
+    trajectory = {
+        name: Variable(variable.values[:1], variable.dims, variable.units, variable.long_name)
+        for name, variable in result["trajectory"].variables.items()
+    }
+    return stored("simulate", {"trajectory": Group(trajectory)}, result.summary)
+
+
 def test_models_that_completed_no_step_together_have_no_difference_in_phase():
     results = both_models(compare=compared(aligned=False))
     assert why_left_out(results, {}) == {8: "compare: no step was completed by both models"}

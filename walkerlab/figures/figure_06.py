@@ -74,7 +74,7 @@ def caption(results: Results) -> str:
     radius = float(result.identity.config_slice["walker"]["foot_radius_m"])
     feet = f"ball feet of {1e3 * radius:.3g} mm radius" if radius else "point feet"
     ground = (
-        f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4f} m"
+        f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
         if TERRAIN in result.groups
         else "on a plane that a swing foot can touch only once it has passed the stance foot"
     )

@@ -57,7 +57,7 @@ def caption(results: Results) -> str:
     """What is shown, and the means of the mechanical energy."""
     walks = walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES)
     cut, extent = shown(walks)
-    means = ", ".join(f"{walk.look.label} {mean_energy(walk):.2f} J" for walk in cut)
+    means = ", ".join(f"{walk.look.label} {mean_energy(walk):.5g} J" for walk in cut)
     return (
         f"Kinetic, potential and mechanical energy{extent}. Time mean of the mechanical energy: {means}. "
         f"{IMPACTS if any(walk.look is CONTACT for walk in walks) else ''}{sentence(walks)}"
@@ -67,7 +67,10 @@ def caption(results: Results) -> str:
 def mean_energy(walk: Walk) -> float:
     """Time mean of the mechanical energy (J) over what is shown."""
     energy, time = walk["mechanical_J"], walk.time
-    return float(np.sum(0.5 * (energy[1:] + energy[:-1]) * np.diff(time)) / (time[-1] - time[0]))
+    duration = float(time[-1] - time[0])
+    if duration == 0.0:
+        return float(energy[0])
+    return float(np.sum(0.5 * (energy[1:] + energy[:-1]) * np.diff(time))) / duration
 
 
 FIGURE = paper_figure(10, "Kinetic, potential and mechanical energy", (RIGID_ENERGIES,), caption, plot)

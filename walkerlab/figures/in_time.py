@@ -23,7 +23,9 @@ def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, 
     for one in axes:
         for walk in walks:
             mark_strikes(one, walk)
-    axes[-1].set_xlim(0.0, 1.01 * max(float(walk.time[-1]) for walk in walks))
+    end = max(float(walk.time[-1]) for walk in walks)
+    if end > 0.0:
+        axes[-1].set_xlim(0.0, 1.01 * end)
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels(axes)
     return figure, axes

@@ -182,6 +182,6 @@ def cycle_caption(sticks: Sticks) -> str:
     """How long the steps of the cycle take and how far they go."""
     strikes = sticks.strikes[:CYCLE]
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
-    measures = ", ".join(f"{period:.4f} s and {length:.4f} m" for period, length in steps)
+    measures = ", ".join(f"{period:.4g} s and {length:.4g} m" for period, length in steps)
     unfinished = "" if strikes.size == CYCLE else "; the cycle was not completed"
     return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down."
