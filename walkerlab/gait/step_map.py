@@ -97,11 +97,10 @@ def chain_rule(walker: RigidWalker, y: State, full: State, DP: Any, work: Any) -
             DP[row, column] = total
 
 
-@kernel
 def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
-    """`step_with_jacobian` for callers outside compiled code, with a fresh budget."""
-    clear_counts(shooting.method)
-    return step_with_jacobian(shooting, z)
+    """`step_with_jacobian` for callers outside compiled code: Newton's first look, without a move."""
+    status, period, _, _ = newton(shooting, np.array(z, float), NO_RESIDUAL)
+    return status, period
 
 
 @kernel
