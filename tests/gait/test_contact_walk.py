@@ -237,3 +237,21 @@ def test_any_start_ends_in_words(theta_2, w_1, w_2, friction):
         assert walk.energy_balance_residual_J < 1e-4
     if walk.outcome is Outcome.WALKED:
         assert walk.periods_s.size == 4
+
+
+BOUNCING = (
+    "contact.stiffness=154987",
+    "contact.damping=1783.13",
+    "contact.full_damping_penetration=4.95809",
+    "contact.stiction_velocity=258.249",
+    "contact.friction_velocity=1278.15",
+    "contact.exponent=2.15",
+    "walker.foot_radius_m=0.03671",
+)
+
+
+def test_a_foot_that_an_event_left_on_the_surface_does_not_hold_the_walk_up():
+    """Hardly damped feet bounce on and on; rounding decides on which side of the surface an event leaves them."""
+    walk = walked(*BOUNCING, steps=4, budget=300_000)
+    assert walk.outcome is Outcome.WALKED
+    assert walk.energy_balance_residual_J < 1e-6

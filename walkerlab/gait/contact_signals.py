@@ -181,7 +181,8 @@ def earliest_crossing(
     best, signal = NO_CROSSING, -1
     for foot in range(2):
         first = foot * PER_FOOT
-        lowest = finder.values[first + HEIGHT, 0]
+        # a foot that an event left on the surface is inside or outside by rounding there
+        lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
         inside = feels_ground(system, carried[foot] != 0, lowest)

@@ -140,6 +140,7 @@ def walk_part(
     begin(method, mode, t, y, method.clock[H_NEXT])
     arriving, refinements, signal = False, 0, -1
     target = deadline(frame, ledger)
+    latest = target  # the end of the step in which an event was found: it is not sought beyond
     scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
     feet = Feet(ledger.carried, ledger.cells, ledger.at_zero)
     while ledger.feet[STEPS] < ledger.touch_time.size:
@@ -154,6 +155,7 @@ def walk_part(
             signal = found
             if fraction <= 1.0:
                 wait = fraction * (method.clock[T] - method.clock[T_OLD])
+                latest = method.clock[T]
                 target = method.clock[T_OLD] + max(wait, EVENT_TIME)
                 arriving, refinements = True, 0
                 if target < method.clock[T]:
@@ -161,7 +163,7 @@ def walk_part(
                     continue
         elif refinements < REFINEMENTS:
             wait = time_to_zero(method, finder, signal)
-            if abs(wait) > EVENT_TIME and target + wait > method.clock[T_OLD]:
+            if abs(wait) > EVENT_TIME and method.clock[T_OLD] < target + wait <= latest:
                 target += wait
                 refinements += 1
                 rewind(method, mode)
