@@ -82,6 +82,11 @@ from numba.extending import overload, register_jitable  # noqa: E402
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
 
+def nothing_compiled_yet() -> bool:
+    """Whether this state of the sources has no compiled code so far: the first run on a machine, or after a change."""
+    return next(CACHE_FOLDER.rglob("*.nbc"), None) is None
+
+
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
     return cast(F, numba.njit(cache=True, **FLAGS)(function))

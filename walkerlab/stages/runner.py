@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -131,6 +132,7 @@ class Run:
         self.reporter = reporter
         self.jobs = jobs
         self.done: list[Done] = []
+        self.announced = False
 
     def carry_out(self, stages: Sequence[Stage]) -> None:
         """Decide on one stage after another, and do it."""
@@ -182,6 +184,7 @@ class Run:
         """Call a stage's `run` with what it declared and nothing else."""
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(stage.module).run
+        self._announce_compilation()
         config = only(self.planner.config, stage.reads)
         extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
         if stage.draws:
@@ -193,6 +196,13 @@ class Run:
         if not isinstance(content, Content):
             raise TypeError(f"{stage.module}.run returned {type(content).__name__}, not Content")
         return content
+
+    def _announce_compilation(self) -> None:
+        """Say once why the first stages of a new installation take so long; a stage without kernels is not asked."""
+        kernels = sys.modules.get("walkerlab.kernels")
+        if kernels is not None and not self.announced and kernels.nothing_compiled_yet():
+            self.announced = True
+            self.reporter.note("compiling the models for this machine, once; later runs use the compiled code")
 
     def report(self, target: Stage, wall_s: float) -> StageReport:
         """How it went."""
