@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.gait.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
-from walkerlab.gait.contact_signals import HEIGHT, PER_FOOT, SIGNALS, Frame, feet_motion
+from walkerlab.gait.contact_signals import (
+    FALLEN_HIP,
+    HEIGHT,
+    PER_FOOT,
+    SIGNALS,
+    Frame,
+    feet_motion,
+    hip_height,
+)
 from walkerlab.gait.contact_tangent import new_tangent
 from walkerlab.gait.contact_walk import (
     AIRBORNE_SINCE,
@@ -245,9 +253,13 @@ def walk_contact(
     interval_s  time between samples, or None for none
     booked      whether to keep the energy's books
 
-    The room for samples doubles until the whole walk fits.
+    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
     """
     frame = ground.frame
+    if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
+        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
+        here = Stopped(0.0, start, np.zeros(4, np.int64))
+        return gather(Outcome.REJECTED, here, ledger, new_observer(walker, ledger, start), walker)
     room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
     while True:
         ledger = new_ledger(walker, ground.terrain, stance, steps, start)

@@ -55,6 +55,7 @@ AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 TRIP = 0.25  # of the stride measure: how far from its foothold a foot must come down to have tripped
 EVENT_TIME = 1e-12  # s, how exactly an event is located
 REFINEMENTS = 4
+REWINDS = 24  # of one step; where rounding moves an event with each try, the step's end is the event
 
 WALKED, FELL, OFF_PAD = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.OFF_PAD)
 LIFTED_OFF, SLID, NO_HEEL_STRIKE = int(Outcome.LIFTED_OFF), int(Outcome.SLID), int(Outcome.NO_HEEL_STRIKE)
@@ -138,7 +139,7 @@ def walk_part(
     """
     mode = in_mode(system, ledger)
     begin(method, mode, t, y, method.clock[H_NEXT])
-    arriving, refinements, signal = False, 0, -1
+    arriving, refinements, rewinds, signal = False, 0, 0, -1
     target = deadline(frame, ledger)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
     scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
@@ -158,16 +159,19 @@ def walk_part(
                 latest = method.clock[T]
                 target = method.clock[T_OLD] + max(wait, EVENT_TIME)
                 arriving, refinements = True, 0
-                if target < method.clock[T]:
+                if target < method.clock[T] and rewinds < REWINDS:
+                    rewinds += 1
                     rewind(method, mode)
                     continue
-        elif refinements < REFINEMENTS:
+        elif refinements < REFINEMENTS and rewinds < REWINDS:
             wait = time_to_zero(method, finder, signal)
             if abs(wait) > EVENT_TIME and method.clock[T_OLD] < target + wait <= latest:
                 target += wait
                 refinements += 1
+                rewinds += 1
                 rewind(method, mode)
                 continue
+        rewinds = 0
         observe(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
         outcome = judge(mode, scene, method, finder, ledger)
         if outcome != GOES_ON:
