@@ -18,6 +18,7 @@ LAYERS = (
     "report",
     "figures",
     "store",
+    "stability",
     "scene",
     "gait",
     "solvers",

@@ -29,7 +29,7 @@ def slice_of(config: Config, reads: tuple[str, ...]) -> dict[str, Any]:
 
 def _copy(source: dict[str, Any], target: dict[str, Any], path: tuple[str, ...]) -> None:
     name, rest = path[0], path[1:]
-    if not rest or source[name] is None:
+    if not rest or source[name] is None or isinstance(source[name], list):  # of a list's items all or none
         target[name] = source[name]
     else:
         _copy(source[name], target.setdefault(name, {}), rest)

@@ -9,7 +9,7 @@ from typing import Final
 
 from walkerlab.config.problems import Problem, nearest, refusal, shown
 from walkerlab.config.reader import MAX_CHARACTERS, read
-from walkerlab.config.tree import Mapping, Position, Scalar
+from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
 BUILTIN_FOLDER: Final = Path(__file__).parent / "builtin"
 SUFFIXES: Final = (".yaml", ".yml")
@@ -77,9 +77,32 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
             raise refusal([Problem(asked, f"extends: more than {MAX_EXTENDS} files deep")])
         seen.append(identity)
         layer = _block_of(text, current)
-        layers.insert(0, layer.without("extends"))
+        layers.insert(0, with_cases(layer.without("extends"), current.path.parent))
         current, asked = _parent_of(layer, current)
     return layers
+
+
+def with_cases(layer: Mapping, folder: Path) -> Mapping:
+    """The layer with the list of a file in the place of that file's name, under stability.cases.
+
+    folder  which relative names start from
+
+    Raises ConfigError if the file cannot be read or holds no list.
+    """
+    block = layer.entries.get("stability")
+    named = block.entries.get("cases") if isinstance(block, Mapping) else None
+    if not isinstance(block, Mapping) or not isinstance(named, Scalar) or not isinstance(named.value, str):
+        return layer
+    path = folder / named.value
+    file = ConfigFile(path, shown(str(path), SHOWN_PATH))
+    cases = read(_text_of(file, named.position), file.label)
+    if not isinstance(cases, Sequence):
+        problem = Problem(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
+        raise refusal([problem])
+    whole, inner = layer.without(), block.without()
+    inner.put("cases", cases, block.keys["cases"])
+    whole.put("stability", inner, layer.keys["stability"])
+    return whole
 
 
 def _parent_of(layer: Mapping, file: ConfigFile) -> tuple[ConfigFile | None, Position | None]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.files import ConfigFile, builtin, find, read_layers
+from walkerlab.config.files import ConfigFile, builtin, find, read_layers, with_cases
 from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
 from walkerlab.config.numbers import short
 from walkerlab.config.run_name import run_name
@@ -49,10 +49,10 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
     settings = parse_settings(sets)
     if strides is not None:
         settings.append(strides_setting(strides))
-    changed_tree = with_settings(tree, settings)
+    changed_tree = with_cases(with_settings(tree, settings), Path())
     changed = typed(changed_tree)
     base = typed(tree) if settings else changed
-    config, warnings = _on_the_slope(changed, changed_tree)
+    config, warnings = on_the_slope(changed, changed_tree)
     return LoadedConfig(config, run_name(base, changed, _degrees(changed_tree)), warnings, file.label)
 
 
@@ -71,7 +71,7 @@ def _degrees(tree: Mapping) -> float | None:
     return float(node.value) if isinstance(node, Scalar) and isinstance(node.value, int | float) else None
 
 
-def _on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
     """`config` with theta_1 of its start such that both feet stand on the slope, theta_1 + theta_2 = -2 phi."""
     if isinstance(config.start, str):
         return config, ()

@@ -10,10 +10,12 @@ from pydantic_core import PydanticCustomError
 
 from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.fields import Block, key
+from walkerlab.config.stability import Case, Stability
 
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Case",
     "CompassWalker",
     "Config",
     "Contact",
@@ -26,6 +28,7 @@ __all__ = [
     "SlopeInDegrees",
     "SolverSettings",
     "Solvers",
+    "Stability",
     "State",
 ]
 
@@ -216,6 +219,7 @@ class Config(Block):
     strides: Annotated[int, key("1", "strides to walk, one stride is two steps", "this project", ge=1, le=10_000)] = 5
     contact: Contact | None = None
     solver: Solvers = Solvers()
+    stability: Stability = Stability()
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

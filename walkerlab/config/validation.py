@@ -82,7 +82,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
 def _unknown_key(path: tuple[str, ...], tree: Mapping) -> Problem:
     block: type[Block] = Config
     for above in path[:-1]:
-        block = block_of(block.model_fields[above]) or block
+        if above in block.model_fields:
+            block = block_of(block.model_fields[above]) or block
     name = path[-1]
     parent, _ = _node_at(tree, path[:-1])
     position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
@@ -113,7 +114,9 @@ def _field_at(model: type[Block], location: tuple[int | str, ...]) -> tuple[list
     field = model.model_fields[path[0]]
     for part in location[1:]:
         block = block_of(field)
-        if block is None:
+        if isinstance(part, int) and block is not None:
+            continue  # an item of a list of blocks
+        if block is None or str(part) not in block.model_fields:
             break
         path.append(str(part))
         field = block.model_fields[str(part)]

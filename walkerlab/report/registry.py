@@ -22,6 +22,7 @@ from walkerlab.report.sections import (
     paper_numbers,
     paper_tables,
     provenance,
+    stability,
     steps,
     verdict,
 )
@@ -40,6 +41,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     paper_tables.section,
     paper_numbers.section,
     errata.section,
+    stability.section,
     left_out.section,
     provenance.section,
 )

@@ -86,7 +86,7 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "seed")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "stability", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -128,6 +128,13 @@ PIPELINE = Graph(
         inputs=gait_for_start_or_pads,
     ),
     Stage(
+        "stability",
+        "walkerlab.stages.stability",
+        "Judge extreme cases and problems with known answers.",
+        reads=("stability",),
+        has_cells=True,
+    ),
+    Stage(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
@@ -141,7 +148,7 @@ PIPELINE = Graph(
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
         reads=EVERYTHING,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "accuracy", "plot"),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "accuracy", "stability", "plot"),
         draws=True,
     ),
 )

@@ -233,8 +233,8 @@ class Run:
             return NoAnswer(said["message"], said["advice"])
         for done in self.done:
             result = self.planner.results.get(done.stage)
-            if result is not None and not result.complete:
-                said = result.summary["no_answer"]
+            said = None if result is None else result.summary.get("no_answer")
+            if said is not None:
                 return NoAnswer(f"{done.stage}: {said['message']}", said["advice"])
         return None
 

@@ -1,0 +1,85 @@
+"""The stage: what it stores and says, the same with one and with two processes, and cases of one's own."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.report.results import Results
+from walkerlab.report.sections.stability import section
+from walkerlab.stability.catalogue import shipped
+from walkerlab.stability.cells import cells_of, run_cells
+from walkerlab.stability.known import Known
+from walkerlab.stability.verdict import CaseResult, Finding
+from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
+
+GOOD = CaseResult(
+    "good", "own", "contact", "because", ("walked",), "walked", 4, 1e-9, 100, 0.1, (Finding("x", 0.5, 1.0),)
+)
+BAD = replace(GOOD, name="bad", outcome="fell")
+RIGHT = Known("ball", "time, s", 1.0, 1.0, "closed form", 1e-6, "tolerance", 0.1)
+WRONG = replace(RIGHT, name="block", value=2.0)
+
+
+def report_of(summary):
+    stored = {} if summary is None else {"stability": SimpleNamespace(summary=summary, groups={})}
+    return section(Results(None, stored))
+
+
+def test_all_right_is_an_answer():
+    assert verdict([GOOD], [RIGHT]) == {}
+    summary = summary_of([GOOD], [RIGHT], [])
+    assert (summary["passed"], summary["failed"]) == (2, 0)
+
+
+def test_what_is_wrong_is_named():
+    said = verdict([GOOD, BAD], [RIGHT, WRONG])["no_answer"]["message"]
+    assert said == "2 of 4 did not end as expected: bad, block"
+    summary = summary_of([GOOD, BAD], [RIGHT, WRONG], [])
+    assert (summary["passed"], summary["failed"]) == (2, 2)
+    assert summary["cases"][1]["note"] == "ended as fell, not walked"
+
+
+def test_tables_are_stored():
+    assert cases_group([GOOD, BAD])["ok"].tolist() == [True, False]
+    assert known_group([RIGHT, WRONG])["error"].tolist() == [0.0, 1.0]
+
+
+def test_report_says_in_red_what_failed():
+    shown = report_of(summary_of([GOOD, BAD], [RIGHT, WRONG], []))
+    red = [block.text for block in shown.blocks if getattr(block, "tone", "") == "bad"]
+    assert len(red) == 2
+    assert "ended as fell, not walked" in red[0]
+    assert report_of(None) is None
+
+
+def test_one_and_two_processes_find_the_same():
+    cases = [case for case in shipped() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")]
+    cells = [cell for cell in cells_of(cases) if hasattr(cell, "case")]
+    one, two = ([replace(found[0], wall_s=0.0) for found in run_cells(cells, jobs)] for jobs in (1, 2))
+    assert one == two
+
+
+def test_cases_of_ones_own_come_from_a_file(tmp_path):
+    (tmp_path / "cases.yaml").write_text("- {name: mine, expected: [walked], reason: mine, config: {slope_deg: 2}}\n")
+    (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
+    (case,) = load(tmp_path / "own.yaml").config.stability.cases
+    assert (case.name, case.config) == ("mine", {"slope_deg": 2})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("- {name: mine, expected: [walkedd], reason: mine}\n", "cases.yaml:1:.*did you mean walked"),
+        ("name: mine\n", "does not hold a list"),
+        ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),
+        ("- {name: x, expected: [walked], reason: mine, budgett: 3}\n", "did you mean .*budget"),
+    ],
+)
+def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
+    (tmp_path / "cases.yaml").write_text(text)
+    (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
+    with pytest.raises(ConfigError, match=said):
+        load(tmp_path / "own.yaml")

@@ -1,0 +1,86 @@
+"""The stability block: cases of one's own, beside the catalogue that comes with the package."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal, get_args
+
+from pydantic import Field, field_validator
+
+from walkerlab.config.fields import Block, key
+
+Fate = Literal[
+    "walked",
+    "fell",
+    "off-pad",
+    "lifted-off",
+    "slid",
+    "no-heel-strike",
+    "budget-exhausted",
+    "solver-failed",
+    "rejected",
+]
+FATES: Final[tuple[Fate, ...]] = get_args(Fate)
+NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
+_HERE: Final = "this project"
+
+
+class Case(Block):
+    """One case: a few lines over the paper config, and what must become of it."""
+
+    name: Annotated[
+        str,
+        key("", "name of the case", _HERE, bounds="up to 64 letters, digits, '.', '_', '+' or '-'"),
+        Field(pattern=NAME),
+    ]
+    family: Annotated[
+        str, key("", "what it belongs to, for tables", _HERE, bounds="as a name"), Field(pattern=NAME)
+    ] = "own"
+    model: Annotated[Literal["contact", "rigid"], key("", "which model walks", _HERE)] = "contact"
+    config: Annotated[
+        dict[str, Any], key("", "keys of a config, over the paper's", _HERE, bounds="a block of keys", default="none")
+    ] = Field(default_factory=dict)
+    steps: Annotated[int, key("1", "steps to walk", _HERE, ge=1, le=2_000_000)] = 4
+    lowered_m: Annotated[
+        float, key("m", "how far the start is sunk into the ground; negative lifts it", _HERE, ge=-1e3, le=1e3)
+    ] = 0.0
+    expected: Annotated[
+        tuple[Fate, ...],
+        key("", "outcomes that are right", _HERE, bounds=f"a list of {', '.join(FATES)}", sequence=True),
+    ]
+    reason: Annotated[str, key("", "why that is to be expected", _HERE, bounds="a sentence")]
+    budget: Annotated[int, key("1", "right-hand sides it may evaluate", _HERE, ge=1, le=100_000_000)] = 400_000
+    balance: Annotated[
+        float, key("1", "largest residual of the energy balance, as a share of the walker's energy", _HERE, gt=0.0)
+    ] = 1e-6
+    agreement: Annotated[
+        float,
+        key("1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", _HERE, gt=0.0),
+    ] = 1e-3
+    compared_steps: Annotated[
+        int, key("1", "steps of which the times are compared: fewer where small errors grow", _HERE, ge=1)
+    ] = 20
+    twin: Annotated[
+        bool, key("", "whether a walker of another size must do the same", _HERE, bounds="true or false")
+    ] = False
+
+    @field_validator("expected")
+    @classmethod
+    def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
+        if not value:
+            raise ValueError("must name an outcome")
+        return value
+
+
+class Stability(Block):
+    """What `walkerlab stability` judges besides the catalogue."""
+
+    cases: Annotated[
+        tuple[Case, ...],
+        key(
+            "",
+            "cases of your own; a file that holds such a list may stand for it",
+            _HERE,
+            bounds="a list of cases, or a file",
+            sequence=True,
+        ),
+    ] = ()

@@ -1,0 +1,141 @@
+"""How extreme cases end, what known problems come to, and what ordinary methods make of the same scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from walkerlab.report.blocks import Block, Body, Cell, Column, Paragraph, Section, Table, Tone, body, table
+from walkerlab.report.numbers import count, number
+from walkerlab.report.results import Results
+
+VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def section(results: Results) -> Section | None:
+    """The stability table; None if the stage did not run."""
+    summary = results.summary("stability")
+    if summary is None:
+        return None
+    cases, known = summary["cases"], summary["known"]
+    blocks: list[Block] = [*failures(cases, known), passed(summary), case_table(cases), known_table(known)]
+    if summary["ordinary"]:
+        blocks.append(ordinary_table(summary))
+    return Section("stability", "Stiff and extreme cases", tuple(blocks))
+
+
+def failures(cases: Rows, known: Rows) -> list[Block]:
+    """What is not as it should be, and why; in red."""
+    found: list[Block] = [
+        Paragraph(f"{row['name']} ({row['family']}): {row['note']}. Expected: {row['reason']}.", "bad")
+        for row in cases
+        if not row["ok"]
+    ]
+    found += [
+        Paragraph(
+            f"{row['name']}: {row['quantity']} is {number(row['value'])}, by another route {number(row['reference'])}; "
+            f"the error of {number(row['error'], 2)} is above {number(row['limit'], 2)}.",
+            "bad",
+        )
+        for row in known
+        if not row["ok"]
+    ]
+    return found
+
+
+def passed(summary: Mapping[str, Any]) -> Paragraph:
+    """How many there are and how they are judged."""
+    total = summary["passed"] + summary["failed"]
+    judged = (
+        "A case passes if it ends as expected, within its budget of right-hand sides, with finite numbers, its energy "
+        "balanced, nothing won back from friction or damping, momentum kept at heel strikes, and the same times at a "
+        "tenfold tolerance; walkers of other sizes also agree with a twin of ordinary size."
+    )
+    return Paragraph(f"{summary['passed']} of {count(total, 'case')} and known problems came out right. {judged}")
+
+
+def case_table(cases: Rows) -> Table:
+    """Every case, by family."""
+    columns = (
+        Column("case"),
+        Column("ended as"),
+        Column("steps", numeric=True),
+        Column("worst measure over its limit", numeric=True),
+        Column("right-hand sides", numeric=True),
+        Column("time (ms)", numeric=True),
+        Column("why that is to be expected", wide=True),
+    )
+    families = dict.fromkeys(str(row["family"]) for row in cases)
+    bodies = tuple(
+        Body(family, body([case_row(row) for row in cases if row["family"] == family]).rows) for family in families
+    )
+    note = "Worst measure: the largest of all measures of a case, each divided by the most that is allowed."
+    return Table("Extreme cases", columns, bodies, wordy=True, note=note)
+
+
+def case_row(row: Mapping[str, Any]) -> list[str | Cell]:
+    """A case."""
+    worst = max((one["value"] / one["limit"] for one in row["measures"] if one["limit"] > 0.0), default=None)
+    return [
+        str(row["name"]),
+        Cell(str(row["outcome"]), "good" if row["ok"] else "bad"),
+        str(row["steps"]),
+        number(worst, 2),
+        str(row["rhs_evaluations"]),
+        number(1e3 * row["wall_s"], 3),
+        str(row["reason"]),
+    ]
+
+
+def known_table(known: Rows) -> Table:
+    """Every known problem."""
+    columns = [
+        Column("problem"),
+        Column("quantity"),
+        Column("by the contact code", numeric=True),
+        Column("reference", numeric=True),
+        Column("relative error", numeric=True),
+        Column("the reference’s route", wide=True),
+    ]
+    rows: list[list[str | Cell]] = [
+        [
+            str(row["name"]),
+            str(row["quantity"]),
+            number(row["value"], 7),
+            number(row["reference"], 7),
+            Cell(number(row["error"], 2), "good" if row["ok"] else "bad"),
+            str(row["source"]),
+        ]
+        for row in known
+    ]
+    return table("Problems with known answers, run through the contact code", columns, rows, wordy=True)
+
+
+def ordinary_table(summary: Mapping[str, Any]) -> Table:
+    """What ordinary methods do with some of the cases: one row a case, one column a method."""
+    rows: Rows = summary["ordinary"]
+    methods = dict.fromkeys(str(row["method"]) for row in rows)
+    names = dict.fromkeys(str(row["case"]) for row in rows)
+    found = {(row["case"], row["method"]): row for row in rows}
+    columns = [Column("case"), *(Column(method) for method in methods)]
+    body_rows: list[list[str | Cell]] = [
+        [name, *(ordinary_cell(found.get((name, method))) for method in methods)] for name in names
+    ]
+    note = (
+        f"The scene as one differential equation without events, at most {summary['ordinary_cap']} evaluations, "
+        "to the end of two steps. In each cell the error of the state there (leg lengths, radians, pendulum times) and "
+        "the run time. "
+        f"Fine: below {number(summary['ordinary_fine'])}; wrong silently: above, and the method says nothing; "
+        "diverges: further than ten legs off, or out of all numbers; gives up: fails or uses up its evaluations."
+    )
+    return table("What an ordinary choice of method does", columns, body_rows, note=note)
+
+
+def ordinary_cell(row: Mapping[str, Any] | None) -> Cell:
+    """A method's verdict with error and run time."""
+    if row is None:
+        return Cell("")
+    error = f" {number(row['error'], 2)}," if "error" in row else ""
+    return Cell(f"{row['verdict']}:{error} {number(1e3 * row['wall_s'], 2)} ms", VERDICTS[row["verdict"]])

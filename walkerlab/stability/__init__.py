@@ -1,0 +1,1 @@
+"""Extreme cases, each judged by measures that the walk itself does not use."""

@@ -1,0 +1,43 @@
+"""The catalogue of cases: read, typed by the schema, and turned into configs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from walkerlab.config.overlay import over_paper
+from walkerlab.config.reader import read
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.config.tree import Mapping, plain
+
+CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
+
+
+def shipped() -> tuple[Case, ...]:
+    """The cases that come with the package; ValueError if two have one name."""
+    root = read(CATALOGUE.read_text(encoding="utf-8"), CATALOGUE.name)
+    if not isinstance(root, Mapping):
+        raise ValueError(f"{CATALOGUE.name} is no block of families")
+    listed: list[Case] = []
+    for family, node in root.entries.items():
+        entries = plain(node)
+        if not isinstance(entries, list):
+            raise ValueError(f"family {family} is no list of cases")
+        listed += [Case.model_validate({"family": family, **entry}) for entry in entries if isinstance(entry, dict)]
+    return without_doubles(listed)
+
+
+def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
+    """The cases; ValueError if two have one name."""
+    names = [case.name for case in cases]
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    if doubled:
+        raise ValueError(f"more than one case is named {', '.join(doubled)}")
+    return tuple(cases)
+
+
+def config_of(case: Case) -> Config:
+    """The paper's config with the case's lines over it; ConfigError if they are no config."""
+    return over_paper(case.config, f"case {case.name}")

@@ -1,0 +1,78 @@
+"""The independent pieces that the stage is made of, run here or in several processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from walkerlab.config.stability import Case
+from walkerlab.stability.catalogue import config_of
+from walkerlab.stability.contact_case import judge_contact
+from walkerlab.stability.known import PROBLEMS, Known
+from walkerlab.stability.ordinary import CHOSEN, Choice, choices
+from walkerlab.stability.rigid_case import judge_rigid
+from walkerlab.stability.verdict import CaseResult
+
+
+@dataclass(frozen=True)
+class CaseCell:
+    """A case to be judged, and shown with ordinary methods if it is one of those."""
+
+    case: Case
+
+    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
+        """The verdict, then the ordinary methods."""
+        config = config_of(self.case)
+        if self.case.model == "rigid":
+            return (judge_rigid(self.case, config),)
+        shown = choices(self.case, config) if self.case.name in CHOSEN else ()
+        return (judge_contact(self.case, config), *shown)
+
+
+@dataclass(frozen=True)
+class KnownCell:
+    """A known problem, by its place in the list."""
+
+    index: int
+
+    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
+        """Its answer."""
+        return (PROBLEMS[self.index].answered(),)
+
+
+Cell = CaseCell | KnownCell
+Found = tuple[CaseResult | Known | Choice, ...]
+
+
+def cells_of(cases: Sequence[Case]) -> list[Cell]:
+    """Everything there is to run: known problems first, since they are the longest."""
+    return [*(KnownCell(index) for index in range(len(PROBLEMS))), *(CaseCell(case) for case in cases)]
+
+
+def run_cell(cell: Cell) -> Found:
+    """One piece; a function that other processes can be sent."""
+    return cell.run()
+
+
+def run_cells(cells: Sequence[Cell], jobs: int) -> Iterator[Found]:
+    """The pieces' results in their order, whoever ran them."""
+    if jobs <= 1:
+        yield from map(run_cell, cells)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    # compiled here before several processes would each compile the same
+    ready = {index: run_cell(cells[index]) for index in first_of_each_model(cells)}
+    waiting = [cell for index, cell in enumerate(cells) if index not in ready]
+    # compiled code and threads do not survive a fork
+    with ProcessPoolExecutor(min(jobs, len(cells)), get_context("spawn")) as pool:
+        others = pool.map(run_cell, waiting)
+        for index in range(len(cells)):
+            yield ready[index] if index in ready else next(others)
+
+
+def first_of_each_model(cells: Sequence[Cell]) -> list[int]:
+    """Places of the first case of each model."""
+    models = [cell.case.model if isinstance(cell, CaseCell) else "" for cell in cells]
+    return [models.index(model) for model in ("contact", "rigid") if model in models]

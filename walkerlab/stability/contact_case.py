@@ -1,0 +1,154 @@
+"""One case of the physical model: walked, walked again with a tenfold tolerance, and as its twin of another size."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.gait.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
+from walkerlab.gait.fixed_point import find_gaits
+from walkerlab.gait.outcome import Outcome
+from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.physics.rigid.walker import step_length
+from walkerlab.physics.system import State
+from walkerlab.scene.contact import ContactScene, contact_scene, start_state
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import method_named
+from walkerlab.stability.scaling import pendulum_time, scaled, to_twin
+from walkerlab.stability.verdict import CaseResult, Finding, finite
+
+TENFOLD = 0.1
+SAMPLED_STEPS = 100  # longer walks are not sampled
+SAMPLES_PER_PENDULUM_TIME = 40
+HEIGHT = 1  # index into the state of the free walker
+RATES = 4  # where the velocities of the state begin
+NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A walker on its ground, in the state that it starts from."""
+
+    scene: ContactScene
+    start: State
+    energy: float  # J, m g L and the energy of the start: what residuals are measured by
+
+
+def prepared(config: Config, case: Case) -> Prepared | None:
+    """The scene and start of a case; None if it starts from a gait that there is not."""
+    walker = rigid_walker(config, config.equations)
+    if isinstance(config.start, str):
+        gait = find_gaits(walker, config.seed).gait
+        if gait is None:
+            return None
+        rigid_state, length = tuple(float(x) for x in gait.state), float(gait.step_length)
+    else:
+        rigid_state = config.start
+        length = abs(float(step_length(walker, rigid_state[1], rigid_state[0])))
+    scene = contact_scene(config, length)
+    y = start_state(scene, rigid_state)
+    lowered = case.lowered_m * config.walker.leg_length_m
+    y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
+    mass, gravity, leg = scene.walker.tree.mass, config.gravity_m_s2, config.walker.leg_length_m
+    speed = float(np.max(np.abs([y[4], y[5], *(leg * rate for rate in y[6:])])))
+    law = scene.walker.normal
+    stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    return Prepared(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)
+
+
+def walked(ready: Prepared, config: Config, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
+    """Walk a case with the tolerances of its config times `sharper`."""
+    settings, scene = config.solver.contact, ready.scene
+    methods = MethodSettings(
+        method_named(settings.method), sharper * settings.rtol, sharper * settings.atol, case.budget
+    )
+    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+    ground = Ground(scene.terrain, scene.frame)
+    return walk_contact(scene.walker, ground, scene.pinned, STANCE_FOOT, ready.start, methods, case.steps, interval)
+
+
+def judge_contact(case: Case, config: Config) -> CaseResult:
+    """Run a case of the physical model and judge it."""
+    started = time.perf_counter()
+    ready = prepared(config, case)
+    if ready is None:
+        return without_start(case, time.perf_counter() - started)
+    result = walked(ready, config, case, 1.0, sampled=case.steps <= SAMPLED_STEPS)
+    wall_s = time.perf_counter() - started
+    findings = [*of_one_run(result, ready, case)]
+    remarks: list[str] = []
+    if result.outcome.answered:
+        compared = [("tenfold tolerance", walked(ready, config, case, TENFOLD, sampled=False), pendulum_time(config))]
+        if case.twin:
+            other = scaled(config, to_twin(config))
+            twin_ready = prepared(other, case)
+            if twin_ready is not None:
+                compared.append(("twin", walked(twin_ready, other, case, 1.0, sampled=False), pendulum_time(other)))
+        for what, again, unit in compared:
+            findings.append(time_difference(what, result, pendulum_time(config), again, unit, case))
+            remarks += outcome_differs(what, case, result.outcome, again.outcome)
+    return CaseResult(
+        name=case.name,
+        family=case.family,
+        model=case.model,
+        reason=case.reason,
+        expected=case.expected,
+        outcome=result.outcome.label,
+        steps=int(result.touch_time_s.size),
+        residual_J=finite(result.energy_balance_residual_J),
+        rhs_evaluations=int(result.work[0]),
+        wall_s=wall_s,
+        findings=tuple(findings),
+        remarks=tuple(remarks),
+    )
+
+
+def without_start(case: Case, wall_s: float) -> CaseResult:
+    """A case that asks for a gait where there is none."""
+    rejected = Outcome.REJECTED.label
+    return CaseResult(case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, wall_s, ())
+
+
+def of_one_run(result: ContactWalkResult, ready: Prepared, case: Case) -> list[Finding]:
+    """Measures that need no second run."""
+    numbers = np.concatenate([result.end_state, result.touch_time_s, result.touch_along_m, result.dissipated_J])
+    balance = finite(result.energy_balance_residual_J / ready.energy)
+    found = [
+        Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
+        Finding("energy balance residual over energy", balance, case.balance),
+        Finding("right-hand sides over budget", float(result.work[0]) / case.budget, 1.0 + 20.0 / case.budget),
+    ]
+    if result.samples is not None and result.samples.dissipated_J.shape[0] > 1:
+        by_channel = result.samples.dissipated_J[:, :2]
+        found.append(
+            Finding("energy won back from friction and damping", won_back(by_channel, ready), NEVER_LESS * case.balance)
+        )
+    return found
+
+
+def won_back(dissipated: NDArray[np.float64], ready: Prepared) -> float:
+    """Largest fall of what was dissipated, as a share of the energy."""
+    return finite(max(0.0, float(np.max(-np.diff(dissipated, axis=0)))) / ready.energy)
+
+
+def time_difference(
+    what: str, one: ContactWalkResult, unit: float, other: ContactWalkResult, other_unit: float, case: Case
+) -> Finding:
+    """How far two runs' touches are apart, each in its own pendulum time; their ends if there are none."""
+    touches, others = one.touch_time_s / unit, other.touch_time_s / other_unit
+    steps = min(touches.size, others.size, case.compared_steps)
+    if steps:
+        apart = float(np.max(np.abs(touches[:steps] - others[:steps])))
+    else:
+        apart = abs(one.end_time_s / unit - other.end_time_s / other_unit)
+    return Finding(f"time apart from {what}, in pendulum times", finite(apart), case.agreement)
+
+
+def outcome_differs(what: str, case: Case, outcome: Outcome, again: Outcome) -> list[str]:
+    """A remark if a second run ends in another way, and not in one that is right too."""
+    return [] if outcome is again or again.label in case.expected else [f"{what}: {again.label}, not {outcome.label}"]

@@ -1,0 +1,152 @@
+"""What an ordinary choice does with the same scenes: SciPy at its default tolerance, a game engine's fixed step.
+
+The scene as one ordinary differential equation without events, as one writes it down who knows nothing of joins and
+pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a sharper tolerance.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.physics.contact.on_pads import OnPads
+from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
+from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
+from walkerlab.stability.contact_case import RATES, TENFOLD, Prepared, prepared, walked
+from walkerlab.stability.scaling import pendulum_time
+from walkerlab.stability.verdict import finite
+
+CAP: Final = 20_000  # right-hand sides
+FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
+RUNS_AWAY: Final = 10.0  # the same
+STEPS: Final = 2
+CHOSEN: Final = (
+    "paper",
+    "si-linear",
+    "k-1e6-linear",
+    "k-times-100",
+    "k-1e8-linear-chatter",
+    "near-rigid",
+    "undamped",
+    "stiction-1e-4",
+    "leg-1-km",
+    "velocities-1e3",
+)
+"""The cases of the catalogue that are shown."""
+LIBRARY: Final = ("RK45", "LSODA", "Radau")
+FIXED_STEPS_S: Final = (1e-3, 1e-4)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One method on one case.
+
+    verdict  fine, wrong silently, gives up, diverges
+    error    of the state at the end; None if it did not get there
+    """
+
+    case: str
+    method: str
+    verdict: str
+    error: float | None
+    rhs_evaluations: int
+    wall_s: float
+
+
+class CapReachedError(Exception):
+    """The evaluations are used up."""
+
+
+def choices(case: Case, config: Config) -> tuple[Choice, ...]:
+    """Every ordinary method on a case of the physical model; none if it has no start."""
+    short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, 1_000_000)})
+    ready = prepared(config, short)
+    if ready is None:
+        return ()
+    walk = walked(ready, config, short, TENFOLD, sampled=False)
+    end, reference = walk.end_time_s, np.array(walk.end_state)
+    units = natural_units(config)
+    found = [library(case.name, name, ready, end, reference, units) for name in LIBRARY]
+    found += [fixed(case.name, h, ready, end, reference, units) for h in FIXED_STEPS_S]
+    return tuple(found)
+
+
+def natural_units(config: Config) -> NDArray[np.float64]:
+    """What each number of the state is measured in: legs, radians, and these in pendulum times."""
+    lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
+    return np.concatenate([lengths, lengths / pendulum_time(config)])
+
+
+def library(
+    case: str, method: str, ready: Prepared, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
+) -> Choice:
+    """A method of SciPy's solve_ivp with nothing but its name given."""
+    from scipy.integrate import solve_ivp
+
+    system = OnPads(ready.scene.walker, ready.scene.terrain)
+    start = np.array(ready.start)
+    code = entry_point(right_hand_side, system, 0.0, start, start)
+    count = 0
+
+    def fun(t: float, y: Any) -> Any:
+        nonlocal count
+        if count >= CAP:
+            raise CapReachedError
+        count += 1
+        rate = np.empty(y.size)
+        code(system, float(t), np.ascontiguousarray(y), rate)
+        return rate
+
+    began = time.perf_counter()
+    y = None
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            solution = solve_ivp(fun, (0.0, end), start, method=method)
+        if solution.success:
+            y = solution.y[:, -1]
+    except (CapReachedError, ValueError, np.linalg.LinAlgError):
+        pass
+    wall_s = time.perf_counter() - began
+    return judged(case, f"SciPy {method}", y, reference, units, count, wall_s)
+
+
+def fixed(
+    case: str, h: float, ready: Prepared, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
+) -> Choice:
+    """Semi-implicit Euler with a fixed step."""
+    system = OnPads(ready.scene.walker, ready.scene.terrain)
+    y = np.array(ready.start)
+    began = time.perf_counter()
+    taken = int(semi_implicit_euler(system, y, end, h, CAP))
+    wall_s = time.perf_counter() - began
+    arrived: NDArray[np.float64] | None = y
+    if taken == CAP and taken * h < end * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY)):
+        arrived = None
+    return judged(case, f"semi-implicit Euler, {h:g} s", arrived, reference, units, taken, wall_s)
+
+
+def judged(
+    case: str,
+    method: str,
+    y: NDArray[np.float64] | None,
+    reference: NDArray[np.float64],
+    units: NDArray[np.float64],
+    count: int,
+    wall_s: float,
+) -> Choice:
+    """What is to be said of where a method arrived; it says none of that itself."""
+    if y is None:
+        return Choice(case, method, "gives up", None, count, wall_s)
+    error = finite(float(np.max(np.abs((y - reference) / units))))
+    scale = max(1.0, float(np.max(np.abs(reference / units))))
+    if error > RUNS_AWAY * scale or float(np.max(np.abs(y[:RATES]))) >= RUNAWAY:
+        return Choice(case, method, "diverges", None, count, wall_s)
+    return Choice(case, method, "fine" if error <= FINE * scale else "wrong silently", error, count, wall_s)

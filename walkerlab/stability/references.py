@@ -1,0 +1,94 @@
+"""Answers to the known problems that use nothing of the contact code: closed forms, and SciPy on laws written anew."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: float) -> float:
+    """Time (s) from landing to landing of a ball on a linear spring without damping, in closed form.
+
+    Flight takes 2 v / g. In contact x'' = g - w^2 x from x = 0, x' = v: half a turn and twice the angle by which
+    gravity shifts the middle.
+    """
+    speed = math.sqrt(2.0 * gravity * drop)
+    omega = math.sqrt(stiffness / mass)
+    contact = (math.pi + 2.0 * math.atan2(gravity, omega * speed)) / omega
+    return 2.0 * speed / gravity + contact
+
+
+def impact_force(depth: float, rate: float, law: tuple[float, float, float, float]) -> float:
+    """ADAMS's IMPACT law (N) as its manual writes it; law is (k, e, c_max, d_max)."""
+    k, e, c_max, d_max = law
+    if depth <= 0.0:
+        return 0.0
+    share = min(1.0, depth / d_max)
+    return max(0.0, k * math.pow(depth, e) + c_max * (3.0 - 2.0 * share) * share**2 * rate)
+
+
+def restitution(mass: float, speed: float, law: tuple[float, float, float, float], gravity: float) -> float:
+    """Speed at which a ball leaves the ground that it meets at `speed` (m/s), over that speed: SciPy's DOP853."""
+    from scipy.integrate import solve_ivp
+
+    def motion(_t: float, y: Any) -> tuple[float, float]:
+        return y[1], gravity - impact_force(y[0], y[1], law) / mass
+
+    def left(t: float, y: Any) -> float:
+        return float(y[0]) if t > 0.0 else 1.0
+
+    left.terminal, left.direction = True, -1.0  # type: ignore[attr-defined]
+    found = solve_ivp(
+        motion, (0.0, 0.05), (0.0, speed), method="DOP853", rtol=1e-11, atol=1e-14, events=left, max_step=1e-5
+    )
+    return float(-found.y[1, -1] / speed)
+
+
+def creep_speed(slope: float, static: float, stiction_velocity: float) -> float:
+    """Slip velocity (m/s) at which the cubic friction law holds a block on a slope (rad)."""
+    from scipy.optimize import brentq
+
+    def excess(slip: float) -> float:
+        share = (slip + stiction_velocity) / (2.0 * stiction_velocity)
+        return -static + 2.0 * static * share**2 * (3.0 - 2.0 * share) - math.tan(slope)
+
+    return float(brentq(excess, 0.0, stiction_velocity, xtol=1e-15))
+
+
+def sliding_acceleration(slope: float, dynamic: float, gravity: float) -> float:
+    """Acceleration (m/s^2) of a block down a slope (rad) under dynamic friction."""
+    return gravity * (math.sin(slope) - dynamic * math.cos(slope))
+
+
+def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
+    """Angular speed (rad/s) just after impact of a steadily rolling rimless wheel of unit mass and spoke.
+
+    inertia  of the hub (kg m^2)
+
+    Source: McGeer, Passive dynamic walking (1990), section 2; Coleman (1998).
+    """
+    half = math.pi / spokes
+    kept = (math.cos(2.0 * half) + inertia) / (1.0 + inertia)
+    gained = 4.0 * gravity * math.sin(half) * math.sin(slope) / (1.0 + inertia)
+    return math.sqrt(kept**2 * gained / (1.0 - kept**2))
+
+
+def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
+    """The same when a spoke is normal to the slope: energy is kept from the impact until then."""
+    half = math.pi / spokes
+    climbed = 2.0 * gravity * (math.cos(slope) - math.cos(half - slope)) / (1.0 + inertia)
+    return math.sqrt(wheel_speed(spokes, slope, gravity, inertia) ** 2 - climbed)
+
+
+def painleve_growth_rate(angle: float, friction: float, mass: float, stiffness: float) -> float:
+    """Rate (1/s) at which a sliding rod's end digs itself into a linear spring, beyond the critical friction.
+
+    angle  between rod and ground (rad)
+
+    A normal force N with friction mu N accelerates the end by A N, m A = 1 + 3 cos(angle) (cos(angle) - mu sin(angle));
+    where A is negative the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
+
+    Source: Painleve (1895); Champneys, Varkonyi, The Painleve paradox in contact mechanics (2016).
+    """
+    by_force = (1.0 + 3.0 * math.cos(angle) * (math.cos(angle) - friction * math.sin(angle))) / mass
+    return math.sqrt(-by_force * stiffness)

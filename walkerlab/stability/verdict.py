@@ -1,0 +1,65 @@
+"""What is found about a case, and what follows from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One independent measure of a run."""
+
+    measure: str
+    value: float
+    limit: float  # up to which the value is right
+    unit: str = "1"
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run passes; what is no number does not."""
+        return bool(math.isfinite(self.value) and self.value <= self.limit)
+
+    def __str__(self) -> str:
+        """In words."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.measure} {self.value:.3g}{unit} above {self.limit:.3g}{unit}"
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """How a case ended and how it is judged.
+
+    residual_J  of the energy balance
+    findings    every measure that was taken
+    remarks     what is wrong besides, in words
+    """
+
+    name: str
+    family: str
+    model: str
+    reason: str
+    expected: tuple[str, ...]
+    outcome: str
+    steps: int
+    residual_J: float  # noqa: N815 (a unit's capital)
+    rhs_evaluations: int
+    wall_s: float
+    findings: tuple[Finding, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What is not as it should be, in words; empty if all is."""
+        failed = [] if self.outcome in self.expected else [f"ended as {self.outcome}, not {' or '.join(self.expected)}"]
+        return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
+
+    @property
+    def ok(self) -> bool:
+        """Whether the case ended as expected and passed every measure."""
+        return not self.failures
+
+
+def finite(value: float) -> float:
+    """The value, or a large number in the place of one that is not finite: results hold no NaN."""
+    return float(value) if math.isfinite(value) else 1e300

@@ -1,0 +1,150 @@
+"""Extreme cases and known problems: every one judged by measures that the walk itself does not use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.stability.catalogue import config_of, shipped, without_doubles
+from walkerlab.stability.cells import cells_of, run_cells
+from walkerlab.stability.known import Known
+from walkerlab.stability.ordinary import CAP, FINE, Choice
+from walkerlab.stability.verdict import CaseResult
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content, Group, Variable
+
+
+def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Judge the catalogue and the config's own cases, answer the known problems, and try ordinary methods.
+
+    jobs  processes
+
+    Raises ConfigError if a case's lines are no config.
+    """
+    for case in config.stability.cases:
+        config_of(case)  # a bad one is told before anything runs
+    cells = cells_of(without_doubles([*shipped(), *config.stability.cases]))
+    progress.start("stability", len(cells))
+    cases: list[CaseResult] = []
+    known: list[Known] = []
+    ordinary: list[Choice] = []
+    for found in run_cells(cells, jobs):
+        cases += [item for item in found if isinstance(item, CaseResult)]
+        known += [item for item in found if isinstance(item, Known)]
+        ordinary += [item for item in found if isinstance(item, Choice)]
+        progress.advance()
+    summary = summary_of(cases, known, ordinary)
+    return Content({"cases": cases_group(cases), "known": known_group(known)}, summary | verdict(cases, known))
+
+
+def verdict(cases: Sequence[CaseResult], known: Sequence[Known]) -> dict[str, Any]:
+    """That there is no answer, in words, if something is not as it should be; the results are whole all the same."""
+    failed = [*(case.name for case in cases if not case.ok), *(answer.name for answer in known if not answer.ok)]
+    if not failed:
+        return {}
+    message = f"{len(failed)} of {len(cases) + len(known)} did not end as expected: {', '.join(failed)}"
+    advice = "`walkerlab report` says in red which and why; `walkerlab stability --json` has every measure."
+    return {"no_answer": {"message": message, "advice": advice}}
+
+
+def summary_of(cases: Sequence[CaseResult], known: Sequence[Known], ordinary: Sequence[Choice]) -> dict[str, Any]:
+    """What the command prints."""
+    return {
+        "cases": [case_row(case) for case in cases],
+        "known": [known_row(answer) for answer in known],
+        "passed": sum(case.ok for case in cases) + sum(answer.ok for answer in known),
+        "failed": sum(not case.ok for case in cases) + sum(not answer.ok for answer in known),
+        "ordinary": [ordinary_row(choice) for choice in ordinary],
+        "ordinary_cap": CAP,
+        "ordinary_fine": FINE,
+    }
+
+
+def case_row(case: CaseResult) -> dict[str, Any]:
+    """A case with every measure that was taken."""
+    measures = [{"measure": one.measure, "value": one.value, "limit": one.limit, "ok": one.ok} for one in case.findings]
+    return {
+        "name": case.name,
+        "family": case.family,
+        "model": case.model,
+        "reason": case.reason,
+        "expected": list(case.expected),
+        "outcome": case.outcome,
+        "ok": case.ok,
+        "steps": case.steps,
+        "energy_balance_residual_J": case.residual_J,
+        "rhs_evaluations": case.rhs_evaluations,
+        "wall_s": case.wall_s,
+        "note": "; ".join(case.failures),
+        "measures": measures,
+    }
+
+
+def known_row(answer: Known) -> dict[str, Any]:
+    """A known problem."""
+    return {
+        "name": answer.name,
+        "quantity": answer.quantity,
+        "value": answer.value,
+        "reference": answer.reference,
+        "source": answer.source,
+        "error": answer.error,
+        "limit": answer.limit,
+        "why_limit": answer.why,
+        "ok": answer.ok,
+        "wall_s": answer.wall_s,
+    }
+
+
+def ordinary_row(choice: Choice) -> dict[str, Any]:
+    """An ordinary method on a case; without an error if it did not arrive."""
+    row: dict[str, Any] = {
+        "case": choice.case,
+        "method": choice.method,
+        "verdict": choice.verdict,
+        "rhs_evaluations": choice.rhs_evaluations,
+        "wall_s": choice.wall_s,
+    }
+    return row if choice.error is None else row | {"error": choice.error}
+
+
+def cases_group(cases: Sequence[CaseResult]) -> Group:
+    """The table of cases."""
+    columns: list[tuple[str, Any, str, str]] = [
+        ("name", [case.name for case in cases], "", "name of the case"),
+        ("family", [case.family for case in cases], "", "family of the case"),
+        ("outcome", [case.outcome for case in cases], "", "how it ended"),
+        ("ok", [case.ok for case in cases], "1", "whether it ended as expected and passed every measure"),
+        ("steps", [case.steps for case in cases], "1", "steps walked"),
+        (
+            "energy_balance_residual_J",
+            [case.residual_J for case in cases],
+            "J",
+            "largest residual of the energy balance",
+        ),
+        ("rhs_evaluations", [case.rhs_evaluations for case in cases], "1", "right-hand sides evaluated"),
+    ]
+    return rows_group("case", len(cases), columns)
+
+
+def known_group(known: Sequence[Known]) -> Group:
+    """The table of known problems."""
+    columns: list[tuple[str, Any, str, str]] = [
+        ("name", [answer.name for answer in known], "", "name of the problem"),
+        ("quantity", [answer.quantity for answer in known], "", "what is compared, with its unit"),
+        ("value", [answer.value for answer in known], "1", "by the contact code, in the quantity's unit"),
+        ("reference", [answer.reference for answer in known], "1", "by another route, in the quantity's unit"),
+        ("error", [answer.error for answer in known], "1", "difference over reference"),
+    ]
+    return rows_group("problem", len(known), columns)
+
+
+def rows_group(dim: str, size: int, columns: Sequence[tuple[str, Any, str, str]]) -> Group:
+    """Columns over one numbered dimension."""
+    variables = {dim: Variable(np.arange(size), (dim,), "1", "number of the row")}
+    for name, values, units, text in columns:
+        variables[name] = Variable(np.array(values, dtype=object if units == "" else None), (dim,), units, text)
+    return Group(variables)
