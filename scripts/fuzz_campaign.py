@@ -1,0 +1,221 @@
+"""Fuzzed configs and damaged results: never a traceback, never a hang, never what is no number stored as a result.
+
+    python scripts/fuzz_campaign.py                          # 2,000 configs, 200 damaged results
+    python scripts/fuzz_campaign.py --configs 50 --damaged 20
+
+Configs are mutated byte by byte, line by line and value by value, from the built-in ones; each is loaded, and each
+eighth that loads is also walked by the rigid model. Damaged results are cut short, have bits flipped, are overwritten
+in part, or are other files. Prints a table in Markdown; exits 1 if anything went wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from walkerlab.config.files import BUILTIN_FOLDER
+from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.errors import WalkerlabError
+from walkerlab.stages.runner import execute
+from walkerlab.store import artifact
+from walkerlab.store.runfolder import RunFolder
+
+LONGEST_S = 20.0  # that a config may take to be refused or walked
+WORDS = (
+    b"nan", b".nan", b".inf", b"-1", b"0", b"1e308", b"-1e-308", b"1e-14", b"null", b"[]", b"{}", b"true", b"'", b'"',
+    b"&a", b"*a", b"!!python/object:os.system", b"../../x", b"<script>", b"\xff\xfe", b"\x00", b"? ", b"- ", b": ",
+    b"99999999999999999999", b"0x10", b"1_000", b"extends: paper", b"strides: 1", b"\t", b"\r", b"---", b"%YAML 1.1",
+)  # fmt: skip
+Mutation = Callable[[random.Random, bytearray], None]
+
+
+def change_byte(drawn: random.Random, text: bytearray) -> None:
+    """Another byte somewhere."""
+    text[drawn.randrange(len(text))] = drawn.randrange(256)
+
+
+def delete_piece(drawn: random.Random, text: bytearray) -> None:
+    """Something is missing."""
+    start = drawn.randrange(len(text))
+    del text[start : start + drawn.randrange(1, 40)]
+
+
+def repeat_line(drawn: random.Random, text: bytearray) -> None:
+    """A line twice, or elsewhere."""
+    lines = text.splitlines(keepends=True)
+    lines.insert(drawn.randrange(len(lines)), drawn.choice(lines))
+    text[:] = b"".join(lines)
+
+
+def insert_word(drawn: random.Random, text: bytearray) -> None:
+    """A troublesome word somewhere."""
+    at = drawn.randrange(len(text))
+    text[at:at] = drawn.choice(WORDS)
+
+
+def replace_value(drawn: random.Random, text: bytearray) -> None:
+    """Another value of a key."""
+    lines = text.splitlines()
+    at = drawn.randrange(len(lines))
+    name, colon, _ = bytes(lines[at]).partition(b":")
+    lines[at] = bytearray(name + colon + b" " + drawn.choice(WORDS))
+    text[:] = b"\n".join(lines) + b"\n"
+
+
+def scale_number(drawn: random.Random, text: bytearray) -> None:
+    """A number of quite another size: valid more often than not."""
+    lines = text.splitlines()
+    numbered = [i for i, line in enumerate(lines) if b": " in line and line.partition(b": ")[2][:1].isdigit()]
+    if numbered:
+        at = drawn.choice(numbered)
+        name = bytes(lines[at]).partition(b":")[0]
+        lines[at] = bytearray(name + b": %.3g" % (10.0 ** drawn.uniform(-6.0, 6.0)))
+        text[:] = b"\n".join(lines) + b"\n"
+
+
+MUTATIONS: tuple[Mutation, ...] = (change_byte, delete_piece, repeat_line, insert_word, replace_value, scale_number)
+
+
+def fuzzed(drawn: random.Random, texts: list[bytes]) -> bytes:
+    """A built-in config, mutated once to four times."""
+    text = bytearray(drawn.choice(texts))
+    for _ in range(drawn.randrange(1, 5)):
+        if text:
+            drawn.choice(MUTATIONS)(drawn, text)
+    return bytes(text)
+
+
+def loaded(path: Path) -> LoadedConfig | None:
+    """The config of a file, or None if it is refused in words."""
+    try:
+        return load(path)
+    except WalkerlabError as error:
+        if not error.message or error.exit_code != 3:
+            raise
+        return None
+
+
+def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Load `count` fuzzed configs, walk some; what became of them, and what went wrong."""
+    drawn = random.Random(seed)
+    texts = [path.read_bytes() for path in sorted(BUILTIN_FOLDER.glob("*.yaml"))]
+    fates: Counter[str] = Counter()
+    wrong: list[str] = []
+    with tempfile.TemporaryDirectory() as place:
+        path, runs = Path(place) / "fuzzed.yaml", Path(place) / "runs"
+        for number in range(count):
+            text = fuzzed(drawn, texts)
+            path.write_bytes(text)
+            began = time.perf_counter()
+            try:
+                fates[fate_of(path, runs, number)] += 1
+            except Exception:  # a traceback is what is looked for
+                wrong.append(f"config {number}: {traceback.format_exc(limit=-3)}\n{text!r}")
+            if time.perf_counter() - began > LONGEST_S:
+                wrong.append(f"config {number}: took {time.perf_counter() - began:.0f} s\n{text!r}")
+            outside = [entry.name for entry in Path(place).iterdir() if entry.name not in ("fuzzed.yaml", "runs")]
+            if outside:
+                wrong.append(f"config {number}: wrote {outside} outside the runs folder")
+    return fates, wrong
+
+
+def fate_of(path: Path, runs: Path, number: int) -> str:
+    """Load a config, and walk each eighth with the rigid model, a few strides at most."""
+    found = loaded(path)
+    if found is None:
+        return "refused with its place"
+    if number % 8:
+        return "accepted"
+    config = found.config.model_copy(update={"strides": min(found.config.strides, 5)})
+    folder = RunFolder(runs, found.run_name)
+    report = execute(config, "simulate", folder, force=True)
+    return "accepted and walked" if report.no_answer is None else "accepted, no answer, told"
+
+
+def cut(drawn: random.Random, data: bytes) -> bytes:
+    """Cut short."""
+    return data[: drawn.randrange(len(data))]
+
+
+def flip(drawn: random.Random, data: bytes) -> bytes:
+    """A bit flipped."""
+    changed = bytearray(data)
+    changed[drawn.randrange(len(data))] ^= 1 << drawn.randrange(8)
+    return bytes(changed)
+
+
+def overwrite(drawn: random.Random, data: bytes) -> bytes:
+    """A block of noise or zeros."""
+    changed, at = bytearray(data), drawn.randrange(len(data))
+    length = min(drawn.randrange(1, 4096), len(data) - at)
+    changed[at : at + length] = drawn.randbytes(length) if drawn.random() < 0.5 else bytes(length)
+    return bytes(changed)
+
+
+def replace_all(drawn: random.Random, data: bytes) -> bytes:
+    """Another file altogether."""
+    return drawn.choice((b"", b"\x89HDF\r\n\x1a\n", b"text\n", drawn.randbytes(len(data))))
+
+
+def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Damage a stored result `count` times; what was said of it, and what went wrong."""
+    drawn = random.Random(seed)
+    fates: Counter[str] = Counter()
+    wrong: list[str] = []
+    with tempfile.TemporaryDirectory() as place:
+        found = load(Path("rigid-only"))
+        folder = RunFolder(Path(place), found.run_name)
+        execute(found.config, "simulate", folder)
+        path = folder.artifact("simulate")
+        whole = path.read_bytes()
+        good = artifact.read(path)
+        for number in range(count):
+            how = drawn.choice((cut, flip, overwrite, replace_all))
+            damaged = how(drawn, whole)
+            path.write_bytes(damaged)
+            try:
+                verdict = artifact.check(path, good.identity.key)
+            except Exception:  # a traceback is what is looked for
+                wrong.append(f"damage {number} ({how.__name__}): {traceback.format_exc(limit=-3)}")
+                continue
+            if not verdict.accepted:
+                fates["not accepted"] += 1
+            elif verdict.artifact is not None and verdict.artifact.digest() == good.digest():
+                fates["accepted: the content is whole"] += 1
+            else:
+                wrong.append(f"damage {number} ({how.__name__}): accepted with another content")
+        path.write_bytes(whole[: len(whole) // 2])
+        execute(found.config, "simulate", folder)
+        if artifact.read(path).digest() != good.digest():
+            wrong.append("a damaged result is not made anew")
+    return fates, wrong
+
+
+def main() -> int:
+    """Run both campaigns."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--configs", type=int, default=2000)
+    parser.add_argument("--damaged", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    began = time.perf_counter()
+    configs, wrong = fuzz_configs(asked.configs, asked.seed)
+    damaged, wrong_too = damage_results(asked.damaged, asked.seed)
+    print("| what | fate | times |\n|---|---|---|")
+    for what, fates in (("config", configs), ("damaged result", damaged)):
+        for fate, times in sorted(fates.items()):
+            print(f"| {what} | {fate} | {times} |")
+    print(f"| both | wrong | {len(wrong + wrong_too)} |\n\n{time.perf_counter() - began:.0f} s")
+    print("\n".join(wrong + wrong_too), file=sys.stderr)
+    return 1 if wrong or wrong_too else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
