@@ -6,6 +6,7 @@ import re
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
+from synthetic_methods import measured_methods
 from synthetic_walks import both_models, contact, rigid, rigid_alone
 
 from walkerlab.figures.canvas import settle, styled
@@ -18,6 +19,7 @@ RESULTS = {
     "rigid alone": rigid_alone(),
     "a plane": both_models(**{"contact-sim": contact(pads=False)}),
     "one stride": both_models(simulate=rigid(2), **{"contact-sim": contact(2, 0.72)}),
+    "methods measured": measured_methods(),
     "one step": both_models(**{"contact-sim": contact(1, outcome="fell")}),
 }
 CASES = [
@@ -26,7 +28,7 @@ CASES = [
     for figure in FIGURES
     if figure.why_left_out(results, {}) is None
 ]
-WITH_UNIT = re.compile(r".+ \((m|s|rad|rad/s|J|N|1)\)")
+WITH_UNIT = re.compile(r".+ \((m|s|rad|rad/s|J|N|1|SI)\)")
 VISIBLE = 0.1
 """Least difference of brightness between lines that lie on one another."""
 

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from synthetic_methods import everything
 from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, stored, without
 
 from walkerlab.figures import figure_02, figure_07, figure_08, figure_09, figure_10
@@ -21,16 +22,17 @@ from walkerlab.figures.style import CONTACT, RIGID
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"
+PAPER_FIGURES = [figure for figure in FIGURES if figure.number is not None]
 NAMES = [figure.name for figure in FIGURES]
 
 
 def why_left_out(results, absent):
-    reasons = {figure.number: figure.why_left_out(results, absent) for figure in FIGURES}
+    reasons = {figure.number: figure.why_left_out(results, absent) for figure in PAPER_FIGURES}
     return {number: why for number, why in reasons.items() if why is not None}
 
 
 def drawable(results):
-    return [figure.number for figure in FIGURES if figure.why_left_out(results, {}) is None]
+    return [figure.number for figure in PAPER_FIGURES if figure.why_left_out(results, {}) is None]
 
 
 def plotted(figure, results):
@@ -99,9 +101,8 @@ def test_models_that_completed_no_step_together_have_no_difference_in_phase():
 
 
 def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
-    numbered = [figure for figure in FIGURES if figure.number is not None]
-    assert [figure.name for figure in numbered] == [f"figure-{figure.number:02d}" for figure in numbered]
-    assert numbered[0].called == "figure 2"
+    assert [figure.name for figure in PAPER_FIGURES] == [f"figure-{figure.number:02d}" for figure in PAPER_FIGURES]
+    assert PAPER_FIGURES[0].called == "figure 2"
     assert len(set(NAMES)) == len(NAMES)
 
 
@@ -111,16 +112,16 @@ def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
 
 @functools.cache
 def drawn_once():
-    return {figure.name: figure.drawn(both_models()) for figure in FIGURES}
+    return {figure.name: figure.drawn(everything()) for figure in FIGURES}
 
 
 OWN_SETTINGS = "font.size: 20\nlines.linewidth: 9\nsvg.fonttype: path\naxes.grid: True\nfigure.dpi: 300\n"
 DRAW_ELSEWHERE = """
 import hashlib, sys
-from synthetic_walks import both_models
+from synthetic_methods import everything
 from walkerlab.figures.registry import FIGURES
 for figure in FIGURES:
-    drawing = figure.drawn(both_models())
+    drawing = figure.drawn(everything())
     print(figure.name, hashlib.sha256(drawing.svg + drawing.png).hexdigest())
 assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens windows"
 """
@@ -150,7 +151,7 @@ def drawn_here():
 def test_svg_keeps_text_as_text_and_has_no_date(name):
     drawing = drawn_once()[name]
     texts = {"".join(text.itertext()) for text in ElementTree.fromstring(drawing.svg).iter(f"{SVG}text")}
-    assert {"time (s)", "angle (rad)", "height (m)"} & texts
+    assert {"time (s)", "angle (rad)", "height (m)", "run time (s)"} & texts
     assert b"<dc:date>" not in drawing.svg
     assert drawing.png.startswith(b"\x89PNG")
 

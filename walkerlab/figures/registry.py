@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from walkerlab.figures import figure_02, figure_06, figure_07, figure_08, figure_09, figure_10
+from walkerlab.figures import accuracy, figure_02, figure_06, figure_07, figure_08, figure_09, figure_10
 from walkerlab.figures.illustration import Illustration
 
 FIGURES: tuple[Illustration, ...] = (
@@ -12,4 +12,5 @@ FIGURES: tuple[Illustration, ...] = (
     figure_08.FIGURE,
     figure_09.FIGURE,
     figure_10.FIGURE,
+    *accuracy.FIGURES,
 )

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from walkerlab.report.blocks import Section
 from walkerlab.report.results import Results
 from walkerlab.report.sections import (
+    accuracy,
     assumptions,
     contact_walk,
     errata,
@@ -38,6 +39,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     contact_walk.section,
     steps.section,
     models.section,
+    accuracy.section,
     paper_tables.section,
     paper_numbers.section,
     errata.section,

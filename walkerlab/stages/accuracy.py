@@ -22,7 +22,8 @@ from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
 BUDGET = 200_000  # right-hand sides of one run of ours
-LIBRARY_BUDGET = 50_000  # of a library's, whose walk in Python costs a hundred times as much for each
+LIBRARY_BUDGET = 25_000  # of a library's, whose walk in Python costs a hundred times as much for each
+WARM_UP_BUDGET = 2_000  # right-hand sides after which everything is compiled and loaded
 LONG_LIBRARY_RUN = 12_000  # right-hand sides of a library's run that is the last of its ladder
 REPEATS, REPEAT_TIME_S = 7, 0.3
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
@@ -93,6 +94,7 @@ def climb(trial: Trial, method: str, reference: Reference) -> tuple[list[Row], l
     own = method in METHODS and METHODS[method].compiled
     ladder, budget = (OWN_LADDER, BUDGET) if own else (LIBRARY_LADDER, LIBRARY_BUDGET)
     longest = budget if own else LONG_LIBRARY_RUN
+    trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     rows: list[Row] = []
     for index, tolerance in enumerate(ladder):
         row = measure(trial, method, tolerance, budget, reference)

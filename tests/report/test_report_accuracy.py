@@ -1,0 +1,98 @@
+"""The section on error against run time: every method, every failure, every reference."""
+
+import pytest
+from synthetic_results import config, fixedpoint, stored
+
+from walkerlab.report.blocks import Findings, Table
+from walkerlab.report.results import Results
+from walkerlab.report.sections.accuracy import section
+
+
+def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
+    return {
+        "scene": scene,
+        "method": method,
+        "tolerance": tolerance,
+        "outcome": outcome,
+        "error": error,
+        "wall_s": wall_s,
+        "rhs_evaluations": 1234,
+    }
+
+
+ROWS = [
+    row("dop853", 1e-3, 2e-5, 5e-5),
+    row("dop853", 1e-12, 7e-15, 2e-4),
+    row("scipy-bdf", 1e-3, None, 0.3, "slid"),
+    row("scipy-bdf", 1e-5, 3e-4, 0.2),
+    row("radau5", 1e-3, 4e-4, 5e-3, scene="contact"),
+]
+SUMMARY = {
+    "rows": ROWS,
+    "repeats": 7,
+    "reference": {
+        "rigid": {"method": "heyoka-taylor", "second_method": "dop853", "agreement": 9e-16},
+        "contact": {"method": "radau5", "second_method": "dop853", "agreement": 1e-12},
+    },
+    "best": {"rigid": {"1e-3": "dop853", "1e-6": "dop853"}, "contact": {"1e-3": "radau5"}},
+    "conclusions": {"rigid": "rigid: at 1e-03, dop853 is fastest.", "contact": "contact: at 1e-03, radau5 is fastest."},
+    "not_run": [
+        {"scene": "rigid", "method": "scipy-bdf", "tolerance": tolerance, "why": "too much work"}
+        for tolerance in (1e-7, 1e-9)
+    ],
+    "environment": {"processor": "x86_64", "cores": 2, "python": "3.11"},
+}
+
+
+@pytest.fixture
+def made():
+    return section(Results(config(), {"accuracy": stored("accuracy", {}, SUMMARY)}))
+
+
+def tables(made):
+    return {
+        block.caption: {
+            (body.title, line[0].text): [cell.text.replace("\u00a0", " ") for cell in line[1:]]
+            for body in block.bodies
+            for line in body.rows
+        }
+        for block in made.blocks
+        if isinstance(block, Table)
+    }
+
+
+def test_without_the_result_there_is_no_section():
+    assert section(Results(config(), {"fixedpoint": fixedpoint()})) is None
+
+
+def test_each_method_has_its_least_time_for_each_error_and_its_smallest_error(made):
+    costs = tables(made)["Least run time for an error, method by method"]
+    assert costs["rigid", "dop853"][:4] == ["0.05", "0.2", "7 × 10⁻¹⁵", "1\u202f234"]
+    assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
+    assert costs["contact", "radau5"][:2] == ["5", "–"]
+
+
+def test_a_run_that_ended_otherwise_is_told_with_its_outcome(made):
+    costs = tables(made)["Least run time for an error, method by method"]
+    assert costs["rigid", "scipy-bdf"][-1] == "slid at 1 × 10⁻³"
+
+
+def test_the_fastest_methods_are_marked(made):
+    body = next(block for block in made.blocks if isinstance(block, Table)).bodies[0]
+    assert {line[0].text: line[0].tone for line in body.rows} == {"dop853": "good", "scipy-bdf": None}
+
+
+def test_conclusions_stand_beside_their_scenes(made):
+    findings = next(block for block in made.blocks if isinstance(block, Findings))
+    assert [(item.about, item.text) for item in findings.items] == [
+        ("rigid", "At 1e-03, dop853 is fastest."),
+        ("contact", "At 1e-03, radau5 is fastest."),
+    ]
+
+
+def test_references_come_with_what_is_known_of_them(made):
+    assert tables(made)["References"]["", "rigid"] == ["heyoka-taylor", "dop853", "9 × 10⁻¹⁶"]
+
+
+def test_what_was_not_run_is_said_once_for_each_reason(made):
+    assert tables(made)["Not run"]["", "rigid"] == ["scipy-bdf", "1 × 10⁻⁷ and 1 × 10⁻⁹", "too much work"]
