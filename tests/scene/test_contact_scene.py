@@ -12,7 +12,7 @@ from walkerlab.config.loader import load
 from walkerlab.gait.contact_signals import feet_motion, hip_height
 from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
-from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
+from walkerlab.scene.contact import contact_scene, damping_ratio, left_out, start_state, static_penetration
 
 STEP = 0.3714
 
@@ -70,9 +70,10 @@ def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foo
 
 
 def test_a_scene_without_friction_has_another_law_not_a_zero():
-    scene = scene_of("contact.friction=none")
+    config = load(None, ("contact.friction=none",)).config
+    scene = contact_scene(config, STEP)
     assert isinstance(scene.walker.friction, Frictionless)
-    assert any("friction" in row["why"] for row in scene.left_out)
+    assert any("friction" in row["why"] for row in left_out(config))
 
 
 def test_pads_are_laid_by_the_step_that_the_config_asks_for():
