@@ -1,0 +1,74 @@
+"""The campaigns of scripts/, cut short: killed runs, runs at once, fuzzed configs, damaged results."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.report.page import render
+from walkerlab.report.results import Results
+from walkerlab.report.sections.stability import section
+from walkerlab.stability.verdict import CaseResult
+from walkerlab.stages.stability import summary_of
+
+SCRIPTS = Path(__file__).parent.parent / "scripts"
+MARKUP = "<script>alert(1)</script>"
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def fuzz():
+    return script("fuzz_campaign")
+
+
+@pytest.fixture(scope="module")
+def kill():
+    return script("kill_campaign")
+
+
+def test_fuzzed_configs_are_refused_in_words_or_walked(fuzz):
+    fates, wrong = fuzz.fuzz_configs(150, seed=1)
+    assert wrong == []
+    assert fates["refused with its place"] > 20
+    assert sum(fates.values()) == 150
+
+
+def test_damaged_results_are_not_accepted(fuzz):
+    fates, wrong = fuzz.damage_results(40, seed=1)
+    assert wrong == []
+    assert fates["not accepted"] > 20
+
+
+def test_killed_runs_lose_nothing(kill):
+    moments, lost = kill.campaign("simulate", "rigid-only", kills=4, seed=1)
+    assert lost == []
+    assert sum(moments.values()) == 4
+
+
+def test_two_runs_at_once_do_not_disturb_each_other(kill):
+    assert kill.together("simulate", "rigid-only", 2) == []
+
+
+@pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])
+def test_a_name_cannot_lead_out_of_the_runs_folder(name):
+    with pytest.raises(ConfigError):
+        load(sets=[f"name={name!r}"])
+
+
+def test_texts_of_cases_do_not_become_markup():
+    case = CaseResult("x", "own", "contact", MARKUP, ("walked",), "fell", 0, 0.0, 1, 0.1, (), (MARKUP,))
+    summary = summary_of([case], [], [])
+    stability = type("Stored", (), {"summary": summary, "groups": {}})()
+    page = render("title", [], [section(Results(None, {"stability": stability}))])
+    assert MARKUP not in page
+    assert "&lt;script&gt;" in page
