@@ -191,6 +191,16 @@ def test_a_page_about_a_slope_without_an_answer_is_made_and_says_so(toy):
     assert toy.execute("page", STEEP).reused
 
 
+def test_a_whole_result_that_says_it_has_no_answer_is_shown_and_told(toy):
+    toy.edit("roll", '"steps": 2', '"no_answer": {"message": "one fell", "advice": "see"}, "steps": 2')
+    report = toy.execute("roll")
+    assert (report.no_answer.message, report.no_answer.exit_code) == ("one fell", 4)
+    page = toy.execute("page")
+    assert page.no_answer.message == "roll: one fell"
+    assert actions(page)["roll"] == "reuse"
+    assert "roll" not in [entry.what for entry in page.left_out]
+
+
 def test_a_page_is_made_anew_when_the_reason_for_a_gap_changes(toy):
     toy.execute("page", STEEP)
     toy.edit("drop", "too steep", "far too steep")
