@@ -8,6 +8,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.report.results import Results
+from walkerlab.report.sections import verdict as verdict_section
 from walkerlab.report.sections.stability import section
 from walkerlab.stability.catalogue import shipped
 from walkerlab.stability.cells import cells_of, run_cells
@@ -83,3 +84,10 @@ def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     with pytest.raises(ConfigError, match=said):
         load(tmp_path / "own.yaml")
+
+
+def test_the_verdict_names_what_failed():
+    summary = summary_of([BAD], [], []) | verdict([BAD], [])
+    results = Results(load().config, {"stability": SimpleNamespace(summary=summary, groups={})})
+    first = verdict_section.section(results).blocks[0]
+    assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")

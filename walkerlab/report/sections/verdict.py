@@ -43,8 +43,10 @@ def section(results: Results) -> Section:
 
 
 def failures(results: Results) -> list[str]:
-    """What has no answer, and what is missing for that reason."""
-    return [failure(results, absent) for absent in results.absent if absent.failed]
+    """What has no answer, and what is missing for that reason; then results that are there and say that they fail."""
+    told = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
+    missing = [failure(results, absent) for absent in results.absent if absent.failed]
+    return [*missing, *(f"{name}: {said['message'].rstrip('.')}." for name, said in told.items() if said is not None)]
 
 
 def failure(results: Results, absent: Absent) -> str:
