@@ -30,6 +30,7 @@ __all__ = [
     "Solvers",
     "Stability",
     "State",
+    "Tune",
 ]
 
 Equations = Literal["corrected", "as-printed"]
@@ -145,6 +146,9 @@ class CompassWalker(Block):
         return 2 * self.leg_mass_kg + self.hip_mass_kg
 
 
+Factor = Annotated[float, Field(ge=-10.0, le=10.0)]
+Factors = tuple[Factor, Factor]
+
 _TOLERANCE = "the measured error against run time"
 
 
@@ -173,6 +177,48 @@ class Solvers(Block):
 
     rigid: RigidSolver = RigidSolver()
     contact: ContactSolver = ContactSolver()
+
+
+class Tune(Block):
+    """Which starts the adjustment of the two initial angular velocities looks at."""
+
+    cells: Annotated[
+        int,
+        key(
+            "1",
+            "cells of the map along each of its axes, the factors on the two velocities",
+            "this project",
+            ge=2,
+            le=501,
+        ),
+    ] = 61
+    swing_factors: Annotated[
+        Factors,
+        key(
+            "1",
+            "least and largest factor on the swing leg's initial angular velocity dtheta_1",
+            "this project",
+            bounds="two numbers from -10 to 10, the first below the second",
+            sequence=True,
+        ),
+    ] = (0.0, 2.0)
+    stance_factors: Annotated[
+        Factors,
+        key(
+            "1",
+            "least and largest factor on the stance leg's initial angular velocity dtheta_2",
+            "this project",
+            bounds="two numbers from -10 to 10, the first below the second",
+            sequence=True,
+        ),
+    ] = (0.85, 1.3)
+
+    @field_validator("swing_factors", "stance_factors")
+    @classmethod
+    def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[0] >= value[1]:
+            raise PydanticCustomError("order", "the first must be below the second")
+        return value
 
 
 class Config(Block):
@@ -220,6 +266,7 @@ class Config(Block):
     contact: Contact | None = None
     solver: Solvers = Solvers()
     stability: Stability = Stability()
+    tune: Tune = Tune()
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

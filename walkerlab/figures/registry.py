@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from walkerlab.figures import accuracy, figure_02, figure_06, figure_07, figure_08, figure_09, figure_10
+from walkerlab.figures import (
+    accuracy,
+    figure_02,
+    figure_05,
+    figure_06,
+    figure_07,
+    figure_08,
+    figure_09,
+    figure_10,
+    figure_11,
+)
 from walkerlab.figures.illustration import Illustration
 
 FIGURES: tuple[Illustration, ...] = (
     figure_02.FIGURE,
+    figure_05.FIGURE,
     figure_06.FIGURE,
     figure_07.FIGURE,
     figure_08.FIGURE,
     figure_09.FIGURE,
     figure_10.FIGURE,
+    figure_11.FIGURE,
     *accuracy.FIGURES,
 )

@@ -28,8 +28,8 @@ from walkerlab.solvers.registry import finder_for
 Floats = NDArray[np.float64]
 
 WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
-NEWTON_STEPS = 24  # steps walked in one search by Newton's method
-BUDGET_OF_A_STEP = 80_000  # right-hand sides
+NEWTON_STEPS = 10  # steps walked in one search by Newton's method
+BUDGET_OF_A_STEP = 40_000  # right-hand sides
 # nearly rigid ground, by which factor its laws differ from the wanted ones
 STIFFER, STICKIER = 100.0, 30.0
 FIRST_STRIDE, SHORTEST_STRIDE, MOST_STRIDES = 0.25, 0.02, 24  # of the way from nearly rigid to the wanted ground

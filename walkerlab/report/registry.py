@@ -12,6 +12,7 @@ from walkerlab.report.blocks import Section
 from walkerlab.report.results import Results
 from walkerlab.report.sections import (
     accuracy,
+    adjustment,
     assumptions,
     contact_walk,
     errata,
@@ -37,6 +38,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     gaits.section,
     assumptions.section,
     contact_walk.section,
+    adjustment.section,
     steps.section,
     models.section,
     accuracy.section,

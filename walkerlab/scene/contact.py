@@ -28,7 +28,7 @@ from walkerlab.solvers.registry import method_named
 if TYPE_CHECKING:
     from walkerlab.config.schema import CompassWalker, Config, Contact
 
-GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-9, 1e-11  # the tangent is exact for this method
+GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
 GAIT_BUDGET = 10_000_000  # right-hand sides
 
 

@@ -86,7 +86,7 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "stability", "seed")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -111,6 +111,16 @@ PIPELINE = Graph(
         inputs=gait_for_start_or_pads,
         needs_contact=True,
         walks=True,
+    ),
+    Stage(
+        "tune",
+        "walkerlab.stages.tune",
+        "Adjust the initial velocities until the physical model walks: whether, how much, and why.",
+        reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
+        inputs=results_of("fixedpoint"),
+        needs_contact=True,
+        walks=True,
+        has_cells=True,
     ),
     Stage(
         "compare",
@@ -140,7 +150,7 @@ PIPELINE = Graph(
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy",),
+        if_current=("accuracy", "tune"),
         draws=True,
     ),
     Stage(
@@ -148,7 +158,9 @@ PIPELINE = Graph(
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
         reads=EVERYTHING,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare", "accuracy", "stability", "plot"),
+        inputs=results_of(
+            "fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"
+        ),
         draws=True,
     ),
 )

@@ -1,0 +1,216 @@
+"""The paper's parameter adjustment as a method: is it needed, how large is it, and what lies behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
+from walkerlab.gait.contact_gait import GaitAnswer
+from walkerlab.gait.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.gait.paper_start import PaperStart, forces_of, paper_start
+from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
+from walkerlab.gait.scaled_starts import (
+    Adjustment,
+    Margin,
+    ScaledStarts,
+    Trial,
+    margins,
+    scaled_starts,
+    smallest_change,
+)
+from walkerlab.gait.start_map import StartMap, contact_map, rigid_map
+from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.physics.contact.pinned import Pinned
+from walkerlab.physics.rigid.walker import RigidWalker
+from walkerlab.physics.system import State
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import method_named
+from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
+from walkerlab.stages.progress import Progress
+from walkerlab.stages.tune_results import groups, summary
+from walkerlab.store.content import Content
+
+# tolerances of the map: away from edges its outcomes are those of the config's (docs/adjustment.md)
+MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
+LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
+RIGID_METHOD, RIGID_RTOL, RIGID_ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
+AS_IT_STANDS = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """The paper's procedure, step by step.
+
+    hinged    the walk whose first step has a revolute joint at its stance foot, from the rigid state
+    released  the walk without it
+    adjusted  the walk from the adjusted start; the released one if no adjustment is needed; None if there is none
+    """
+
+    rigid_state: State
+    rigid: RecordedWalk
+    hinged: ContactWalkResult
+    released: ContactWalkResult
+    adjusted: ContactWalkResult | None
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that the stage found."""
+
+    scene: ContactScene
+    gait: GaitAnswer
+    procedure: Procedure
+    as_it_stands: Trial
+    adjustment: Adjustment | None
+    margins: list[Margin]
+    contact_map: StartMap
+    rigid_map: StartMap
+    paper: PaperStart
+    steps: int  # asked for
+    gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
+
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Adjust the start; raises NoAnswer if there is neither a gait nor a start that walks."""
+    rigid_step, rigid_state = rigid_start(config, inputs)
+    gait = contact_gait(config, rigid_step, rigid_state)
+    scene = free_scene(config, rigid_step, gait)
+    stage = Stage(config, scene, rigid_state, gait)
+    found = stage.findings(progress, jobs)
+    content = Content(groups(found), summary(found))
+    if gait.gait is None and found.adjustment is None:
+        raise NoAnswer(
+            f"tune: no gait ({gait.reason}), and none of {found.contact_map.outcome.size} starts walked",
+            gait.advice,
+            partial=content,
+        )
+    return content
+
+
+def free_scene(config: Config, rigid_step: float, gait: GaitAnswer) -> ContactScene:
+    """The config's scene without a hinge; raises NoAnswer if its pads are to fit a gait that there is not."""
+    contact = config.contact
+    wants_own = contact is not None and contact.pad_pitch == "own" and contact.terrain == "checkerboard"
+    if wants_own and gait.gait is None:
+        raise NoAnswer(f"tune: no contact gait to lay the pads for: {gait.reason}", gait.advice)
+    own = None if gait.gait is None else gait.gait.step.length_m
+    return replace(contact_scene(config, rigid_step, own if own is not None else rigid_step), pinned=None)
+
+
+class Stage:
+    """What the parts of the stage share."""
+
+    def __init__(self, config: Config, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
+        """Nothing is walked yet."""
+        self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
+        self.steps = 2 * config.strides
+        self.rigid: RigidWalker = rigid_walker(config, config.equations)
+        self.starts = self.scaled()
+
+    def findings(self, progress: Progress, jobs: int) -> Findings:
+        """Procedure, margins, map, adjustment and the paper's own start."""
+        settings = self.config.tune
+        swing = np.linspace(*settings.swing_factors, settings.cells)
+        stance = np.linspace(*settings.stance_factors, settings.cells)
+        progress.start("tune: procedure")
+        hinged = self.walk(self.rigid_state, hinged_walker(self.config, self.scene.walker))
+        released = self.walk(self.rigid_state)
+        as_it_stands = self.starts.walk(*AS_IT_STANDS)
+        progress.start("tune: map", swing.size * stance.size)
+        quick = self.starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * as_it_stands.evaluations))
+        cells = contact_map(quick, swing, stance, jobs, progress.advance)
+        progress.start("tune: rigid map and margins")
+        rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
+        adjustment, around = self.adjusted(as_it_stands, quick, cells)
+        found = margins(self.starts, around) if adjustment is not None else []
+        adjusted = None if adjustment is None else self.walk(self.scaled_state(adjustment.swing, adjustment.stance))
+        return Findings(
+            self.scene,
+            self.gait,
+            Procedure(
+                self.rigid_state,
+                self.rigid_walk(),
+                hinged,
+                released,
+                adjusted,
+            ),
+            as_it_stands,
+            adjustment,
+            found,
+            cells,
+            rigid_cells,
+            paper_start(self.rigid, self.walk, self.scene.walker),
+            self.steps,
+            None if adjusted is None else self.factors_at_the_end(adjusted),
+        )
+
+    def adjusted(
+        self, as_it_stands: Trial, quick: ScaledStarts, cells: StartMap
+    ) -> tuple[Adjustment | None, tuple[float, float]]:
+        """The smallest change of the velocities, and the factors around which margins are asked."""
+        if as_it_stands.walks:
+            return Adjustment(*AS_IT_STANDS, as_it_stands), AS_IT_STANDS
+        if not cells.walking.size:
+            return None, AS_IT_STANDS
+        cell = (
+            float(np.ptp(cells.swing)) / (cells.swing.size - 1),
+            float(np.ptp(cells.stance)) / (cells.stance.size - 1),
+        )
+        change = smallest_change(self.starts, quick, cells.walking, cell)
+        return change, AS_IT_STANDS if change is None else (change.swing, change.stance)
+
+    def scaled(self) -> ScaledStarts:
+        """The scaled starts, walked at the config's tolerances."""
+        settings, found = self.config.solver.contact, self.gait.gait
+        own = None if found is None else (found.step.period_s, found.step.length_m)
+        starts = scaled_starts(
+            self.scene.walker,
+            self.scene.ground,
+            lambda swing, stance: start_state(self.scene, self.scaled_state(swing, stance)),
+            self.steps,
+            own,
+        )
+        return replace(starts, rtol=settings.rtol, atol=settings.atol, budget=self.steps * BUDGET_PER_STEP)
+
+    def scaled_state(self, swing: float, stance: float) -> State:
+        """The rigid start with its velocities scaled."""
+        theta_1, theta_2, omega_1, omega_2 = self.rigid_state
+        return (theta_1, theta_2, swing * omega_1, stance * omega_2)
+
+    def factors_at_the_end(self, walk: ContactWalkResult) -> tuple[float, float] | None:
+        """Velocities of the last step of a walk, once the foot behind has lifted, over those of the rigid start."""
+        if walk.touch_time_s.size < 2:
+            return None
+        time, normal, _ = forces_of(walk, self.scene.walker)
+        landed = int(walk.touch_time_s.size) % 2  # leg 0 lands first
+        swing = 1 - landed
+        lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
+        if not lifted.size or walk.samples is None:
+            return None
+        rates = walk.samples.states[lifted[0], 6:8]
+        if self.rigid_state[2] == 0.0 or self.rigid_state[3] == 0.0:
+            return None
+        return float(rates[swing] / self.rigid_state[2]), float(rates[landed] / self.rigid_state[3])
+
+    def walk(self, state: State, pinned: Pinned | None = None) -> ContactWalkResult:
+        """Walk the physical model from a rigid state, as contact-sim does, with samples."""
+        settings = self.config.solver.contact
+        methods = MethodSettings(
+            method_named(settings.method), settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP
+        )
+        scene = replace(self.scene, pinned=pinned)
+        interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
+        start = start_state(scene, state)
+        return walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, start, methods, self.steps, interval)
+
+    def rigid_walk(self) -> RecordedWalk:
+        """The rigid model from its start, with samples."""
+        method = method_named(RIGID_METHOD).new(len(self.rigid_state), RIGID_RTOL, RIGID_ATOL, ENDLESS)
+        state: Any = self.rigid_state
+        return take_walk(self.rigid, method, state, self.steps, sampled=True)

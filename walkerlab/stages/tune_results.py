@@ -1,0 +1,300 @@
+"""What `tune` stores and prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkerlab.gait.contact_run import ContactWalkResult
+from walkerlab.gait.contact_section import ContactGait
+from walkerlab.gait.outcome import Outcome
+from walkerlab.gait.paper.printed import COORDINATES, TABLE_2
+from walkerlab.gait.recorded_walk import RecordedWalk
+from walkerlab.gait.scaled_starts import Adjustment, Margin
+from walkerlab.gait.start_map import StartMap
+from walkerlab.stages.simulate import leg_variables
+from walkerlab.store.content import Group, Variable
+
+if TYPE_CHECKING:
+    from walkerlab.stages.tune import Findings
+
+TIME, LEG = "time", "leg"
+SWING, STANCE = "swing_factor", "stance_factor"
+SECTION_COORDINATES = (
+    "height of the centre of mass over the slope (m)",
+    "angle of the stance leg (rad)",
+    "velocity of the centre of mass along the slope (m/s)",
+    "velocity of the centre of mass normal to the slope (m/s)",
+    "angular velocity of the swing leg (rad/s)",
+    "angular velocity of the stance leg (rad/s)",
+)
+
+
+def summary(found: Findings) -> dict[str, Any]:
+    """What the command prints."""
+    procedure = found.procedure
+    return {
+        "table2": table_2(found),
+        "gait": gait_summary(found),
+        "adjustment": adjustment_summary(found),
+        "paper_start": {
+            "outcome": found.paper.walk.outcome.label,
+            "reason": found.paper.reason,
+            "steps": int(found.paper.walk.touch_time_s.size),
+            "state": list(found.paper.state),
+            "energy_J": found.paper.energy,
+            "weight_N": found.paper.weight,
+            "normal_force_N": found.paper.rigid_normal,
+            "pull_from_s": found.paper.pull_from,
+            "airborne_from_s": found.paper.airborne_from,
+            "end_time_s": found.paper.walk.end_time_s,
+        },
+        "procedure": {
+            "hinged": walk_summary(procedure.hinged),
+            "released": walk_summary(procedure.released),
+            "adjusted": None if procedure.adjusted is None else walk_summary(procedure.adjusted),
+        },
+        "map": map_summary(found),
+        "slope_rad": found.scene.walker.slope,
+        "pitch_m": found.scene.pitch_m,
+    }
+
+
+def table_2(found: Findings) -> dict[str, dict[str, Any]]:
+    """The paper's two starts and ours, with percentages on either base."""
+    rigid = found.procedure.rigid_state
+    change = found.adjustment
+    factors = (1.0, 1.0, 1.0, 1.0) if change is None else (1.0, 1.0, change.swing, change.stance)
+    rows = {}
+    for name, printed, value, factor in zip(COORDINATES, TABLE_2, rigid, factors, strict=True):
+        matlab, adams = printed.matlab.value, printed.adams.value
+        ours = value * factor
+        rows[name] = {
+            "unit": printed.matlab.unit,
+            "paper_matlab": matlab,
+            "paper_adams": adams,
+            "paper_percent": printed.percent.value,
+            "paper_percent_of_matlab": percent(adams, matlab, matlab),
+            "paper_percent_of_adams": percent(adams, matlab, adams),
+            "ours_rigid": value,
+            "ours_adjusted": None if change is None else ours,
+            "ours_percent_of_rigid": None if change is None else percent(ours, value, value),
+            "ours_percent_of_adjusted": None if change is None else percent(ours, value, ours),
+        }
+    return rows
+
+
+def percent(value: float, other: float, base: float) -> float | None:
+    """How much larger in magnitude a value is than the other, in percent of a base; None for a base of zero."""
+    return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
+
+
+def gait_summary(found: Findings) -> dict[str, Any]:
+    """The contact model's own gait, or why there is none."""
+    gait = found.gait.gait
+    said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
+    if gait is None:
+        return said
+    step = gait.step
+    return {
+        **said,
+        "state": gait.z.tolist(),
+        "state_is": list(SECTION_COORDINATES),
+        "section": "the swing foot passes the stance foot: no foot is touching or lifting there",
+        "period_s": step.period_s,
+        "step_length_m": step.length_m,
+        "multipliers": [[float(value.real), float(value.imag)] for value in gait.multipliers],
+        "spectral_radius": float(abs(gait.multipliers[0])),
+        "stable": gait.stable,
+        "slip_m": step.slip_m,
+        "residual": gait.residual,
+        "lost_J": dict(zip(("damping", "friction", "edges"), step.books_J.tolist(), strict=True)),
+        "height_lost_J": step.height_lost_J,
+        "balance_J": float(step.books_J.sum() - step.height_lost_J),
+    }
+
+
+def adjustment_summary(found: Findings) -> dict[str, Any]:
+    """The smallest change that walks, whether any is needed, and the margins around it."""
+    needed = not found.as_it_stands.walks
+    change = found.adjustment
+    said: dict[str, Any] = {"needed": needed, "found": change is not None}
+    if change is None:
+        said["reason"] = f"none of {found.contact_map.outcome.size} starts walked {found.steps} steps" + (
+            " and settled on the gait" if found.gait.gait is not None else ""
+        )
+        return said
+    return {
+        **said,
+        "scale_dtheta1": change.swing,
+        "scale_dtheta2": change.stance,
+        "distance": change.distance,
+        "walked_steps": change.trial.steps,
+        "margins": {margin.name: margin_summary(margin) for margin in found.margins},
+    }
+
+
+def margin_summary(margin: Margin) -> dict[str, Any]:
+    """How far one may go one way, and what happens beyond."""
+    beyond = None if margin.fails is None else Outcome(margin.fails.outcome)
+    return {
+        "factor": margin.factor,
+        "percent": 100.0 * (margin.factor - 1.0),
+        "beyond": None if beyond is None else "not settled" if beyond is Outcome.WALKED else beyond.label,
+        "steps_beyond": None if margin.fails is None else margin.fails.steps,
+    }
+
+
+def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
+    """How one walk went."""
+    return {
+        "outcome": walk.outcome.label,
+        "advice": walk.outcome.advice,
+        "steps": int(walk.touch_time_s.size),
+        "step_periods_s": walk.periods_s.tolist(),
+        "step_lengths_m": walk.lengths_m.tolist(),
+        "end_time_s": walk.end_time_s,
+    }
+
+
+def map_summary(found: Findings) -> dict[str, Any]:
+    """How many cells end how, in both models."""
+    return {
+        "cells": int(found.contact_map.outcome.size),
+        "walks_share": found.contact_map.share(),
+        "contact": counted(found.contact_map),
+        "rigid": counted(found.rigid_map),
+    }
+
+
+def counted(cells: StartMap) -> dict[str, int]:
+    """Cells by outcome."""
+    numbers, counts = np.unique(cells.outcome, return_counts=True)
+    return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
+
+
+def groups(found: Findings) -> dict[str, Group]:
+    """The datasets of the artifact."""
+    procedure = found.procedure
+    stored: dict[str, Group | None] = {
+        "map": map_group(found),
+        "margins": margins_group(found.margins) if found.margins else None,
+        "gait": gait_group(found.gait.gait) if found.gait.gait is not None else None,
+        "rigid_start": rigid_group(procedure.rigid),
+        "released": walk_group(procedure.released),
+        "hinged": walk_group(procedure.hinged),
+        "adjusted": None if procedure.adjusted is None else walk_group(procedure.adjusted),
+        "paper_start": paper_group(found),
+    }
+    return {name: group for name, group in stored.items() if group is not None}
+
+
+def map_group(found: Findings) -> Group:
+    """Outcome and steps of both models over the two factors."""
+    cells, rigid = found.contact_map, found.rigid_map
+    dims = (STANCE, SWING)
+    change: Adjustment | None = found.adjustment
+    attrs: dict[str, Any] = {
+        "outcomes": ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome),
+        "steps_wanted": found.steps,
+    }
+    if change is not None:
+        attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
+    if found.gait_factors is not None:
+        attrs |= dict(zip(("gait_swing_factor", "gait_stance_factor"), found.gait_factors, strict=True))
+    return Group(
+        {
+            SWING: Variable(cells.swing, (SWING,), "1", "factor on the swing leg's initial angular velocity"),
+            STANCE: Variable(cells.stance, (STANCE,), "1", "factor on the stance leg's initial angular velocity"),
+            "outcome": Variable(
+                cells.outcome, dims, "1", "how the physical model's walk ended, see attribute outcomes"
+            ),
+            "steps": Variable(cells.steps, dims, "1", "steps that the physical model walked"),
+            "settled": Variable(
+                cells.settled, dims, "1", "1 if the last step is the contact gait's within two percent"
+            ),
+            "rigid_outcome": Variable(rigid.outcome, dims, "1", "how the rigid model's walk ended"),
+            "rigid_steps": Variable(rigid.steps, dims, "1", "steps that the rigid model walked"),
+        },
+        attrs,
+    )
+
+
+def margins_group(margins: list[Margin]) -> Group:
+    """How far the start may be scaled."""
+    return Group(
+        {
+            "margin": Variable(np.arange(len(margins)), ("margin",), "1", "number"),
+            "name": Variable(np.array([one.name for one in margins], dtype=object), ("margin",), "", "what is scaled"),
+            "factor": Variable(np.array([one.factor for one in margins]), ("margin",), "1", "the last that walks"),
+        }
+    )
+
+
+def gait_group(gait: ContactGait) -> Group:
+    """The contact gait on its section."""
+    pairs = ("coordinate", "along")
+    return Group(
+        {
+            "coordinate": Variable(np.array(SECTION_COORDINATES, dtype=object), ("coordinate",), "", "coordinate"),
+            "state": Variable(gait.z, ("coordinate",), "m, rad, m/s, m/s, rad/s, rad/s", "gait on the section"),
+            "derivative": Variable(gait.step.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+            "multiplier": Variable(np.arange(6), ("multiplier",), "1", "number"),
+            "multiplier_real": Variable(gait.multipliers.real.copy(), ("multiplier",), "1", "real part"),
+            "multiplier_imag": Variable(gait.multipliers.imag.copy(), ("multiplier",), "1", "imaginary part"),
+        }
+    )
+
+
+def walk_group(walk: ContactWalkResult) -> Group | None:
+    """Angles and velocities of a walk of the physical model; None if nothing was sampled."""
+    if walk.samples is None or walk.samples.time_s.size == 0:
+        return None
+    y = walk.samples.states
+    return Group({**legs_in_time(walk.samples.time_s, y[:, 2:4], y[:, 6:8]), **touches(walk.touch_time_s)})
+
+
+def rigid_group(walk: RecordedWalk) -> Group | None:
+    """The same of the rigid model from its start."""
+    samples = walk.samples
+    if samples is None or samples.time.size == 0:
+        return None
+    legs: Mapping[str, Variable] = leg_variables(samples, 1 - samples.step % 2)
+    time = {TIME: Variable(samples.time, (TIME,), "s", "time")}
+    return Group({**time, **legs, **touches(walk.heel_strikes)})
+
+
+def legs_in_time(time: Any, angle: Any, velocity: Any) -> dict[str, Variable]:
+    """Angles and velocities."""
+    return {
+        TIME: Variable(time, (TIME,), "s", "time"),
+        LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
+        "angle": Variable(angle, (TIME, LEG), "rad", "angle of the leg from the vertical"),
+        "velocity": Variable(velocity, (TIME, LEG), "rad/s", "angular velocity of the leg"),
+    }
+
+
+def touches(times: Any) -> dict[str, Variable]:
+    """When steps ended; none if there was no step."""
+    if not times.size:
+        return {}
+    return {
+        "step": Variable(np.arange(times.size), ("step",), "1", "step number"),
+        "touch_time_s": Variable(times, ("step",), "s", "time at which the step ended"),
+    }
+
+
+def paper_group(found: Findings) -> Group:
+    """The paper's ADAMS start in the physical model."""
+    paper = found.paper
+    samples = paper.walk.samples
+    legs = {} if samples is None else legs_in_time(samples.time_s, samples.states[:, 2:4], samples.states[:, 6:8])
+    return Group(
+        {
+            **legs,
+            "normal_force_N": Variable(paper.normal, (TIME, LEG), "N", "normal force of the ground on the foot"),
+            "mechanical_J": Variable(paper.mechanical, (TIME,), "J", "kinetic and potential energy"),
+        }
+    )
