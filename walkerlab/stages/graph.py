@@ -119,7 +119,6 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
-        walks=True,
         has_cells=True,
     ),
     Stage(

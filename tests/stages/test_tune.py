@@ -1,0 +1,96 @@
+"""The adjustment: not needed on the paper's contact, found where it is, and words where there is none."""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.canonical import only
+from walkerlab.config.loader import load
+from walkerlab.errors import NoAnswer
+from walkerlab.stages import fixedpoint, tune
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+
+
+@functools.cache
+def tuned(config, *sets):
+    """The stage's result with a small map."""
+    loaded = load(Path(config), sets).config
+    gait = fixedpoint.run(only(loaded, PIPELINE["fixedpoint"].reads), {}, Silent())
+    return tune.run(only(loaded, PIPELINE["tune"].reads), {"fixedpoint": gait}, Silent())
+
+
+def small(config, *sets, cells=5):
+    return tuned(config, f"tune.cells={cells}", *sets)
+
+
+def test_the_papers_contact_needs_no_adjustment():
+    found = small("paper").summary["adjustment"]
+    assert not found["needed"]
+    assert (found["scale_dtheta1"], found["scale_dtheta2"], found["walked_steps"]) == (1.0, 1.0, 10)
+    margins = found["margins"]
+    assert 0.95 < margins["dtheta_2 down"]["factor"] < 1.0 < margins["dtheta_2 up"]["factor"] < 1.2
+    assert margins["dtheta_2 down"]["beyond"] == "off-pad"
+
+
+def test_the_gait_is_the_one_that_the_walk_settles_on():
+    summary = small("paper").summary
+    gait, walk = summary["gait"], summary["procedure"]["adjusted"]
+    assert gait["stable"]
+    assert walk["step_periods_s"][-1] == pytest.approx(gait["period_s"], rel=1e-3)
+    assert walk["step_lengths_m"][-1] == pytest.approx(gait["step_length_m"], rel=1e-3)
+    assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
+
+
+def test_the_papers_own_start_lifts_off_the_ground_and_says_why():
+    start = small("paper").summary["paper_start"]
+    assert start["outcome"] != "walked"
+    assert start["energy_J"] == pytest.approx(221.5, abs=0.5)
+    assert start["normal_force_N"] < 0.1 * start["weight_N"]
+    assert "221.5 J" in start["reason"]
+
+
+def test_percentages_are_given_on_both_bases():
+    row = small("paper").summary["table2"]["dtheta_2"]
+    assert row["paper_percent_of_matlab"] == pytest.approx(100 * (3.20 - 0.84) / 0.84)
+    assert row["paper_percent_of_adams"] == pytest.approx(100 * (3.20 - 0.84) / 3.20)
+
+
+def test_creeping_feet_need_an_adjustment_and_the_found_start_walks():
+    summary = small("sliding-feet", "tune.stance_factors=[1.0, 1.1]").summary
+    found = summary["adjustment"]
+    assert found["needed"]
+    assert summary["procedure"]["released"]["outcome"] == "off-pad"
+    assert summary["procedure"]["adjusted"]["outcome"] == "walked"
+    assert 0.0 < found["distance"] < 0.2
+
+
+def test_the_map_is_what_single_walks_say():
+    content = small("paper")
+    cells = content["map"]
+    assert cells["outcome"].shape == (5, 5)
+    walked = (cells["outcome"] == 0).sum()
+    assert walked == content.summary["map"]["contact"].get("walked", 0)
+    assert np.all(cells["steps"][cells["outcome"] == 0] == 10)
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [
+        ("contact.static_friction=0", "contact.dynamic_friction=0"),
+        ("contact.static_friction=0.05", "contact.dynamic_friction=0.04"),
+    ],
+)
+def test_ground_that_cannot_hold_the_walker_has_no_answer_but_words(sets):
+    with pytest.raises(NoAnswer) as caught:
+        small("paper", *sets, cells=3)
+    assert "gait" in caught.value.message
+    assert caught.value.partial is not None
+
+
+def test_a_start_that_flies_is_an_answer():
+    summary = small("paper", "start=[-0.2018, 0.167, -1.02, -3.2]", cells=3).summary
+    assert summary["adjustment"]["needed"]
+    assert summary["procedure"]["released"]["outcome"] != "walked"
