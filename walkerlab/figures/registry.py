@@ -12,6 +12,7 @@ from walkerlab.figures import (
     figure_09,
     figure_10,
     figure_11,
+    figure_12,
 )
 from walkerlab.figures.illustration import Illustration
 
@@ -24,5 +25,6 @@ FIGURES: tuple[Illustration, ...] = (
     figure_09.FIGURE,
     figure_10.FIGURE,
     figure_11.FIGURE,
+    figure_12.FIGURE,
     *accuracy.FIGURES,
 )

@@ -30,6 +30,7 @@ class PaperStart:
     rigid_normal    N, force of the ground on the rigid model's stance foot at the start
     pull_from       s, from when on the rigid model's ground would have to pull; None if it never has to
     airborne_from   s, from when on no foot of the physical model is carried; None if one always is
+    carried_later   N, the most that the ground carries in the physical model once it would have to pull in the rigid one
     time            (samples,) s
     normal          (samples, leg) N, normal forces of the physical model
     mechanical      (samples,) J, kinetic and potential energy of the physical model
@@ -42,6 +43,7 @@ class PaperStart:
     rigid_normal: float
     pull_from: float | None
     airborne_from: float | None
+    carried_later: float | None
     time: NDArray[np.float64]
     normal: NDArray[np.float64]
     mechanical: NDArray[np.float64]
@@ -55,6 +57,8 @@ class PaperStart:
         ]
         if self.pull_from is not None:
             parts.append(f"to keep the stance foot down it would have to pull from {self.pull_from:.3g} s on")
+        if self.carried_later is not None:
+            parts.append(f"as it cannot, it carries no more than {self.carried_later:.2g} N from then on")
         if self.airborne_from is not None:
             parts.append(f"so both feet are off the ground from {self.airborne_from:.3g} s on")
         steps = int(self.walk.touch_time_s.size)
@@ -74,14 +78,17 @@ def paper_start(walker: RigidWalker, walk: Callable[[State], ContactWalkResult],
     start = np.array([state])
     result = walk(state)
     time, normal, mechanical = forces_of(result, contact)
+    pull_from = None if rigid.samples is None else pulls_from(walker, rigid.samples.time, rigid.samples.state)
+    later = normal[time >= pull_from].sum(axis=1) if pull_from is not None else np.zeros(0)
     return PaperStart(
         state=state,
         walk=result,
         energy=float(energies(walker, start).sum()),
         weight=float(contact.tree.mass * np.hypot(contact.gravity_along, contact.gravity_down)),
         rigid_normal=float(reactions(walker, start)[0, 1]),
-        pull_from=None if rigid.samples is None else pulls_from(walker, rigid.samples.time, rigid.samples.state),
+        pull_from=pull_from,
         airborne_from=first(time, normal.sum(axis=1) <= 0.0),
+        carried_later=float(later.max()) if later.size else None,
         time=time,
         normal=normal,
         mechanical=mechanical,

@@ -33,6 +33,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary
 from walkerlab.stages.tune_results import groups, summary
 from walkerlab.store.content import Content
 
@@ -81,9 +82,13 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
     rigid_step, rigid_state = rigid_start(config, inputs)
     gait = contact_gait(config, rigid_step, rigid_state)
     scene = free_scene(config, rigid_step, gait)
-    stage = Stage(config, scene, rigid_state, gait)
-    found = stage.findings(progress, jobs)
-    content = Content(groups(found), summary(found))
+    found = Stage(config, scene, rigid_state, gait).findings(progress, jobs)
+    stored, said = groups(found), summary(found)
+    limit = rigid_limit(config, found, inputs, progress)
+    if limit is not None:
+        stored |= limit_groups(limit)
+        said |= limit_summary(limit)
+    content = Content(stored, said)
     if gait.gait is None and found.adjustment is None:
         raise NoAnswer(
             f"tune: no gait ({gait.reason}), and none of {found.contact_map.outcome.size} starts walked",
@@ -101,6 +106,16 @@ def free_scene(config: Config, rigid_step: float, gait: GaitAnswer) -> ContactSc
         raise NoAnswer(f"tune: no contact gait to lay the pads for: {gait.reason}", gait.advice)
     own = None if gait.gait is None else gait.gait.step.length_m
     return replace(contact_scene(config, rigid_step, own if own is not None else rigid_step), pinned=None)
+
+
+def rigid_limit(
+    config: Config, found: Findings, inputs: Mapping[str, Content], progress: Progress
+) -> LimitFindings | None:
+    """What the rigid limit takes; None if it is not asked for or there is no gait to follow."""
+    if found.gait.gait is None or not config.tune.rigid_limit:
+        return None
+    rigid = inputs["fixedpoint"].summary
+    return limit_findings(config, found.scene, found.gait.gait, rigid, found.procedure.rigid, progress)
 
 
 class Stage:

@@ -1,0 +1,211 @@
+"""What the rigid limit takes, and which part of the contact makes which part of the difference: of `tune`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.gait.comparison import Motion
+from walkerlab.gait.contact_section import ContactGait
+from walkerlab.gait.paper.printed import ANGLE_ERROR
+from walkerlab.gait.recorded_walk import RecordedWalk
+from walkerlab.gait.rigid_limit import (
+    ALL,
+    ALL_POINT,
+    DAMPING,
+    NORMAL,
+    STICTION,
+    STIFFNESS,
+    Distance,
+    Extrapolation,
+    Limit,
+    RigidGait,
+    extrapolated,
+    observed_orders,
+)
+from walkerlab.physics.contact.compass import compass_assembly, contact_walker
+from walkerlab.physics.contact.walker import ContactWalker
+from walkerlab.physics.system import State
+from walkerlab.scene.contact import ContactScene, compass_parts, start_state
+from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
+from walkerlab.stages.progress import Progress
+from walkerlab.stages.simulate import leg_variables
+from walkerlab.store.content import Group, Variable
+
+FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
+WALKED, GAITS = (ALL, ALL_POINT), (STICTION, STIFFNESS, DAMPING, NORMAL)
+# of each setting: name, unit, meaning, whether it is a run time
+COLUMNS = (
+    ("period", "period_s", "s", "period of the contact gait"),
+    ("length", "step_length_m", "m", "its step length"),
+    ("slip", "slip_m", "m", "its slip a step"),
+    ("period_error", "period_error_s", "s", "its period less the rigid gait's"),
+    ("length_error", "length_error_m", "m", "its step length less the rigid gait's"),
+    ("numerical_period", "numerical_period_s", "s", "change of the period with a tolerance ten times tighter"),
+)
+WALK_COLUMNS = (
+    ("angle", "angle_error_rad", "rad", "largest difference of an angle from the rigid walk in phase, between impacts"),
+    (
+        "velocity",
+        "velocity_error_rad_s",
+        "rad/s",
+        "largest difference of an angular velocity in phase, between impacts",
+    ),
+    ("raw_angle", "raw_angle_error_rad", "rad", "largest difference of an angle at the same time"),
+    ("raw_velocity", "raw_velocity_error_rad_s", "rad/s", "largest difference of an angular velocity at the same time"),
+    ("numerical_time", "numerical_time_s", "s", "change of the last touch with a tolerance a hundred times tighter"),
+    ("evaluations", "rhs_evaluations", "1", "right-hand sides of the walk"),
+    ("wall_s", "wall_s", "s", "run time of the walk"),
+)
+
+
+@dataclass(frozen=True)
+class LimitFindings:
+    """Distances by series, and the limit without creep."""
+
+    rigid_period: float
+    contact_period: float
+    series: dict[str, list[Distance]]
+    without_creep: Extrapolation | None
+
+
+def limit_findings(
+    config: Config,
+    scene: ContactScene,
+    gait: ContactGait,
+    rigid_gait: Mapping[str, Any],
+    walk: RecordedWalk,
+    progress: Progress,
+) -> LimitFindings | None:
+    """Lead the contact towards the rigid limit; None if the rigid start's walk has no samples or no step.
+
+    rigid_gait  summary of `fixedpoint`
+    walk        of the rigid model from the start
+    """
+    if walk.samples is None or walk.steps == 0:
+        return None
+    legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
+    motion = Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes)
+    limit = Limit(
+        scene.ground,
+        RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
+        walk.steps,
+        scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
+    )
+    progress.start("tune: rigid limit", len(WALKED) + len(GAITS))
+
+    def start(walker: ContactWalker) -> State:
+        return start_state(replace(scene, walker=walker), walk.start)
+
+    found: dict[str, list[Distance]] = {}
+    for name in WALKED:
+        walker = scene.walker if name == ALL else point_footed(config, scene.walker)
+        found[name] = limit.series(name, walker, gait, start)
+        progress.advance()
+    for name in GAITS:
+        found[name] = limit.series(name, scene.walker, gait)
+        progress.advance()
+    return LimitFindings(limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
+
+
+def point_footed(config: Config, walker: ContactWalker) -> ContactWalker:
+    """The same walker on the same ground, with points for feet as the rigid model has them."""
+    parts = compass_parts(config.walker.model_copy(update={"foot_radius_m": 0.0}))
+    return contact_walker(
+        compass_assembly(parts), walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad
+    )
+
+
+def limit_summary(found: LimitFindings) -> dict[str, Any]:
+    """Orders of convergence, what 1e-4 takes, and what each cause amounts to."""
+    return {
+        "orders": {name: orders(distances) for name, distances in found.series.items()},
+        "reaches": {name: reached(found.series[name]) for name in WALKED},
+        "causes": causes(found),
+    }
+
+
+def orders(distances: list[Distance]) -> list[float]:
+    """Observed orders of the period's convergence, from the config's contact towards the limit."""
+    return [float(order) for order in observed_orders(distances)]
+
+
+def reached(distances: list[Distance]) -> dict[str, Any]:
+    """What the config's contact and the most rigid one amount to, and from which on the paper's claim is met."""
+    claim = ANGLE_ERROR.value
+    walked = [one for one in distances if one.angle is not None]
+    first = next((one for one in walked if one.angle is not None and one.angle <= claim), None)
+    return {
+        "claim_rad": claim,
+        "settings": [setting(one) for one in walked],
+        "first_within_claim": None if first is None else setting(first),
+    }
+
+
+def setting(one: Distance) -> dict[str, Any]:
+    """A setting and how far it is from the rigid walk."""
+    return {
+        "stiffness_factor": one.setting.stiffness,
+        "damping_factor": one.setting.damping,
+        "stiction_velocity_factor": one.setting.stiction,
+        "period_error_s": one.period_error,
+        "angle_error_rad": one.angle,
+        "velocity_error_rad_s": one.velocity,
+        "raw_angle_error_rad": one.raw_angle,
+        "numerical_time_s": one.numerical_time,
+        "run_wall_s": one.wall_s,
+    }
+
+
+def causes(found: LimitFindings) -> dict[str, Any]:
+    """Parts of the difference in period, each from switching one thing off while the others stay."""
+    total = found.contact_period - found.rigid_period
+    parts: dict[str, float] = {}
+    if found.without_creep is not None:
+        parts["creep_s"] = found.contact_period - found.without_creep.period
+    if found.series[NORMAL]:
+        parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL][-1].period
+    if found.series[ALL_POINT]:
+        parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT][0].period
+    return {
+        "total_s": total,
+        **parts,
+        "together_s": total - sum(parts.values()),
+        "creep_uncertainty_s": None if found.without_creep is None else found.without_creep.uncertainty,
+        "left_with_all_off_s": found.series[ALL_POINT][-1].period_error if found.series[ALL_POINT] else None,
+    }
+
+
+def limit_groups(found: LimitFindings) -> dict[str, Group]:
+    """One group a series."""
+    return {f"limit/{group_name(name)}": series_group(name, rows) for name, rows in found.series.items() if rows}
+
+
+def group_name(series: str) -> str:
+    """Of a series' group in the artifact."""
+    return series.replace(", ", "-").replace(" ", "-")
+
+
+def series_group(name: str, rows: list[Distance]) -> Group:
+    """A series' settings and distances."""
+    dims = ("setting",)
+    whole = [one for one in rows if one.angle is not None]
+    rows = whole if name in WALKED and whole else rows
+    factors = (
+        ("stiffness", "stiffness_factor", "on the stiffness"),
+        ("damping", "damping_factor", "on the damping"),
+        ("stiction", "stiction_velocity_factor", "on the stiction and friction velocity"),
+    )
+    variables = {"setting": Variable(np.arange(len(rows)), dims, "1", "setting, from the config's contact on")}
+    for attribute, column, text in factors:
+        values = np.array([getattr(one.setting, attribute) for one in rows])
+        variables[column] = Variable(values, dims, "1", f"factor {text}")
+    columns = COLUMNS + (WALK_COLUMNS if name in WALKED and whole else ())
+    for attribute, column, unit, text in columns:
+        values = np.array([getattr(one, attribute) for one in rows])
+        variables[column] = Variable(values, dims, unit, text, timing=attribute == "wall_s")
+    return Group(variables)
