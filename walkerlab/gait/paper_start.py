@@ -30,7 +30,7 @@ class PaperStart:
     rigid_normal    N, force of the ground on the rigid model's stance foot at the start
     pull_from       s, from when on the rigid model's ground would have to pull; None if it never has to
     airborne_from   s, from when on no foot of the physical model is carried; None if one always is
-    carried_later   N, the most that the ground carries in the physical model once it would have to pull in the rigid one
+    carried_later   N, the most that the physical model's ground carries once the rigid one's would have to pull
     time            (samples,) s
     normal          (samples, leg) N, normal forces of the physical model
     mechanical      (samples,) J, kinetic and potential energy of the physical model

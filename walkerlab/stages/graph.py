@@ -157,9 +157,7 @@ PIPELINE = Graph(
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
         reads=EVERYTHING,
-        inputs=results_of(
-            "fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"
-        ),
+        inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
         draws=True,
     ),
 )

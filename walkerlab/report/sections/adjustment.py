@@ -6,12 +6,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.report.blocks import Block, Cell, Column, Paragraph, Section, Table, table
-from walkerlab.report.numbers import count, fixed, length, listed, number, quantity
+from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 
 STAGE = "tune"
+CAUSES = {
+    "creep_s": "creep in the friction law makes",
+    "penetration_and_finite_impact_s": "penetration and the finite impact",
+    "foot_radius_s": "the round foot",
+    "together_s": "what they make together",
+}
+"""Parts of the difference in period, and what they are called in a sentence."""
 NOTHING = 1e-9
 """Imaginary part below which a multiplier is shown as real."""
 Summary = Mapping[str, Any]
@@ -28,12 +35,17 @@ def section(results: Results) -> Section | None:
     if summary["adjustment"].get("margins"):
         blocks.append(margins_table(summary))
     blocks.append(walks_table(summary))
+    if summary.get("reaches"):
+        blocks += [limit_table(name, found) for name, found in summary["reaches"].items() if found["settings"]]
+    if summary.get("orders"):
+        blocks.append(orders_table(summary["orders"]))
     return Section("adjustment", "The parameter adjustment", tuple(blocks))
 
 
 def verdict(summary: Summary) -> str:
     """Whether the adjustment was needed, and what explains it, in one paragraph."""
-    return " ".join((needed(summary), explained(summary), papers_start(summary)))
+    parts = (needed(summary), explained(summary), caused(summary), reached(summary), papers_start(summary))
+    return " ".join(part for part in parts if part)
 
 
 def needed(summary: Summary) -> str:
@@ -70,6 +82,49 @@ def explained(summary: Summary) -> str:
         f"{quantity(gait['height_lost_J'], 'J', 4)} that a step descends, {damping} go "
         f"into damping at touch-down and {friction} into friction."
     )
+
+
+def caused(summary: Summary) -> str:
+    """What makes the difference from the rigid gait; nothing if that was not asked."""
+    causes = summary.get("causes")
+    if not causes or not causes["total_s"]:
+        return ""
+    total = causes["total_s"]
+    parts = listed(
+        f"{name} {milliseconds(causes[key])} ({number(100.0 * causes[key] / total, 3)} %)"
+        for key, name in CAUSES.items()
+        if causes.get(key) is not None
+    )
+    return f"Its period differs from the rigid gait's by {milliseconds(total)}: {parts}, each switched off alone."
+
+
+def reached(summary: Summary) -> str:
+    """What the paper's claim would take; nothing if that was not asked."""
+    found = summary.get("reaches", {}).get("all, point foot")
+    if not found or not found["settings"]:
+        return ""
+    first, last = found["settings"][0], found["settings"][-1]
+    claim, differ = number(found["claim_rad"]), quantity(first["angle_error_rad"], "rad", 2)
+    within = found["first_within_claim"]
+    chosen = last if within is None else within
+    stiffness, damping, stiction = (
+        number(chosen[f"{name}_factor"], 3) for name in ("stiffness", "damping", "stiction_velocity")
+    )
+    contact = (
+        f"point feet, {stiffness} times the config's stiffness, {damping} times its damping and {stiction} times its "
+        f"stiction velocity"
+    )
+    if within is not None:
+        return (
+            f"To differ from the rigid walk by no more than {claim} rad in phase instead of {differ} takes {contact}."
+        )
+    left = quantity(last["angle_error_rad"], "rad", 2)
+    return f"With {contact}, the angles still differ by {left} in phase instead of {differ}: {claim} is not reached."
+
+
+def milliseconds(value_s: float) -> str:
+    """A time in ms."""
+    return quantity(1e3 * value_s, "ms", 3)
 
 
 def papers_start(summary: Summary) -> str:
@@ -174,3 +229,39 @@ def walks_table(summary: Summary) -> Table:
     return table(
         "The procedure, walk by walk", [Column("walk"), Column("outcome"), Column("steps", numeric=True)], rows
     )
+
+
+def limit_table(name: str, found: Summary) -> Table:
+    """One way towards the rigid limit."""
+    heads = (
+        "stiffness",
+        "damping",
+        "stiction velocity",
+        "period error (s)",
+        "angle, in phase (rad)",
+        "velocity, in phase (rad/s)",
+        "angle, same time (rad)",
+        "numerical error (s)",
+        "run time (s)",
+    )
+    keys = (
+        "stiffness_factor",
+        "damping_factor",
+        "stiction_velocity_factor",
+        "period_error_s",
+        "angle_error_rad",
+        "velocity_error_rad_s",
+        "raw_angle_error_rad",
+        "numerical_time_s",
+        "run_wall_s",
+    )
+    rows = [[number(row[key], 3) for key in keys] for row in found["settings"]]
+    note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
+    return table(f"Towards the rigid limit: {name}", [Column(head, numeric=True) for head in heads], rows, note=note)
+
+
+def orders_table(orders: Mapping[str, Any]) -> Table:
+    """Observed orders of convergence, knob by knob."""
+    rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
+    columns = [Column("knob"), Column("observed orders, towards the limit", wide=True)]
+    return table("How fast the period converges when one knob is turned", columns, rows)
