@@ -15,7 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.gait.comparison import IMPACT_PHASE, PHASES, Motion, difference_in_phase, difference_in_time
+from walkerlab.gait.comparison import (
+    IMPACT_PHASE,
+    PHASES,
+    Motion,
+    difference_in_phase,
+    difference_in_time,
+    sampled_at_step_ends,
+)
 from walkerlab.gait.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
 from walkerlab.gait.contact_section import ContactGait, find_contact_gait
 from walkerlab.physics.contact.compass import STANCE_FOOT
@@ -170,7 +177,7 @@ class Limit:
         if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         y = walk.samples.states
-        motion = Motion(walk.samples.time_s, y[:, 2:4], y[:, 6:8], walk.touch_time_s)
+        motion = sampled_at_step_ends(Motion(walk.samples.time_s, y[:, 2:4], y[:, 6:8], walk.touch_time_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases[phases >= IMPACT_PHASE])
         _, raw = difference_in_time(motion, self.rigid.motion)
