@@ -80,7 +80,8 @@ class Findings:
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Adjust the start; raises NoAnswer if there is neither a gait nor a start that walks."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    gait = contact_gait(config, rigid_step, rigid_state)
+    near = tuple(float(x) for x in inputs["fixedpoint"].summary["state"])  # the start itself may be far from any gait
+    gait = contact_gait(config, rigid_step, near)
     scene = free_scene(config, rigid_step, gait)
     found = Stage(config, scene, rigid_state, gait).findings(progress, jobs)
     stored, said = groups(found), summary(found)
