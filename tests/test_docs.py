@@ -47,9 +47,10 @@ def test_links_lead_to_files_that_are_there(path):
 @pytest.mark.parametrize("command", commands())
 def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "my.yaml").write_text("extends: paper\n", encoding="utf-8")
     stands_for = {"STAGE": "fixedpoint", "FILE": "my.yaml"}
     words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
+    for name in (word for word in words if word.endswith(".yaml") and not word.startswith("configs/")):
+        (tmp_path / name).write_text("extends: paper\n", encoding="utf-8")
     dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
     done = CliRunner().invoke(program(), [*words, *dry])
     assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
@@ -78,3 +79,13 @@ def test_tables_are_what_the_tool_gives(name, results):
 def test_every_part_has_a_maker_and_a_place():
     placed = [part for name in MAKER["DOCUMENTS"] for _, part, _, _ in MAKER["PART"].findall(text_of(ROOT / name))]
     assert sorted(placed) == sorted(MAKER["PARTS"])
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.name)
+def test_the_readme_leads_to_every_page(page):
+    assert f"(docs/{page.name})" in text_of(ROOT / "README.md")
+
+
+def test_the_pipeline_page_draws_every_stage():
+    drawing = re.search(r"```mermaid\n(.*?)```", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL)[1]
+    assert [stage.name for stage in PIPELINE.stages if not re.search(rf"\b{stage.name}\b", drawing)] == []
