@@ -89,7 +89,28 @@ def nothing_compiled_yet() -> bool:
 
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    return cast(F, numba.njit(cache=True, **FLAGS)(function))
+    compiled = numba.njit(cache=True, **FLAGS)(function)
+    _forgive_unknown_types(compiled)
+    return cast(F, compiled)
+
+
+def _forgive_unknown_types(compiled: Any) -> None:
+    """Begin a kernel's stored code anew where it was stored for types that this process cannot import.
+
+    Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
+    """
+    stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if stored is None:
+        return
+    load_index = stored._load_index
+
+    def index() -> Any:
+        try:
+            return load_index()
+        except (ImportError, AttributeError):
+            return {}
+
+    stored._load_index = index
 
 
 def inlined(function: F) -> F:

@@ -16,7 +16,7 @@ from walkerlab.kernels import uncompiled
 from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.scene.user_script import walk_as_a_script
 from walkerlab.solvers.registry import METHODS, Method, finder_for
-from walkerlab.solvers.stepping import ACCEPTED, REJECTED, RHS
+from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
 
 if TYPE_CHECKING:
     from walkerlab.gait.contact_run import Ground
@@ -72,16 +72,22 @@ class RigidTrial:
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             return lambda: self._as_a_script(rtol, atol, budget)
-        return lambda: self._walk(METHODS[method], rtol, atol, budget)
+        return self._prepared(METHODS[method], rtol, atol, budget)
 
-    def _walk(self, entry: Method, rtol: float, atol: float, budget: int) -> TrialRun:
+    def _prepared(self, entry: Method, rtol: float, atol: float, budget: int) -> Callable[[], TrialRun]:
+        """The walk with memory that its runs share, as a program that walks often would have it."""
         method = entry.new(4, rtol, atol, budget)
         finder = finder_for(method, RIGID_SIGNALS)
-        after = np.zeros((self.steps, 4))
+        strikes, before, after = np.zeros(self.steps), np.zeros((self.steps, 4)), np.zeros((self.steps, 4))
         stride = walk if entry.compiled else uncompiled(walk)
-        strikes, before = np.zeros(self.steps), np.zeros((self.steps, 4))
-        status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after)
-        return finished(Outcome(status), after[-1], method.counts)
+
+        def run() -> TrialRun:
+            clear_counts(method)
+            method.clock[H_NEXT] = 0.0
+            status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after)
+            return finished(Outcome(status), after[-1], method.counts)
+
+        return run
 
     def _as_a_script(self, rtol: float, atol: float, budget: int) -> TrialRun:
         state, evaluations = walk_as_a_script(self.walker, self.start, self.steps, rtol, atol, budget)

@@ -1,0 +1,310 @@
+"""Measure what the project claims about speed, as ratios within one run on one machine.
+
+    python scripts/benchmark.py [--quick] [--write]
+
+Everything is warm; times are medians. Peers are named with their versions. With --write the table goes into
+docs/performance.md. With --quick each time is the median of fewer repeats, and near-rigid ground is left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import re
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config import loader
+from walkerlab.gait.continuation import Branch
+from walkerlab.gait.fixed_point import Search, SearchSettings, find_gaits
+from walkerlab.gait.small_slope import seeds
+from walkerlab.gait.step_map import newton
+from walkerlab.kernels import kernel
+from walkerlab.physics.contact.friction import Frictionless
+from walkerlab.physics.contact.motion import OnGround
+from walkerlab.physics.rigid.walker import step_length
+from walkerlab.physics.system import blank, derivative
+from walkerlab.scene.contact import contact_scene, hinged_walker
+from walkerlab.scene.contact_trials import contact_trial
+from walkerlab.scene.references import Reference, reference_for
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.solvers.vectors import load, store
+
+ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
+PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
+STEPS = 10
+BUDGET = 2_000_000
+CALLS, STATES = 1_000_000, 64  # calls of a right-hand side, and the states that they are at
+LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
+PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
+PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+MET, MISSED, STRETCH = "bar met", "bar missed", "stretch met"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One claim: what was done, what it took, and what was aimed at."""
+
+    work: str
+    measured: str
+    bar: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Timed:
+    """The cheapest run of a method that is exact enough."""
+
+    method: str
+    tolerance: float
+    error: float
+    seconds: float
+    rhs: int
+
+
+class Stopwatch:
+    """Medians of repeats."""
+
+    def __init__(self, repeats: int, longest_s: float) -> None:
+        """At most so many repeats, and no more once they have taken so long."""
+        self.repeats, self.longest_s = repeats, longest_s
+
+    def __call__(self, work: Callable[[], Any]) -> float:
+        """Seconds, after one call that is not counted."""
+        work()
+        times: list[float] = []
+        while len(times) < self.repeats and (len(times) < 3 or sum(times) < self.longest_s):
+            start = time.perf_counter()
+            work()
+            times.append(time.perf_counter() - start)
+        return median(times)
+
+
+def cheapest(
+    trial: Trial, reference: Reference, method: str, level: float, watch: Stopwatch, ladder: Sequence[float]
+) -> Timed | None:
+    """A method at the loosest tolerance at which its error is at most `level`; None if there is none."""
+    for tolerance in ladder:
+        walk = trial.prepare(method, tolerance, BUDGET)
+        run = walk()
+        if not run.state.size:
+            continue
+        error = float(np.max(np.abs(run.state - reference.state)))
+        if error <= level:
+            return Timed(method, tolerance, error, watch(walk), run.rhs_evaluations)
+    return None
+
+
+def against(work: str, ours: Timed | None, peer: Timed | None, bar: float, stretch: float) -> Line:
+    """How many times faster we are."""
+    aim = f"{bar:g} x (stretch {stretch:g} x)"
+    if ours is None or peer is None:
+        who = "we" if ours is None else "the peer"
+        return Line(work, f"{who} did not reach the error", aim, MISSED if ours is None else "no comparison")
+    ratio = peer.seconds / ours.seconds
+    measured = f"{ratio:.3g} x: {spoken(ours)} against {spoken(peer)}"
+    return Line(work, measured, aim, STRETCH if ratio >= stretch else MET if ratio >= bar else MISSED)
+
+
+def spoken(run: Timed) -> str:
+    """A run in words."""
+    return f"{run.method} {1e3 * run.seconds:.3g} ms at {run.error:.1e}"
+
+
+def at_most(work: str, value: float, unit: str, bar: float, stretch: float) -> Line:
+    """A number that is to be small."""
+    aim = f"{bar:g} {unit} (stretch {stretch:g})"
+    return Line(work, f"{value:.3g} {unit}", aim, STRETCH if value <= stretch else MET if value <= bar else MISSED)
+
+
+def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
+    """Ten rigid steps, and how exact they can be."""
+    walker = rigid_walker(ONE_DEGREE, "corrected")
+    trial = RigidTrial(walker, (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START), STEPS)
+    reference = reference_for(trial)
+    ours = cheapest(trial, reference, "dop853", 1e-9, watch, LADDER)
+    for name, peer, bar, stretch in (
+        ("NumPy right-hand side", USER_SCRIPT, 300, 600),
+        ("our compiled right-hand side", "scipy-dop853", 100, 250),
+    ):
+        found = cheapest(trial, reference, peer, 1e-9, watch, LADDER)
+        yield against(f"ten rigid steps at 1e-9, against SciPy DOP853 with {name}", ours, found, bar, stretch)
+    errors = []
+    for tolerance in (1e-12, 1e-13, 1e-14):
+        run = trial.prepare("dop853", tolerance, BUDGET)()
+        errors.append(float(np.max(np.abs(run.state - reference.state))))
+    known = f" (reference {reference.method}, second {reference.second_method}: {reference.agreement:.1e})"
+    line = at_most("ten rigid steps, smallest error", min(errors), "", 1e-13, 1e-14)
+    yield replace(line, measured=line.measured.strip() + known)
+
+
+def contact_trial_at_one_degree() -> ContactTrial:
+    """Ten steps, 7 s, with the paper's contact from the rigid fixed point."""
+    gait = find_gaits(rigid_walker(ONE_DEGREE, "corrected")).gait
+    assert gait is not None, "there is a gait at 1 degree"
+    return contact_trial(ONE_DEGREE, tuple(gait.state), gait.step_length, STEPS)
+
+
+def contact_lines(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> Iterator[Line]:
+    """The contact walker against SciPy's stiff solvers."""
+    for level, peer, bar, stretch in ((2e-6, "scipy-radau", 30, 70), (1e-4, "scipy-lsoda", 8, 20)):
+        ours = cheapest(trial, reference, "radau5", level, watch, LADDER)
+        found = cheapest(trial, reference, peer, level, watch, LADDER[2:])
+        yield against(f"contact walker, 7 s at {level:g}, against {peer}", ours, found, bar, stretch)
+
+
+def newton_lines(watch: Stopwatch) -> Iterator[Line]:
+    """From the small-slope seed to the fixed point at 1 degree."""
+    search = Search(rigid_walker(ONE_DEGREE, "corrected"), SearchSettings())
+    seed = seeds(search.walker)[0]
+
+    def solve() -> None:
+        reached = Branch(search.looking, seed).follow(search.walker.slope)
+        assert reached.z is not None, "the gait can be followed"
+        z = np.array(reached.z)
+        newton(search.solving, z, search.settings.solved_residual)
+
+    yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
+
+
+@kernel
+def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
+    """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
+    for call in range(calls):
+        place = call % states.shape[0]
+        store(derivative(system, 0.0, load(states, place, blank(system))), rates, place)
+
+
+def rhs_times(watch: Stopwatch) -> dict[str, float]:
+    """Nanoseconds of right-hand sides."""
+    rigid = rigid_walker(ONE_DEGREE, "corrected")
+    scene = contact_scene(ONE_DEGREE, abs(step_length(rigid, -0.2044, 0.1695)))
+    walker = scene.walker
+    free = (0.0, 0.7365, -0.2044, 0.1695, 0.65, -0.1, -0.6, -0.86)
+    angles = (-0.2044, 0.1695, -0.6, -0.86)
+    systems: dict[str, tuple[Any, Any]] = {
+        "rigid, Appendix A": (rigid, angles),
+        "contact, both feet may touch": (OnGround(walker, (True, True)), free),
+        "contact, frictionless": (OnGround(walker._replace(friction=Frictionless()), (True, True)), free),
+        "contact, in the air": (OnGround(walker, (False, False)), free),
+        "contact, stance foot hinged": (hinged_walker(ONE_DEGREE, walker), angles),
+    }
+    found = {}
+    for name, (system, state) in systems.items():
+        # as many different states as fit into the fastest memory, a hair apart
+        states = np.array(state) * (1.0 + 1e-6 * np.arange(STATES)[:, np.newaxis])
+        rates = np.zeros_like(states)
+        found[name] = 1e9 * watch(partial(call_often, system, states, rates, CALLS)) / CALLS
+    return found
+
+
+def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
+    """The two right-hand sides, and what generality costs."""
+    rigid, contact = times["rigid, Appendix A"], times["contact, both feet may touch"]
+    hinged = times["contact, stance foot hinged"]
+    yield at_most("right-hand side, rigid", rigid, "ns", 40, 20)
+    yield at_most("right-hand side, contact", contact, "ns", 100, 60)
+    work = "assembled from parts and hinged, swing foot watched, against Appendix A's closed form"
+    yield at_most(work, hinged / rigid, "x", 3, 1)
+
+
+def memory_line() -> Line:
+    """What 10,000 strides take more than 100."""
+    walker = rigid_walker(ONE_DEGREE, "corrected")
+    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    peaks = []
+    for strides in (100, 10_000):
+        tracemalloc.start()
+        RigidTrial(walker, start, 2 * strides).prepare("dop853", 1e-8, 10**9)()
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    a_step = (peaks[1] - peaks[0]) / (2 * 9_900)
+    # a time and the states before and after each heel strike
+    allowed = 8 * (1 + 4 + 4)
+    measured = f"{a_step:.0f} bytes a step more, its time and states are {allowed}"
+    return Line("memory, 10,000 strides without stored states", measured, "flat", MET if a_step <= allowed else MISSED)
+
+
+def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
+    """Error and work with steps that end at the force law's joins, and without."""
+    smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_joins=False)))
+    rows = []
+    for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
+        cells = [f"{tolerance:.0e}"]
+        for one in (trial, smooth):
+            walk = one.prepare("radau5", tolerance, BUDGET)
+            run = walk()
+            error = float(np.max(np.abs(run.state - reference.state))) if run.state.size else None
+            cells += [run.outcome if error is None else f"{error:.1e}", str(run.rhs_evaluations)]
+            cells.append(f"{1e3 * watch(walk):.3g}")
+        rows.append(cells)
+    return rows
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def environment() -> str:
+    """On what it was measured."""
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
+    return f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}, {libraries}"
+
+
+def conclusion(lines: Sequence[Line]) -> str:
+    """How many bars were met, and which were not."""
+    missed = [line.work for line in lines if line.verdict == MISSED]
+    met = sum(line.verdict in (MET, STRETCH) for line in lines)
+    said = f"{met} of {len(lines)} bars met"
+    return f"{said}." if not missed else f"{said}; missed: {'; '.join(missed)}."
+
+
+def main() -> None:
+    """Measure, print, and write if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats")
+    parser.add_argument("--write", action="store_true", help="write the tables into docs/performance.md")
+    options = parser.parse_args()
+    watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
+
+    lines = [*rigid_lines(watch), *newton_lines(watch)]
+    trial = contact_trial_at_one_degree()
+    reference = reference_for(trial)
+    lines += contact_lines(trial, reference, watch)
+    times = rhs_times(watch)
+    lines += [*rhs_lines(times), memory_line()]
+    parts = {
+        "environment": f"{environment()}.\n\n{conclusion(lines)}\n",
+        "speed": markdown(
+            ("work", "measured", "bar", "verdict"), [(one.work, one.measured, one.bar, one.verdict) for one in lines]
+        ),
+        "left-out": markdown(
+            ("right-hand side", "ns", "of the whole"),
+            [(name, f"{ns:.3g}", f"{ns / times['contact, both feet may touch']:.2f}") for name, ns in times.items()],
+        ),
+        "joins": markdown(
+            ("tolerance", "error, located", "rhs", "ms", "error, stepped over", "rhs", "ms"),
+            join_rows(trial, reference, watch),
+        ),
+    }
+    for text in parts.values():
+        print(text)
+    if options.write:
+        page = PAGE.read_text(encoding="utf-8")
+        PAGE.write_text(PART.sub(lambda part: f"{part[1]}{parts[part[2]]}{part[4]}", page), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+"""What holds for every method of the registry; a new one is covered as soon as it is listed."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from walkerlab.kernels import kernel
+from walkerlab.physics.system import blank, derivative, jacobian
+from walkerlab.solvers.registry import METHODS, method_named
+from walkerlab.solvers.stepping import (
+    ACCEPTED,
+    OUT_OF_BUDGET,
+    RHS,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    dense_degree,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
+
+MOON = 0.012277471
+PLENTY = 10**6
+
+
+class Satellite(NamedTuple):
+    """Arenstorf's orbit about earth and moon; Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2)."""
+
+    moon: float
+
+
+START = (0.994, 0.0, 0.0, -2.00158510637908252240537862224)
+PERIOD = 17.0652165601579625588917206249
+
+
+@blank.case(Satellite)
+def satellite_blank(system):
+    return (0.0, 0.0, 0.0, 0.0)
+
+
+@derivative.case(Satellite)
+def satellite_derivative(system, t, y):
+    m, e = system.moon, 1.0 - system.moon
+    earth = ((y[0] + m) ** 2 + y[1] ** 2) ** 1.5
+    moon = ((y[0] - e) ** 2 + y[1] ** 2) ** 1.5
+    return (
+        y[2],
+        y[3],
+        y[0] + 2.0 * y[3] - e * (y[0] + m) / earth - m * (y[0] - e) / moon,
+        y[1] - 2.0 * y[2] - e * y[1] / earth - m * y[1] / moon,
+    )
+
+
+@jacobian.case(Satellite)
+def satellite_jacobian(system, t, y, J):
+    m, e = system.moon, 1.0 - system.moon
+    x_e, x_m = y[0] + m, y[0] - e
+    r_e, r_m = math.sqrt(x_e * x_e + y[1] * y[1]), math.sqrt(x_m * x_m + y[1] * y[1])
+    for i in range(4):
+        for j in range(4):
+            J[i, j] = 0.0
+    J[0, 2], J[1, 3], J[2, 3], J[3, 2] = 1.0, 1.0, 2.0, -2.0
+    pull = e / r_e**3 + m / r_m**3
+    J[2, 0] = 1.0 - pull + 3.0 * (e * x_e * x_e / r_e**5 + m * x_m * x_m / r_m**5)
+    J[3, 1] = 1.0 - pull + 3.0 * (e * y[1] * y[1] / r_e**5 + m * y[1] * y[1] / r_m**5)
+    J[2, 1] = J[3, 0] = 3.0 * y[1] * (e * x_e / r_e**5 + m * x_m / r_m**5)
+
+
+ORBIT = Satellite(MOON)
+
+
+@kernel
+def drive(method, system, start, t_end):
+    begin(method, system, 0.0, start, 0.0)
+    status = STEP_DONE
+    while method.clock[T] < t_end and status == STEP_DONE:
+        status = advance(method, system, t_end)
+    return status
+
+
+@kernel
+def half_way(method, system, out):
+    prepare_dense(method, system)
+    y = interpolate(method, system, 0.5)
+    for i in range(4):
+        out[i] = y[i]
+
+
+@kernel
+def once_more(method, system, t_end):
+    rewind(method, system)
+    return advance(method, system, t_end)
+
+
+def called(name, function, *arguments):
+    """A kernel as the walks call it: compiled for our own methods, in Python for a library's."""
+    return (function if METHODS[name].compiled else function.py_func)(*arguments)
+
+
+def driven(name, rtol, t_end, budget=PLENTY):
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, budget)
+    return method, called(name, drive, method, ORBIT, START, t_end)
+
+
+@pytest.fixture(scope="module")
+def early():
+    """The satellite after a tenth of its period, by the most exact of all."""
+    return driven("dop853", 1e-14, 0.1 * PERIOD)[0].y.copy()
+
+
+every_method = pytest.mark.parametrize("name", METHODS)
+
+
+@every_method
+def test_arenstorfs_orbit_closes(name):
+    """Errors grow about 10^4 times along the orbit."""
+    method, status = driven(name, 1e-9, PERIOD)
+    assert status == STEP_DONE
+    assert method.y[:2] == pytest.approx(START[:2], abs=2e-3)
+    assert method.clock[T] == PERIOD
+
+
+@every_method
+def test_error_falls_with_the_tolerance(name, early):
+    errors = [np.abs(driven(name, rtol, 0.1 * PERIOD)[0].y - early).max() for rtol in (1e-4, 1e-6, 1e-8)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-4
+
+
+@every_method
+def test_work_is_counted_and_rises_with_accuracy(name):
+    loose, tight = (driven(name, rtol, 0.1 * PERIOD)[0].counts for rtol in (1e-4, 1e-8))
+    assert 0 < loose[ACCEPTED] < tight[ACCEPTED]
+    assert 0 < loose[RHS] < tight[RHS]
+
+
+@every_method
+def test_a_budget_ends_the_run(name):
+    method, status = driven(name, 1e-8, PERIOD, budget=100)
+    assert status == OUT_OF_BUDGET
+    assert method.counts[RHS] <= 130  # a step that has begun may be finished
+
+
+@every_method
+def test_dense_output_agrees_with_a_run_that_ends_there(name):
+    rtol = 1e-8
+    method, _ = driven(name, rtol, 0.05 * PERIOD)
+    out = np.zeros(4)
+    called(name, half_way, method, ORBIT, out)
+    middle = 0.5 * (method.clock[T_OLD] + method.clock[T])
+    exact = driven("dop853", 1e-13, middle)[0].y
+    assert out == pytest.approx(exact, abs=1e-4)
+
+
+@every_method
+def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
+    method, _ = driven(name, 1e-8, 0.05 * PERIOD)
+    event = 0.25 * method.clock[T_OLD] + 0.75 * method.clock[T]
+    assert called(name, once_more, method, ORBIT, event) == STEP_DONE
+    assert method.clock[T] == event
+    exact = driven("dop853", 1e-13, event)[0].y
+    assert method.y == pytest.approx(exact, abs=1e-4)
+
+
+@every_method
+def test_the_same_run_gives_the_same_bits(name):
+    first, second = (driven(name, 1e-7, 0.1 * PERIOD)[0] for _ in range(2))
+    assert first.y.tobytes() == second.y.tobytes()
+    assert first.counts.tolist() == second.counts.tolist()
+
+
+@every_method
+def test_dense_degree_is_that_of_a_polynomial(name):
+    assert 3 <= dense_degree(method_named(name).new(4, 1e-6, 1e-8, PLENTY)) <= 10
+
+
+def test_an_unknown_method_is_an_error_that_names_the_known():
+    with pytest.raises(KeyError, match="dop853, radau5"):
+        method_named("euler")

@@ -1,0 +1,157 @@
+"""An edited function never runs stale: compiled code belongs to the sources that it was made of."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "walkerlab"
+CALL = """
+from walkerlab.kernels import CACHE_FOLDER
+import walkerlab.gait.trial_of_code as trial
+print(trial.twice(3.0), CACHE_FOLDER.name)
+"""
+CALLER = '''"""A kernel that calls a function of another file."""
+
+from walkerlab.kernels import kernel
+from walkerlab.physics.trial_of_code import once
+
+
+@kernel
+def twice(x: float) -> float:
+    """Twice that."""
+    return 2.0 * once(x)
+'''
+CALLED = '''"""A function to be edited."""
+
+from walkerlab.kernels import inlined
+
+
+@inlined
+def once(x: float) -> float:
+    """This."""
+    return x + 1.0
+'''
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package with two files more, and a way to run it in a process of its own."""
+    package = tmp_path / "walkerlab"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    (package / "gait" / "trial_of_code.py").write_text(CALLER)
+    (package / "physics" / "trial_of_code.py").write_text(CALLED)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, "-c", CALL], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        value, folder = done.stdout.split()
+        return float(value), folder
+
+    return package, run
+
+
+def compiled(folder):
+    return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
+
+
+def test_an_edited_function_of_another_file_never_runs_stale(copy):
+    package, run = copy
+    called = package / "physics" / "trial_of_code.py"
+    before = called.stat()
+    assert run()[0] == 8.0
+    called.write_text(CALLED.replace("x + 1.0", "x + 2.0"))
+    # not even a file's time gives it away
+    os.utime(called, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert run()[0] == 10.0
+
+
+def test_code_that_is_as_before_is_not_compiled_again(copy):
+    package, run = copy
+    _, folder = run()
+    kept = compiled(package.parent / "cache" / folder)
+    assert run()[1] == folder
+    assert kept
+    assert compiled(package.parent / "cache" / folder) == kept
+
+
+def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(copy):
+    package, run = copy
+    _, folder = run()
+    with (package / "errors.py").open("a") as file:
+        file.write("\n# a remark\n")
+    assert run()[1] == folder
+
+
+FOREIGN = """
+from typing import NamedTuple
+from walkerlab.physics.trial_of_system import value
+from walkerlab.gait.trial_of_system import valued
+class Foreign(NamedTuple):
+    number: float
+value.case(Foreign)(lambda system: 3.0)
+result = valued(Foreign(1.0))
+"""
+OWN = """
+from walkerlab.physics.trial_of_system import Own
+from walkerlab.gait.trial_of_system import valued
+print(valued(Own(1.0)))
+"""
+SYSTEM = '''"""Systems of several types."""
+
+from typing import Any, NamedTuple
+
+from walkerlab.kernels import by_type
+
+
+class Own(NamedTuple):
+    """One of the package."""
+
+    number: float
+
+
+@by_type
+def value(system: Any) -> float:
+    """A number."""
+
+
+@value.case(Own)
+def own_value(system: Own) -> float:
+    """Its own."""
+    return system.number
+'''
+VALUED = '''"""A kernel for systems of any type."""
+
+from typing import Any
+
+from walkerlab.kernels import kernel
+from walkerlab.physics.trial_of_system import value
+
+
+@kernel
+def valued(system: Any) -> float:
+    """Its value."""
+    return value(system)
+'''
+
+
+def test_code_compiled_for_types_of_another_program_does_not_stand_in_the_way(copy, tmp_path):
+    package, _ = copy
+    (package / "physics" / "trial_of_system.py").write_text(SYSTEM)
+    (package / "gait" / "trial_of_system.py").write_text(VALUED)
+    (tmp_path / "foreign.py").write_text(FOREIGN)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+
+    def run(source):
+        return subprocess.run(
+            [sys.executable, "-c", source], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        ).stdout
+
+    run("import foreign")
+    (tmp_path / "foreign.py").unlink()
+    assert run(OWN) == "1.0\n"
