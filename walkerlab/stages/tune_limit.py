@@ -59,7 +59,7 @@ WALK_COLUMNS = (
     ("raw_velocity", "raw_velocity_error_rad_s", "rad/s", "largest difference of an angular velocity at the same time"),
     ("numerical_time", "numerical_time_s", "s", "change of the last touch with a tolerance a hundred times tighter"),
     ("evaluations", "rhs_evaluations", "1", "right-hand sides of the walk"),
-    ("wall_s", "wall_s", "s", "run time of the walk"),
+    ("wall_s", "wall_s", "s", "processor time of the walk"),
 )
 
 
