@@ -153,7 +153,7 @@ def follow_from_rigid(walker: ContactWalker, ground: Ground, methods: MethodSett
         return GaitAnswer(
             None,
             "nearly rigid ground has no gait either",
-            "The gait needs ground that its feet can use: try contact.terrain: after-mid-swing, or a gentler slope.",
+            "Damp or stiffen the contact, choose a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
         )
     rigidity, stride, before = 1.0, FIRST_STRIDE, None
     for _ in range(MOST_STRIDES):
