@@ -214,7 +214,13 @@ class Tune(Block):
     ] = (0.85, 1.3)
 
     rigid_limit: Annotated[
-        bool, key("", "whether the contact is also led towards the rigid limit, to see what 1e-4 takes", "this project")
+        bool,
+        key(
+            "",
+            "whether the contact is also led towards the rigid limit, to see what 1e-4 takes",
+            "this project",
+            bounds="true or false",
+        ),
     ] = True
 
     @field_validator("swing_factors", "stance_factors")
