@@ -165,12 +165,14 @@ def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
         return OUT_OF_BUDGET
     try:
         method.solver.step()
+        if method.solver.status == "failed":
+            return STEP_TOO_SMALL
+        # some dense outputs evaluate the right-hand side too
+        dense = method.solver.dense_output()
     except OutOfBudgetError:
         return OUT_OF_BUDGET
-    if method.solver.status == "failed":
-        return STEP_TOO_SMALL
     method.counts[ACCEPTED] += 1
-    method.dense = method.solver.dense_output()
+    method.dense = dense
     clock[T_OLD], clock[T] = method.solver.t_old, min(method.solver.t, t_end)
     method.y_old[:] = method.dense(method.solver.t_old)
     method.y[:] = method.solver.y if clock[T] == method.solver.t else method.dense(clock[T])
