@@ -56,10 +56,18 @@ def test_report_says_in_red_what_failed():
     assert report_of(None) is None
 
 
+def test_report_names_the_other_method_or_why_there_is_none():
+    alone = replace(GOOD, name="alone", second_tried="dop853 budget-exhausted")
+    shown = report_of(summary_of([replace(GOOD, second_method="dop853"), alone], [RIGHT], []))
+    (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
+    assert [row[3].text for row in table.bodies[0].rows] == ["dop853", "none"]
+    assert "alone: dop853 budget-exhausted" in table.note
+
+
 def test_one_and_two_processes_find_the_same():
     cases = [case for case in shipped() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")]
     cells = [cell for cell in cells_of(cases) if hasattr(cell, "case")]
-    one, two = ([replace(found[0], wall_s=0.0) for found in run_cells(cells, jobs)] for jobs in (1, 2))
+    one, two = ([replace(item, wall_s=0.0) for found in run_cells(cells, jobs) for item in found] for jobs in (1, 2))
     assert one == two
 
 

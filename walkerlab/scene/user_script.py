@@ -21,9 +21,15 @@ class OutOfBudgetError(Exception):
 
 
 def walk_as_a_script(
-    walker: RigidWalker, start: tuple[float, ...], steps: int, rtol: float, atol: float, budget: int
+    walker: RigidWalker,
+    start: tuple[float, ...],
+    steps: int,
+    rtol: float,
+    atol: float,
+    budget: int,
+    method: str = "DOP853",
 ) -> tuple[Floats | None, int]:
-    """Walk `steps` steps with SciPy's solve_ivp, DOP853, a NumPy right-hand side and its terminal events.
+    """Walk `steps` steps with SciPy's solve_ivp, a NumPy right-hand side and its terminal events.
 
     Returns the state after the last impact (None if the budget did not last) and the right-hand sides used.
     """
@@ -55,7 +61,7 @@ def walk_as_a_script(
     limit = 10.0 * np.sqrt(L / g)
     try:
         for _ in range(steps):
-            swing = solve_ivp(right_hand_side, (0.0, limit), state, method="DOP853", rtol=rtol, atol=atol, events=event)
+            swing = solve_ivp(right_hand_side, (0.0, limit), state, method=method, rtol=rtol, atol=atol, events=event)
             state = np.array(impact(walker, *swing.y[:, -1].tolist()))
     except OutOfBudgetError:
         return None, used

@@ -9,24 +9,22 @@ from walkerlab.config.stability import Case
 from walkerlab.stability.catalogue import config_of
 from walkerlab.stability.contact_case import judge_contact
 from walkerlab.stability.known import PROBLEMS, Known
-from walkerlab.stability.ordinary import CHOSEN, Choice, choices
+from walkerlab.stability.ordinary import Choice, choices
 from walkerlab.stability.rigid_case import judge_rigid
 from walkerlab.stability.verdict import CaseResult
 
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to be judged, and shown with ordinary methods if it is one of those."""
+    """A case to be judged, and tried with ordinary methods."""
 
     case: Case
 
     def run(self) -> tuple[CaseResult | Known | Choice, ...]:
         """The verdict, then the ordinary methods."""
         config = config_of(self.case)
-        if self.case.model == "rigid":
-            return (judge_rigid(self.case, config),)
-        shown = choices(self.case, config) if self.case.name in CHOSEN else ()
-        return (judge_contact(self.case, config), *shown)
+        judge = judge_rigid if self.case.model == "rigid" else judge_contact
+        return (judge(self.case, config), *choices(self.case, config))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""One case of the physical model: walked, walked again with a tenfold tolerance, and as its twin of another size."""
+"""One case of the physical model: walked, again with a tenfold tolerance and by another method, and as its twin."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.gait.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
+from walkerlab.gait.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.gait.fixed_point import find_gaits
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import STANCE_FOOT
@@ -18,8 +18,10 @@ from walkerlab.physics.rigid.walker import step_length
 from walkerlab.physics.system import State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Method, method_named
+from walkerlab.solvers.stepping import ACCEPTED, RHS
 from walkerlab.stability.scaling import pendulum_time, scaled, to_twin
+from walkerlab.stability.second_method import Second, promised, second_walk
 from walkerlab.stability.verdict import CaseResult, Finding, finite
 
 TENFOLD = 0.1
@@ -68,8 +70,27 @@ def walked(ready: Prepared, config: Config, case: Case, sharper: float, sampled:
         method_named(settings.method), sharper * settings.rtol, sharper * settings.atol, case.budget
     )
     interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
-    ground = Ground(scene.terrain, scene.frame)
-    return walk_contact(scene.walker, ground, scene.pinned, STANCE_FOOT, ready.start, methods, case.steps, interval)
+    return walked_with(methods, ready, case, interval)
+
+
+def walked_with(
+    methods: MethodSettings, ready: Prepared, case: Case, interval: float | None = None
+) -> ContactWalkResult:
+    """Walk a case by a method, with samples at an interval (s) if there is one."""
+    scene = ready.scene
+    return walk_contact(
+        scene.walker, scene.ground, scene.pinned, STANCE_FOOT, ready.start, methods, case.steps, interval
+    )
+
+
+def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[ContactWalkResult]:
+    """Walk a case by another method than its config's, at the same tolerance."""
+    settings = config.solver.contact
+
+    def walk(method: Method, budget: int) -> ContactWalkResult:
+        return walked_with(MethodSettings(method, settings.rtol, settings.atol, budget), ready, case)
+
+    return second_walk(settings.method, case.budget, walk)
 
 
 def judge_contact(case: Case, config: Config) -> CaseResult:
@@ -82,15 +103,11 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
     wall_s = time.perf_counter() - started
     findings = [*of_one_run(result, ready, case)]
     remarks: list[str] = []
+    second: Second[ContactWalkResult] = Second("", None, f"the walk itself ended {result.outcome.label}")
     if result.outcome.answered:
-        compared = [("tenfold tolerance", walked(ready, config, case, TENFOLD, sampled=False), pendulum_time(config))]
-        if case.twin:
-            other = scaled(config, to_twin(config))
-            twin_ready = prepared(other, case)
-            if twin_ready is not None:
-                compared.append(("twin", walked(twin_ready, other, case, 1.0, sampled=False), pendulum_time(other)))
-        for what, again, unit in compared:
-            findings.append(time_difference(what, result, pendulum_time(config), again, unit, case))
+        second = walked_otherwise(ready, config, case)
+        for what, again, unit in compared_walks(ready, config, case, second):
+            findings.append(time_difference(what, result, pendulum_time(config), again, unit, case, config))
             remarks += outcome_differs(what, case, result.outcome, again.outcome)
     return CaseResult(
         name=case.name,
@@ -101,17 +118,37 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
         outcome=result.outcome.label,
         steps=int(result.touch_time_s.size),
         residual_J=finite(result.energy_balance_residual_J),
-        rhs_evaluations=int(result.work[0]),
+        rhs_evaluations=int(result.work[RHS]),
         wall_s=wall_s,
         findings=tuple(findings),
         remarks=tuple(remarks),
+        second_method=second.method,
+        second_tried=second.tried,
     )
+
+
+def compared_walks(
+    ready: Prepared, config: Config, case: Case, second: Second[ContactWalkResult]
+) -> list[tuple[str, ContactWalkResult, float]]:
+    """The walks that must do the same: what they are, and their pendulum times (s)."""
+    tenfold = walked(ready, config, case, TENFOLD, sampled=False)
+    compared = [("tenfold tolerance", tenfold, pendulum_time(config))]
+    if second.walk is not None:
+        compared.append((second.method, second.walk, pendulum_time(config)))
+    if case.twin:
+        other = scaled(config, to_twin(config))
+        twin_ready = prepared(other, case)
+        if twin_ready is not None:
+            compared.append(("twin", walked(twin_ready, other, case, 1.0, sampled=False), pendulum_time(other)))
+    return compared
 
 
 def without_start(case: Case, wall_s: float) -> CaseResult:
     """A case that asks for a gait where there is none."""
-    rejected = Outcome.REJECTED.label
-    return CaseResult(case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, wall_s, ())
+    rejected, none = Outcome.REJECTED.label, "there is no start"
+    return CaseResult(
+        case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, wall_s, (), (), "", none
+    )
 
 
 def of_one_run(result: ContactWalkResult, ready: Prepared, case: Case) -> list[Finding]:
@@ -121,7 +158,7 @@ def of_one_run(result: ContactWalkResult, ready: Prepared, case: Case) -> list[F
     found = [
         Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
         Finding("energy balance residual over energy", balance, case.balance),
-        Finding("right-hand sides over budget", float(result.work[0]) / case.budget, 1.0 + 20.0 / case.budget),
+        Finding("right-hand sides over budget", float(result.work[RHS]) / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if result.samples is not None and result.samples.dissipated_J.shape[0] > 1:
         by_channel = result.samples.dissipated_J[:, :2]
@@ -137,7 +174,13 @@ def won_back(dissipated: NDArray[np.float64], ready: Prepared) -> float:
 
 
 def time_difference(
-    what: str, one: ContactWalkResult, unit: float, other: ContactWalkResult, other_unit: float, case: Case
+    what: str,
+    one: ContactWalkResult,
+    unit: float,
+    other: ContactWalkResult,
+    other_unit: float,
+    case: Case,
+    config: Config,
 ) -> Finding:
     """How far two runs' touches are apart, each in its own pendulum time; their ends if there are none."""
     touches, others = one.touch_time_s / unit, other.touch_time_s / other_unit
@@ -146,7 +189,8 @@ def time_difference(
         apart = float(np.max(np.abs(touches[:steps] - others[:steps])))
     else:
         apart = abs(one.end_time_s / unit - other.end_time_s / other_unit)
-    return Finding(f"time apart from {what}, in pendulum times", finite(apart), case.agreement)
+    limit = promised(case, one.outcome, config.solver.contact.rtol, int(one.work[ACCEPTED] + other.work[ACCEPTED]))
+    return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)
 
 
 def outcome_differs(what: str, case: Case, outcome: Outcome, again: Outcome) -> list[str]:

@@ -1,7 +1,8 @@
 """What an ordinary choice does with the same scenes: SciPy at its default tolerance, a game engine's fixed step.
 
-The scene as one ordinary differential equation without events, as one writes it down who knows nothing of joins and
-pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a sharper tolerance.
+The contact scene as one ordinary differential equation without events, as one writes it down who knows nothing of joins
+and pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a sharp tolerance,
+whatever the case asks for. The rigid scene as a script of one's own, with an event function.
 """
 
 from __future__ import annotations
@@ -16,32 +17,30 @@ from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
+from walkerlab.gait.contact_run import MethodSettings
+from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
 from walkerlab.physics.contact.on_pads import OnPads
+from walkerlab.scene.rigid import SWING_EQUATIONS
+from walkerlab.scene.user_script import walk_as_a_script
+from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
-from walkerlab.stability.contact_case import RATES, TENFOLD, Prepared, prepared, walked
+from walkerlab.stability.contact_case import RATES, Prepared, prepared, walked_with
+from walkerlab.stability.rigid_case import Prepared as RigidPrepared
+from walkerlab.stability.rigid_case import prepared as rigid_prepared
 from walkerlab.stability.scaling import pendulum_time
 from walkerlab.stability.verdict import finite
 
 CAP: Final = 20_000  # right-hand sides
 FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
+SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
 RUNS_AWAY: Final = 10.0  # the same
 STEPS: Final = 2
-CHOSEN: Final = (
-    "paper",
-    "si-linear",
-    "k-1e6-linear",
-    "k-times-100",
-    "k-1e8-linear-chatter",
-    "near-rigid",
-    "undamped",
-    "stiction-1e-4",
-    "leg-1-km",
-    "velocities-1e3",
-)
-"""The cases of the catalogue that are shown."""
 LIBRARY: Final = ("RK45", "LSODA", "Radau")
 FIXED_STEPS_S: Final = (1e-3, 1e-4)
+REFERENCE: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
+REFERENCE_BUDGET: Final = 1_000_000  # at least
+RIGID_REFERENCE: Final = ("dop853", 1e-12, 1e-14)
 
 
 @dataclass(frozen=True)
@@ -65,17 +64,53 @@ class CapReachedError(Exception):
 
 
 def choices(case: Case, config: Config) -> tuple[Choice, ...]:
-    """Every ordinary method on a case of the physical model; none if it has no start."""
-    short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, 1_000_000)})
-    ready = prepared(config, short)
+    """Every ordinary method on a case; none if it has no start or moves nowhere."""
+    short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
+    return rigid_choices(short, config) if case.model == "rigid" else contact_choices(short, config)
+
+
+def contact_choices(case: Case, config: Config) -> tuple[Choice, ...]:
+    """Every ordinary method on a case of the physical model."""
+    ready = prepared(config, case)
     if ready is None:
         return ()
-    walk = walked(ready, config, short, TENFOLD, sampled=False)
+    name, rtol, atol = REFERENCE
+    walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)
     end, reference = walk.end_time_s, np.array(walk.end_state)
+    if end == 0.0:
+        return ()
     units = natural_units(config)
     found = [library(case.name, name, ready, end, reference, units) for name in LIBRARY]
     found += [fixed(case.name, h, ready, end, reference, units) for h in FIXED_STEPS_S]
     return tuple(found)
+
+
+def rigid_choices(case: Case, config: Config) -> tuple[Choice, ...]:
+    """SciPy's methods in a script that walks a case of the rigid model, after as many steps as it takes."""
+    ready = rigid_prepared(config)
+    if ready is None:
+        return ()
+    name, rtol, atol = RIGID_REFERENCE
+    walk = take_walk(
+        ready.walker, method_named(name).new(SWING_EQUATIONS, rtol, atol, case.budget), ready.start, case.steps
+    )
+    if not walk.steps:
+        return ()
+    units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
+    return tuple(script(case.name, name, ready, walk, units) for name in LIBRARY)
+
+
+def script(case: str, method: str, ready: RigidPrepared, walk: RecordedWalk, units: NDArray[np.float64]) -> Choice:
+    """A method of SciPy's solve_ivp with nothing but its name given, its event function at every heel strike."""
+    began = time.perf_counter()
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        try:
+            y, count = walk_as_a_script(ready.walker, ready.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
+        except (ValueError, np.linalg.LinAlgError):
+            y, count = None, CAP
+    wall_s = time.perf_counter() - began
+    return judged(case, f"SciPy {method}", y, np.array(walk.final_state), units, count, wall_s)
 
 
 def natural_units(config: Config) -> NDArray[np.float64]:

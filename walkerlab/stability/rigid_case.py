@@ -1,4 +1,4 @@
-"""One case of the rigid model: walked, walked again with a tenfold tolerance, and as its twin of another size."""
+"""One case of the rigid model: walked, again with a tenfold tolerance and by another method, and as its twin."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from walkerlab.gait.recorded_walk import RecordedWalk, as_state, take_walk
 from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.physics.system import State
 from walkerlab.scene.rigid import SWING_EQUATIONS, rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Method, method_named
 from walkerlab.stability.contact_case import TENFOLD, outcome_differs, without_start
 from walkerlab.stability.scaling import pendulum_time, scaled, to_twin
+from walkerlab.stability.second_method import Second, promised, second_walk
 from walkerlab.stability.verdict import CaseResult, Finding, finite
 
 Array = NDArray[np.float64]
@@ -58,6 +59,17 @@ def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> Recor
     return take_walk(ready.walker, method, ready.start, case.steps)
 
 
+def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[RecordedWalk]:
+    """Walk a case by another method than its config's, at the same tolerance."""
+    settings = config.solver.rigid
+
+    def walk(method: Method, budget: int) -> RecordedWalk:
+        solver = method.new(SWING_EQUATIONS, settings.rtol, settings.atol, budget)
+        return take_walk(ready.walker, solver, ready.start, case.steps)
+
+    return second_walk(settings.method, case.budget, walk)
+
+
 def judge_rigid(case: Case, config: Config) -> CaseResult:
     """Run a case of the rigid model and judge it."""
     started = time.perf_counter()
@@ -68,18 +80,13 @@ def judge_rigid(case: Case, config: Config) -> CaseResult:
     wall_s = time.perf_counter() - started
     findings = of_one_walk(walk, ready, case)
     remarks: list[str] = []
+    second: Second[RecordedWalk] = Second("", None, f"the walk itself ended {walk.outcome.label}")
     short = case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
-    whole = short.steps == case.steps
     if walk.outcome.answered:
-        compared = [("tenfold tolerance", walked(ready, config, short, TENFOLD), pendulum_time(config))]
-        if case.twin:
-            other = scaled(config, to_twin(config))
-            twin_ready = prepared(other)
-            if twin_ready is not None:
-                compared.append(("twin", walked(twin_ready, other, short, 1.0), pendulum_time(other)))
-        for what, again, unit in compared:
-            findings.append(time_difference(what, walk, pendulum_time(config), again, unit, case))
-            if whole:
+        second = walked_otherwise(ready, config, short)
+        for what, again, unit in compared_walks(ready, config, short, second):
+            findings.append(time_difference(what, walk, pendulum_time(config), again, unit, case, config))
+            if short.steps == case.steps:
                 remarks += outcome_differs(what, case, walk.outcome, again.outcome)
     return CaseResult(
         name=case.name,
@@ -94,7 +101,24 @@ def judge_rigid(case: Case, config: Config) -> CaseResult:
         wall_s=wall_s,
         findings=tuple(findings),
         remarks=tuple(remarks),
+        second_method=second.method,
+        second_tried=second.tried,
     )
+
+
+def compared_walks(
+    ready: Prepared, config: Config, case: Case, second: Second[RecordedWalk]
+) -> list[tuple[str, RecordedWalk, float]]:
+    """The walks that must do the same: what they are, and their pendulum times (s)."""
+    compared = [("tenfold tolerance", walked(ready, config, case, TENFOLD), pendulum_time(config))]
+    if second.walk is not None:
+        compared.append((second.method, second.walk, pendulum_time(config)))
+    if case.twin:
+        other = scaled(config, to_twin(config))
+        twin_ready = prepared(other)
+        if twin_ready is not None:
+            compared.append(("twin", walked(twin_ready, other, case, 1.0), pendulum_time(other)))
+    return compared
 
 
 def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding]:
@@ -184,10 +208,11 @@ def kinetic(walker: RigidWalker, state: Array) -> float:
 
 
 def time_difference(
-    what: str, one: RecordedWalk, unit: float, other: RecordedWalk, other_unit: float, case: Case
+    what: str, one: RecordedWalk, unit: float, other: RecordedWalk, other_unit: float, case: Case, config: Config
 ) -> Finding:
     """How far two walks' heel strikes are apart, each in its own pendulum time."""
     strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit
     steps = min(strikes.size, others.size, case.compared_steps)
     apart = float(np.max(np.abs(strikes[:steps] - others[:steps]))) if steps else 0.0
-    return Finding(f"time apart from {what}, in pendulum times", finite(apart), case.agreement)
+    limit = promised(case, one.outcome, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
+    return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)

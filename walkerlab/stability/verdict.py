@@ -30,9 +30,11 @@ class Finding:
 class CaseResult:
     """How a case ended and how it is judged.
 
-    residual_J  of the energy balance
-    findings    every measure that was taken
-    remarks     what is wrong besides, in words
+    residual_J     of the energy balance
+    findings       every measure that was taken
+    remarks        what is wrong besides, in words
+    second_method  the other method that it was compared with; empty if none could walk it
+    second_tried   what became of those asked before, or why none was asked
     """
 
     name: str
@@ -47,6 +49,8 @@ class CaseResult:
     wall_s: float
     findings: tuple[Finding, ...]
     remarks: tuple[str, ...] = ()
+    second_method: str = ""
+    second_tried: str = ""
 
     @property
     def failures(self) -> tuple[str, ...]:

@@ -80,6 +80,8 @@ def case_row(case: CaseResult) -> dict[str, Any]:
         "wall_s": case.wall_s,
         "note": "; ".join(case.failures),
         "measures": measures,
+        "second_method": case.second_method,
+        "second_tried": case.second_tried,
     }
 
 
