@@ -15,36 +15,27 @@ import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
+from leaving_out import HEAD, leaving_out_rows
+from right_hand_sides import ONE_DEGREE, times_ns
 
-from walkerlab.config import loader
 from walkerlab.gait.continuation import Branch
 from walkerlab.gait.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.gait.small_slope import seeds
 from walkerlab.gait.step_map import newton
-from walkerlab.kernels import kernel
-from walkerlab.physics.contact.friction import Frictionless
-from walkerlab.physics.contact.motion import OnGround
-from walkerlab.physics.rigid.walker import step_length
-from walkerlab.physics.system import blank, derivative
-from walkerlab.scene.contact import contact_scene, hinged_walker
 from walkerlab.scene.contact_trials import contact_trial
 from walkerlab.scene.references import Reference, reference_for
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
-from walkerlab.solvers.vectors import load, store
 
-ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
 BUDGET = 2_000_000
-CALLS, STATES = 1_000_000, 64  # calls of a right-hand side, and the states that they are at
 LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
 PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
 PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -177,41 +168,9 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 
 
-@kernel
-def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
-    """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
-    for call in range(calls):
-        place = call % states.shape[0]
-        store(derivative(system, 0.0, load(states, place, blank(system))), rates, place)
-
-
-def rhs_times(watch: Stopwatch) -> dict[str, float]:
-    """Nanoseconds of right-hand sides."""
-    rigid = rigid_walker(ONE_DEGREE, "corrected")
-    scene = contact_scene(ONE_DEGREE, abs(step_length(rigid, -0.2044, 0.1695)))
-    walker = scene.walker
-    free = (0.0, 0.7365, -0.2044, 0.1695, 0.65, -0.1, -0.6, -0.86)
-    angles = (-0.2044, 0.1695, -0.6, -0.86)
-    systems: dict[str, tuple[Any, Any]] = {
-        "rigid, Appendix A": (rigid, angles),
-        "contact, both feet may touch": (OnGround(walker, (True, True)), free),
-        "contact, frictionless": (OnGround(walker._replace(friction=Frictionless()), (True, True)), free),
-        "contact, in the air": (OnGround(walker, (False, False)), free),
-        "contact, stance foot hinged": (hinged_walker(ONE_DEGREE, walker), angles),
-    }
-    found = {}
-    for name, (system, state) in systems.items():
-        # as many different states as fit into the fastest memory, a hair apart
-        states = np.array(state) * (1.0 + 1e-6 * np.arange(STATES)[:, np.newaxis])
-        rates = np.zeros_like(states)
-        found[name] = 1e9 * watch(partial(call_often, system, states, rates, CALLS)) / CALLS
-    return found
-
-
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     """The two right-hand sides, and what generality costs."""
-    rigid, contact = times["rigid, Appendix A"], times["contact, both feet may touch"]
-    hinged = times["contact, stance foot hinged"]
+    rigid, contact, hinged = times["rigid"], times["contact"], times["contact, hinged"]
     yield at_most("right-hand side, rigid", rigid, "ns", 40, 20)
     yield at_most("right-hand side, contact", contact, "ns", 100, 60)
     work = "assembled from parts and hinged, swing foot watched, against Appendix A's closed form"
@@ -283,17 +242,15 @@ def main() -> None:
     trial = contact_trial_at_one_degree()
     reference = reference_for(trial)
     lines += contact_lines(trial, reference, watch)
-    times = rhs_times(watch)
-    lines += [*rhs_lines(times), memory_line()]
+    repeats = 5 if options.quick else 15
+    sides = times_ns(repeats)
+    lines += [*rhs_lines(sides), memory_line()]
     parts = {
         "environment": f"{environment()}.\n\n{conclusion(lines)}\n",
         "speed": markdown(
             ("work", "measured", "bar", "verdict"), [(one.work, one.measured, one.bar, one.verdict) for one in lines]
         ),
-        "left-out": markdown(
-            ("right-hand side", "ns", "of the whole"),
-            [(name, f"{ns:.3g}", f"{ns / times['contact, both feet may touch']:.2f}") for name, ns in times.items()],
-        ),
+        "left-out": markdown(HEAD, leaving_out_rows(sides, repeats)),
         "joins": markdown(
             ("tolerance", "error, located", "rhs", "ms", "error, stepped over", "rhs", "ms"),
             join_rows(trial, reference, watch),

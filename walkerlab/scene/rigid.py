@@ -11,7 +11,8 @@ from walkerlab.solvers.registry import method_named
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Equations
 
-SWING_EQUATIONS = 4
+COORDINATES = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+SWING_EQUATIONS = len(COORDINATES)
 C21_SIGNS: dict[Equations, float] = {"corrected": CORRECTED, "as-printed": AS_PRINTED}
 ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
 

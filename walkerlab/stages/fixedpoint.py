@@ -11,11 +11,10 @@ from walkerlab.config.schema import Config, Equations
 from walkerlab.errors import NoAnswer
 from walkerlab.gait.fixed_point import GaitSearch, find_gaits
 from walkerlab.gait.gait import Gait
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import COORDINATES, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
-COORDINATES = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 GAIT = ("gait",)
 # of each gait: key, attribute, unit, meaning
 COLUMNS = (

@@ -12,8 +12,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.gait.recorded_walk import RecordedWalk, Samples, as_state, take_walk
 from walkerlab.gait.rigid_measures import energies, reactions
 from walkerlab.physics.system import State
-from walkerlab.scene.rigid import RigidScene, rigid_scene
-from walkerlab.stages.fixedpoint import COORDINATES
+from walkerlab.scene.rigid import COORDINATES, RigidScene, rigid_scene
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 

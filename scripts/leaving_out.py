@@ -1,0 +1,263 @@
+"""What leaving out saves: each reduced scene against the full one, in time, compile time and bytes.
+
+Times are processor times. `benchmark.py` prints the table and writes it into docs/performance.md.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from importlib import import_module
+from pathlib import Path
+from statistics import median
+
+from walkerlab.config import loader
+from walkerlab.config.schema import Config
+from walkerlab.gait.contact_run import MethodSettings, walk_contact
+from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.solvers.registry import method_named
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+from walkerlab.store.artifact import write
+from walkerlab.store.key import Identity
+from walkerlab.store.provenance import begin
+
+ROOT = Path(__file__).resolve().parent.parent
+# nothing but the stage itself runs: the start and the pads ask for no gait
+GAIT = (-0.2042, 0.1694, -0.6, -0.86)
+GIVEN = (f"start={list(GAIT)}", "contact.pad_pitch=0.3714")
+BUDGET = 10_000_000  # right-hand sides
+IDENTITY = Identity("measured", {}, {}, "")
+NO_FRICTION = ("contact.static_friction=0", "contact.dynamic_friction=0")
+ALIKE = 0.05  # of which two times do not differ
+HEAD = ("left out", "against", "right-hand side, ns", "run, ms", "import, s", "compile, s", "file, kB", "conclusion")
+QUANTITIES = ("a right-hand side", "a run", "importing", "compiling", "the file")
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What `walkerlab STAGE --set ...` walks."""
+
+    stage: str
+    sets: tuple[str, ...]
+
+    def once(self, artifact: Path) -> None:
+        """Run the stage alone, and store what it makes."""
+        config = self.config
+        content = import_module(PIPELINE[self.stage].module).run(config, {}, Silent())
+        write(artifact, content, IDENTITY, begin(config, {}))
+
+    @cached_property
+    def config(self) -> Config:
+        """The paper's, changed."""
+        return loader.load(None, self.sets).config
+
+    def command(self, runs: Path) -> list[str]:
+        """The command line of a run."""
+        sets = [word for one in self.sets for word in ("--set", one)]
+        return [sys.executable, "-m", "walkerlab", self.stage, "--quiet", "--force", "--runs", str(runs), *sets]
+
+
+def with_books(kept: bool) -> None:
+    """A walk of the paper's model, with or without the energy's books: what damping, friction and edges took."""
+    scene = contact_scene(contact().config, 0.3714)
+    settings = contact().config.solver.contact
+    methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, BUDGET)
+    start = start_state(scene, GAIT)
+    walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, 10, None, booked=kept)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Something left out: a full scene and a reduced one, their right-hand sides, and what else is to be known.
+
+    sides    names of the full and the reduced right-hand side
+    scenes   the full and the reduced scene, run for time and size
+    works    or what the two do instead
+    compile  whether the two are compiled apart
+    imports  what the two have to import, as Python
+    note     said beside the measured conclusion
+    """
+
+    what: str
+    against: str
+    sides: tuple[str, str] | None = None
+    scenes: tuple[Scene, Scene] | None = None
+    works: tuple[Callable[[], None], Callable[[], None]] | None = None
+    compile: bool = False
+    imports: tuple[str, str] | None = None
+    note: str = ""
+    found: dict[str, Pair] = field(default_factory=dict)
+
+
+def contact(*sets: str, strides: int = 5) -> Scene:
+    """A walk of the physical model."""
+    return Scene("contact-sim", (*GIVEN, f"strides={strides}", *sets))
+
+
+def rigid(*sets: str) -> Scene:
+    """A walk of the rigid model."""
+    return Scene("simulate", (GIVEN[0], "strides=5", *sets))
+
+
+def outputs(*names: str) -> str:
+    """Only these outputs."""
+    return f"outputs=[{','.join(names)}]"
+
+
+def reductions() -> list[Reduction]:
+    """Every reduction there is, and two that there are not."""
+    whole, none = contact(), contact(outputs())
+    import_stage = "import walkerlab.stages.{}, walkerlab.stages.runner"
+    walking, drawing = import_stage.format("simulate"), import_stage.format("plot")
+    return [
+        Reduction(
+            "the contact model: no contact block",
+            "contact-sim, which simulate alone does without",
+            ("contact", "rigid"),
+            (contact(), rigid("contact=null")),
+            compile=True,
+            imports=(import_stage.format("contact_sim"), walking),
+        ),
+        Reduction(
+            "floating base and stance contact: first step hinged",
+            "free first step",
+            ("contact", "contact, hinged"),
+            (contact(strides=1), contact("contact.stance=pinned", strides=1)),
+            compile=True,
+            note="both kinds of step are compiled, since the hinge is released after the first",
+        ),
+        Reduction(
+            "tangential velocity and force: frictionless",
+            "coefficients of zero",
+            ("contact, friction of zero", "contact, frictionless"),
+            (contact(*NO_FRICTION), contact("contact.friction=none")),
+            compile=True,
+        ),
+        Reduction(
+            "force law of a foot out of reach",
+            "evaluated and multiplied by zero",
+            ("swinging foot evaluated", "swinging foot passed over"),
+        ),
+        Reduction(
+            "leg inertia",
+            "0.1 kg m^2",
+            ("contact, inertia", "contact"),
+            note="the inertia is summed into constants before anything runs, so that there is no term to leave out",
+        ),
+        Reduction(
+            "a foot's radius",
+            "a radius of zero",
+            ("radius of zero", "no radius"),
+            note="measured by a right-hand side of the script's own; the project has none",
+        ),
+        Reduction("energies", "all outputs", scenes=(whole, contact(outputs("states", "forces")))),
+        Reduction("forces", "all outputs", scenes=(whole, contact(outputs("states", "energies")))),
+        Reduction("states", "all outputs", scenes=(whole, contact(outputs("energies", "forces")))),
+        Reduction("all outputs, so dense states", "all outputs", scenes=(whole, none)),
+        Reduction("all outputs of the rigid walk", "all outputs", scenes=(rigid(), rigid(outputs()))),
+        Reduction(
+            "dissipation: the energy's books",
+            "kept along the walk",
+            works=(partial(with_books, True), partial(with_books, False)),
+            note="contact-sim keeps them, whose summary says how well they balance; searches and maps do without",
+        ),
+        Reduction("matplotlib: nothing is drawn", "a command that draws", imports=(drawing, walking)),
+        Reduction(
+            "all science: help is shown",
+            "a command that walks",
+            imports=(walking, "import sys; sys.argv = ['walkerlab', 'schema', '--help']; import walkerlab.cli.main"),
+        ),
+    ]
+
+
+def leaving_out_rows(sides: dict[str, float], repeats: int) -> list[list[str]]:
+    """The table's rows, given the times of all right-hand sides."""
+    with tempfile.TemporaryDirectory() as place:
+        found = [measured(one, sides, repeats, Path(place)) for one in reductions()]
+    return [row_of(one) for one in found]
+
+
+def measured(one: Reduction, sides: dict[str, float], repeats: int, place: Path) -> Reduction:
+    """A reduction with all that is to be known of it."""
+    found: dict[str, Pair] = {}
+    if one.sides is not None:
+        found["a right-hand side"] = (sides[one.sides[0]], sides[one.sides[1]])
+    if one.scenes is not None:
+        full, reduced = one.scenes
+        files = place / "full.h5", place / "reduced.h5"
+        took = in_turn(repeats, partial(full.once, files[0]), partial(reduced.once, files[1]))
+        found["a run"] = (1e3 * took[0], 1e3 * took[1])
+        found["the file"] = (files[0].stat().st_size / 1e3, files[1].stat().st_size / 1e3)
+        if one.compile:
+            found["compiling"] = (compile_s(full, place), compile_s(reduced, place))
+    if one.works is not None:
+        took = in_turn(repeats, *one.works)
+        found["a run"] = (1e3 * took[0], 1e3 * took[1])
+    if one.imports is not None:
+        found["importing"] = in_turn(repeats, *(partial(run, [sys.executable, "-c", code]) for code in one.imports))
+    one.found.update(found)
+    return one
+
+
+def in_turn(repeats: int, full: Callable[[], object], reduced: Callable[[], object]) -> Pair:
+    """Medians of the processor times (s) of two works that take turns, after one of each that is not counted."""
+    full(), reduced()
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(repeats):
+        for work, taken in zip((full, reduced), times, strict=True):
+            start = processor_s()
+            work()
+            taken.append(processor_s() - start)
+    return median(times[0]), median(times[1])
+
+
+def processor_s() -> float:
+    """Processor time (s) of this process and of those that it waited for."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def run(command: Sequence[str], cache: Path | None = None) -> None:
+    """Run a process to its end."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)} | ({"WALKERLAB_CACHE": str(cache)} if cache else {})
+    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def compile_s(scene: Scene, place: Path) -> float:
+    """Processor time (s) of a first run less that of a second one."""
+    with tempfile.TemporaryDirectory(dir=place) as cache:
+        work = partial(run, scene.command(place), Path(cache))
+        start = processor_s()
+        work()
+        first = processor_s() - start
+        start = processor_s()
+        work()
+        return first - (processor_s() - start)
+
+
+def row_of(one: Reduction) -> list[str]:
+    """A row: each quantity as full -> reduced."""
+    pairs = [one.found.get(name) for name in QUANTITIES]
+    cells = ["" if pair is None else f"{pair[0]:.3g} → {pair[1]:.3g}" for pair in pairs]
+    note = f"; {one.note}" if one.note else ""
+    return [one.what, one.against, *cells, conclusion(one.found) + note]
+
+
+def conclusion(found: dict[str, Pair]) -> str:
+    """What is saved, what is not, and what is even slower."""
+    saved = {name: 1.0 - reduced / full for name, (full, reduced) in found.items()}
+    gains = [f"{100 * share:.0f} % of {name}" for name, share in saved.items() if share > ALIKE]
+    losses = [f"{-100 * share:.0f} % to {name}" for name, share in saved.items() if share < -ALIKE]
+    said = [f"saves {', '.join(gains)}" if gains else "saves nothing"]
+    return "; ".join([*said, *([f"**adds {', '.join(losses)}**"] if losses else [])])

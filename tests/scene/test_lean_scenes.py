@@ -1,0 +1,163 @@
+"""Each reduced scene gives the numbers of the full one with the part set to nothing."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from walkerlab.config.loader import load
+from walkerlab.gait.contact_run import MethodSettings, walk_contact
+from walkerlab.gait.contact_signals import ALONG, STICKS_FORWARD, feet_motion, joins
+from walkerlab.physics.contact.compass import STANCE_FOOT, CompassParts, compass_assembly, contact_walker
+from walkerlab.physics.contact.friction import Coulomb, Frictionless
+from walkerlab.physics.contact.motion import OnGround
+from walkerlab.physics.multibody.parts import Assembly, Body, Particle
+from walkerlab.physics.system import derivative, jacobian
+from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.solvers.registry import method_named
+from walkerlab.stages import contact_sim, simulate
+from walkerlab.stages.progress import Silent
+
+START = (-0.2042, 0.1694, -0.6, -0.86)
+NO_FRICTION = Coulomb(0.0, 0.0, 0.1, 1.0)
+BOTH = (True, True)
+EPS = np.finfo(float).eps
+angles, rates = st.floats(-0.5, 0.5), st.floats(-3.0, 3.0)
+
+
+@pytest.fixture(scope="module")
+def sides():
+    """Right-hand sides that leave out more, or less, than the project's."""
+    path = Path(__file__).parents[2] / "scripts" / "right_hand_sides.py"
+    spec = importlib.util.spec_from_file_location("right_hand_sides", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["right_hand_sides"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def walker_with(radius=0.001, friction=None):
+    scene = contact_scene(load(None, (f"walker.foot_radius_m={radius}",)).config, 0.3714)
+    return scene.walker if friction is None else scene.walker._replace(friction=friction)
+
+
+def over(walker, foot, height, theta, omega, velocity):
+    """The state in which the lowest point of a foot is at a height over the ground."""
+    state = (0.0, 1.0, *theta, *velocity, *omega)
+    return (0.0, 1.0 + height - feet_motion(walker, state)[foot].height, *state[2:])
+
+
+def same_to_rounding(found, expected, scale):
+    assert np.abs(np.subtract(found, expected)).max() <= 64 * EPS * (scale + np.abs(expected).max())
+
+
+states = st.tuples(
+    st.sampled_from((0, 1)), st.floats(-1e-3, 1e-3), st.tuples(angles, angles), st.tuples(rates, rates),
+    st.tuples(rates, rates),
+)  # fmt: skip
+
+
+@given(state=states, radius=st.sampled_from((0.0, 0.001, 0.1)))
+def test_frictionless_ground_is_a_coefficient_of_zero(state, radius):
+    zero, none = (walker_with(radius, law) for law in (NO_FRICTION, Frictionless()))
+    y = over(zero, *state)
+    assert derivative(OnGround(none, BOTH), 0.0, y) == derivative(OnGround(zero, BOTH), 0.0, y)
+    found, expected = np.zeros((8, 8)), np.zeros((8, 8))
+    jacobian(OnGround(none, BOTH), 0.0, y, found)
+    jacobian(OnGround(zero, BOTH), 0.0, y, expected)
+    np.testing.assert_array_equal(found, expected)
+
+
+@given(state=states)
+def test_a_point_foot_is_a_ball_of_radius_zero(sides, state):
+    """Against a foot that is described without a radius."""
+    walker = walker_with(radius=0.0)
+    y = over(walker, *state)
+    expected = derivative(sides.PointFeet(walker), 0.0, y)
+    same_to_rounding(derivative(OnGround(walker, BOTH), 0.0, y), expected, 1.0)
+
+
+@given(state=states, clearance=st.floats(1e-9, 0.5))
+def test_a_foot_out_of_reach_feels_what_its_force_law_times_zero_is(sides, state, clearance):
+    walker = walker_with()
+    foot, _, *rest = state
+    for y in (over(walker, *state), over(walker, foot, clearance, *rest)):
+        expected = derivative(sides.EveryFoot(walker), 0.0, y)
+        same_to_rounding(derivative(OnGround(walker, BOTH), 0.0, y), expected, 1.0)
+
+
+@given(state=states, clearance=st.floats(1e-9, 0.5))
+def test_a_foot_out_of_reach_moves_as_over_no_ground(state, clearance):
+    walker = walker_with()
+    foot, _, *rest = state
+    y = over(walker, foot, clearance, *rest)
+    carried = (foot != 0, foot != 1)
+    assert derivative(OnGround(walker, carried), 0.0, y) == derivative(OnGround(walker, BOTH), 0.0, y)
+
+
+@given(state=states)
+def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
+    """Described in two ways: a body with an inertia of zero, and a particle."""
+    legs = compass_assembly(CompassParts(1.0, 0.5, 5.0, 10.0, 0.0, 0.001))
+    particles = tuple(Particle(f"mass of {leg.name}", leg.mass_kg, leg.name, leg.centre_m) for leg in legs.bodies)
+    bars = tuple(Body(leg.name, 0.0, (0.0, 0.0)) for leg in legs.bodies)
+    points = Assembly(bars, legs.joints, (*particles, *legs.particles), legs.feet)
+    one = walker_with()
+    other = contact_walker(points, one.normal, one.friction, 9.81, one.slope)
+    y = over(one, *state)
+    found = derivative(OnGround(other, BOTH), 0.0, y)
+    expected = derivative(OnGround(one, BOTH), 0.0, y)
+    # the ground magnifies the rounding of a foot's height by the force's gradient over the masses
+    J = np.zeros((8, 8))
+    jacobian(OnGround(one, BOTH), 0.0, y, J)
+    same_to_rounding(found, expected, np.abs(J).max())
+
+
+def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
+    """The same steps to the last bit, where no step ends at a join of the friction law."""
+    ends = []
+    for law in (NO_FRICTION, Frictionless()):
+        scene = contact_scene(load(None, ()).config, 0.3714)
+        walker = scene.walker._replace(friction=law)
+        ground = scene.ground._replace(frame=scene.frame._replace(locate_joins=False))
+        methods = MethodSettings(method_named("radau5"), 1e-7, 1e-9, 10**6)
+        walk = walk_contact(walker, ground, None, STANCE_FOOT, start_state(scene, START), methods, 2, 0.01)
+        ends.append((walk.outcome, walk.end_time_s, walk.end_state, walk.samples.states.tolist(), walk.work.tolist()))
+    assert ends[0] == ends[1]
+
+
+def test_frictionless_ground_has_four_joins_less():
+    assert joins(Coulomb(0.9, 0.7, 0.1, 1.0)) == ALONG
+    assert joins(Frictionless()) == STICKS_FORWARD == ALONG - 4
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """Both walks by stage and by what outputs ask for."""
+    given = ("strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714")
+
+    def walk(stage, outputs):
+        config = load(None, (*given, f"outputs=[{','.join(outputs)}]")).config
+        return stage.run(config, {}, Silent())
+
+    everything = ("states", "energies", "forces")
+    wanted = [everything, *((one,) for one in everything), ()]
+    return {stage: {asked: walk(stage, asked) for asked in wanted} for stage in (simulate, contact_sim)}
+
+
+@pytest.mark.parametrize("stage", [simulate, contact_sim], ids=lambda stage: stage.__name__)
+def test_outputs_that_are_asked_for_are_those_of_the_full_result(walks, stage):
+    full, *parts = walks[stage].values()
+    seen = set()
+    for part in parts:
+        for path, group in part.groups.items():
+            for name in group.variables:
+                np.testing.assert_array_equal(group[name], full[path][name])
+                seen.add((path, name))
+        same = {key: value for key, value in part.summary.items() if key != "left_out"}
+        assert same == {key: value for key, value in full.summary.items() if key != "left_out"}
+    assert seen == {(path, name) for path, group in full.groups.items() for name in group.variables}
