@@ -4,13 +4,14 @@
     python scripts/fuzz_campaign.py --configs 50 --damaged 20
 
 Configs are mutated byte by byte, line by line and value by value, from the built-in ones; each is loaded, and each
-eighth that loads is also walked by the rigid model. Damaged results are cut short, have bits flipped, are overwritten
-in part, or are other files. Prints a table in Markdown; exits 1 if anything went wrong.
+eighth is also walked, by the rigid model or on its ground. Damaged results are cut short, have bits flipped, are
+overwritten in part, or are other files. Prints a table in Markdown; exits 1 if anything went wrong.
 """
 
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import random
 import sys
 import tempfile
@@ -27,7 +28,10 @@ from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 
-LONGEST_S = 20.0  # that a config may take to be refused or walked
+LONGEST_S = 20.0  # that a config may take to be refused or walked, once its models are compiled
+HANGS_S = 300.0  # after which the campaign ends with a traceback of where it hangs
+WALKED, WALKED_ON_GROUND = 8, 24  # each how-manieth is walked, and with the contact model
+TOLD_EVERY = 100
 WORDS = (
     b"nan", b".nan", b".inf", b"-1", b"0", b"1e308", b"-1e-308", b"1e-14", b"null", b"[]", b"{}", b"true", b"'", b'"',
     b"&a", b"*a", b"!!python/object:os.system", b"../../x", b"<script>", b"\xff\xfe", b"\x00", b"? ", b"- ", b": ",
@@ -113,30 +117,43 @@ def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
         for number in range(count):
             text = fuzzed(drawn, texts)
             path.write_bytes(text)
-            began = time.perf_counter()
+            faulthandler.dump_traceback_later(HANGS_S, exit=True)
             try:
-                fates[fate_of(path, runs, number)] += 1
+                fate, took_s = timed(path, runs, number)
+                if took_s > LONGEST_S:  # it may have had a method compiled: once more
+                    fate, took_s = timed(path, runs, number)
+                fates[fate] += 1
+                if took_s > LONGEST_S:
+                    wrong.append(f"config {number}: took {took_s:.0f} s\n{text!r}")
             except Exception:  # a traceback is what is looked for
                 wrong.append(f"config {number}: {traceback.format_exc(limit=-3)}\n{text!r}")
-            if time.perf_counter() - began > LONGEST_S:
-                wrong.append(f"config {number}: took {time.perf_counter() - began:.0f} s\n{text!r}")
             outside = [entry.name for entry in Path(place).iterdir() if entry.name not in ("fuzzed.yaml", "runs")]
             if outside:
                 wrong.append(f"config {number}: wrote {outside} outside the runs folder")
+            if (number + 1) % TOLD_EVERY == 0:
+                print(f"{number + 1} of {count} configs, {len(wrong)} wrong", file=sys.stderr, flush=True)
+        faulthandler.cancel_dump_traceback_later()
     return fates, wrong
 
 
+def timed(path: Path, runs: Path, number: int) -> tuple[str, float]:
+    """What becomes of a config, and the processor time (s) that it takes."""
+    began = time.process_time()
+    return fate_of(path, runs, number), time.process_time() - began
+
+
 def fate_of(path: Path, runs: Path, number: int) -> str:
-    """Load a config, and walk each eighth with the rigid model, a few strides at most."""
+    """Load a config, and walk some, a few strides at most."""
     found = loaded(path)
     if found is None:
         return "refused with its place"
-    if number % 8:
+    if number % WALKED:
         return "accepted"
     config = found.config.model_copy(update={"strides": min(found.config.strides, 5)})
-    folder = RunFolder(runs, found.run_name)
-    report = execute(config, "simulate", folder, force=True)
-    return "accepted and walked" if report.no_answer is None else "accepted, no answer, told"
+    on_ground = config.contact is not None and number % WALKED_ON_GROUND == 0
+    stage = "contact-sim" if on_ground else "simulate"
+    report = execute(config, stage, RunFolder(runs, found.run_name), force=True)
+    return f"accepted, {stage} walked" if report.no_answer is None else f"accepted, {stage} has no answer, told"
 
 
 def cut(drawn: random.Random, data: bytes) -> bytes:
