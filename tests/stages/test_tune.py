@@ -9,6 +9,9 @@ import pytest
 from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
+from walkerlab.report.blocks import Findings
+from walkerlab.report.results import Results
+from walkerlab.report.sections import adjustment, verdict
 from walkerlab.stages import fixedpoint, tune
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
@@ -83,11 +86,32 @@ def test_the_map_is_what_single_walks_say():
         ("contact.static_friction=0.05", "contact.dynamic_friction=0.04"),
     ],
 )
-def test_ground_that_cannot_hold_the_walker_has_no_answer_but_words(sets):
-    with pytest.raises(NoAnswer) as caught:
-        small("paper", *sets, cells=3)
-    assert "gait" in caught.value.message
-    assert caught.value.partial is not None
+def test_that_no_start_walks_is_an_answer_in_words(sets):
+    content = small("paper", *sets, cells=3)
+    gait, found = content.summary["gait"], content.summary["adjustment"]
+    assert not gait["found"]
+    assert len(gait["reason"]) > 20
+    assert (found["needed"], found["found"], found["reason"]) == (True, False, "none of 9 starts walked 10 steps")
+    assert len(found["advice"]) > 20
+    assert "adjusted" not in content.groups
+    assert "no_answer" not in content.summary
+
+
+def test_the_page_says_that_no_start_walks():
+    results = Results(None, {"tune": small("contact-si", cells=3)})
+    (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Findings)]
+    (told,) = found.items
+    assert (told.about, told.tone) == ("Parameter adjustment", "bad")
+    assert "None of 9 starts walked" in told.text
+    text = adjustment.section(results).blocks[0].text
+    assert text.startswith("No adjustment of the two initial velocities helps: none of 9 starts walked 10 steps.")
+    assert "The contact model has no gait of its own" in text
+
+
+def test_pads_for_a_gait_that_is_not_there_have_no_answer():
+    ground = ("contact.static_friction=0", "contact.dynamic_friction=0", "contact.pad_pitch=own")
+    with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
+        small("paper", *ground, cells=3)
 
 
 def test_a_start_that_flies_is_an_answer():

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from walkerlab.stages.tune import Findings
 
 TIME, LEG = "time", "leg"
+WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 SWING, STANCE = "swing_factor", "stance_factor"
 SECTION_COORDINATES = (
     "height of the centre of mass over the slope (m)",
@@ -125,6 +126,7 @@ def adjustment_summary(found: Findings) -> dict[str, Any]:
         said["reason"] = f"none of {found.contact_map.outcome.size} starts walked {found.steps} steps" + (
             " and settled on the gait" if found.gait.gait is not None else ""
         )
+        said["advice"] = found.gait.advice or WIDER
         return said
     return {
         **said,

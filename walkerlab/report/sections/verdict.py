@@ -31,7 +31,8 @@ Rows = Sequence[Mapping[str, Any]]
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
     blocks: list[Block] = [Paragraph(failure, "bad") for failure in failures(results)]
-    fared = [found for found in (*(finding(results, stage) for stage in MODELS), gait(results)) if found is not None]
+    told = (*(finding(results, stage) for stage in MODELS), gait(results), adjustment(results))
+    fared = [found for found in told if found is not None]
     if fared:
         blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad"))))
     rows = paper_numbers(results)
@@ -67,6 +68,14 @@ def gait(results: Results) -> Finding | None:
     if summary["stable"]:
         return Finding("Periodic gait", text, "stable", "good")
     return Finding("Periodic gait", text, "unstable", "fair")
+
+
+def adjustment(results: Results) -> Finding | None:
+    """That no start walks in the contact model; None if one does, or none was sought."""
+    found = (results.summary("tune") or {}).get("adjustment")
+    if found is None or found["found"]:
+        return None
+    return Finding("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
 
 
 def of_the_paper(results: Results, rows: Rows) -> list[Block]:
