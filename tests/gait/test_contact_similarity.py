@@ -7,7 +7,6 @@ import pytest
 from contact_walks import FIXED_POINT, RIGID_STEP, faster, scene_of, settings, walked
 
 from walkerlab.gait.contact_run import Ground, walk_contact
-from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.terrain import Checkerboard
 from walkerlab.scene.contact import start_state
 
@@ -59,9 +58,6 @@ def twin(static, dynamic):
     )
 
 
-INTEGRATION_STEP = 1e-3  # s, of radau5 at this tolerance while a foot slides
-
-
 @pytest.mark.parametrize(
     ("factor", "mu"),
     [(1.0, (0.9, 0.7)), (0.9, (0.9, 0.7)), (0.95, (0.9, 0.7)), (1.0, (0.3, 0.2)), (1.0, (0.05, 0.04))],
@@ -76,6 +72,4 @@ def test_a_walker_and_its_scaled_twin_walk_and_end_alike(factor, mu):
     assert other.outcome is walk.outcome
     np.testing.assert_allclose(other.touch_time_s / TIME, walk.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m / LENGTH, walk.touch_along_m, atol=1e-6)
-    # a slide is noticed at the end of an integration step, not located, and the twins' steps are not the same
-    noticed = INTEGRATION_STEP if walk.outcome is Outcome.SLID else 1e-5
-    assert other.end_time_s / TIME == pytest.approx(walk.end_time_s, abs=noticed)
+    assert other.end_time_s / TIME == pytest.approx(walk.end_time_s, abs=1e-5)

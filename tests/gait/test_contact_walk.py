@@ -17,7 +17,9 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from walkerlab.gait.contact_signals import farthest_slide, feet_motion
 from walkerlab.gait.outcome import Outcome
+from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.motion import OnGround
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
@@ -98,6 +100,29 @@ def test_glassy_ground_lets_the_stance_foot_slide_away_at_once():
     walk = walked(*GLASSY)
     assert walk.outcome is Outcome.SLID
     assert walk.periods_s.size == 0
+
+
+def slid_foot(tolerance, start):
+    scene, walk = scene_of(*GLASSY), walked(*GLASSY, start=start, tolerance=tolerance)
+    assert walk.outcome is Outcome.SLID
+    begin = feet_motion(scene.walker, start_state(scene, start))[STANCE_FOOT]
+    end = feet_motion(scene.walker, walk.end_state)[STANCE_FOOT]
+    return abs(end.along - begin.along), end.height, farthest_slide(scene.terrain)
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
+def test_a_walk_ends_the_moment_its_loaded_stance_foot_is_too_far_from_its_foothold(tolerance):
+    away, height, farthest = slid_foot(tolerance, (*FIXED_POINT[:2], 0.0, 0.0))
+    assert height < -1e-5
+    # located to 1e-12 s at a few m/s
+    assert away == pytest.approx(farthest, abs=1e-11)
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
+def test_a_walk_ends_the_moment_its_stance_foot_lands_too_far_from_its_foothold(tolerance):
+    away, height, farthest = slid_foot(tolerance, FIXED_POINT)
+    assert away > farthest
+    assert height == pytest.approx(0.0, abs=1e-11)
 
 
 def test_near_rigid_contact_walks_almost_the_rigid_gait():

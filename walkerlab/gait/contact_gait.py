@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.gait.contact_rules import STANCE, STEPS
 from walkerlab.gait.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
 from walkerlab.gait.contact_section import ContactGait, coordinates_of, find_contact_gait
 from walkerlab.gait.contact_signals import PASSING, SIGNALS
-from walkerlab.gait.contact_walk import STANCE, STEPS
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.friction import Coulomb, Frictionless

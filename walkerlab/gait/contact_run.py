@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.gait.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.gait.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
 from walkerlab.gait.contact_signals import (
     FALLEN_HIP,
     HEIGHT,
@@ -19,12 +20,7 @@ from walkerlab.gait.contact_signals import (
     hip_height,
 )
 from walkerlab.gait.contact_tangent import new_tangent
-from walkerlab.gait.contact_walk import (
-    AIRBORNE_SINCE,
-    STEPS,
-    Ledger,
-    walk_part,
-)
+from walkerlab.gait.contact_walk import walk_part
 from walkerlab.gait.outcome import Outcome
 from walkerlab.kernels import kernel, uncompiled
 from walkerlab.physics.contact.energy import book_energy, kinetic_energy, potential_energy

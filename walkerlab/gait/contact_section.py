@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.gait.contact_observer import ContactObserver
+from walkerlab.gait.contact_rules import Ledger
 from walkerlab.gait.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
 from walkerlab.gait.contact_signals import PASSING, SIGNALS, feet_motion
-from walkerlab.gait.contact_walk import Ledger
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.motion import OnGround

@@ -12,7 +12,7 @@ from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.motion import OnGround
 from walkerlab.physics.contact.normal_force import grip
 from walkerlab.physics.contact.pinned import Pinned, floating_state
-from walkerlab.physics.contact.terrain import cell_edges
+from walkerlab.physics.contact.terrain import cell_edges, stride_measure
 from walkerlab.physics.contact.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.physics.multibody.tree import sines_cosines
 from walkerlab.physics.system import State
@@ -24,8 +24,9 @@ STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
 ALONG = 9  # no event: where the foot is
 PER_FOOT = 10
 # signals of the walker
-PASSING, FALL = 2 * PER_FOOT, 2 * PER_FOOT + 1
-SIGNALS = 2 * PER_FOOT + 2
+PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
+SIGNALS = 2 * PER_FOOT + 3
+FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot from its foothold
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 
 
@@ -97,6 +98,8 @@ def sample_signals(
     terrain: Any,
     frame: Frame,
     cells: Any,
+    stance: int,
+    foothold: float,
     state: State,
     node: int,
     finder: CrossingFinder,
@@ -108,6 +111,14 @@ def sample_signals(
     sample_foot(walker, feet[1], cell_edges(terrain, 1, cells[1]), PER_FOOT, node, finder)
     finder.values[PASSING, node] = feet[1].along - feet[0].along
     finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
+    away = finder.values[stance * PER_FOOT + ALONG, node] - foothold
+    finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+
+
+@inlined
+def farthest_slide(terrain: Any) -> float:
+    """How far from its foothold a loaded stance foot may get (m)."""
+    return FARTHEST_SLIDE * stride_measure(terrain)
 
 
 @inlined
@@ -169,6 +180,7 @@ def earliest_crossing(
     frame: Frame,
     watch_order: bool,
     carried: Any,
+    stance: int,
     at_zero: Any,
     finder: CrossingFinder,
 ) -> tuple[float, int]:
@@ -176,6 +188,7 @@ def earliest_crossing(
 
     watch_order  whether it matters that the feet pass each other
     carried      (2,) whether there is ground under each foot
+    stance       the stance foot, which may slide
     at_zero      (signals,) which signals the last event left at zero
     """
     best, signal = NO_CROSSING, -1
@@ -192,6 +205,10 @@ def earliest_crossing(
             at = first_crossing(finder, index, FALLING if edge else 0, 0.0, at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
+        if inside and foot == stance:
+            at = first_crossing(finder, SLIDE, FALLING, 0.0, at_zero[SLIDE] != 0)
+            if at < best:
+                best, signal = at, SLIDE
     if watch_order:
         at = first_crossing(finder, PASSING, 0, 0.0, at_zero[PASSING] != 0)
         if at < best:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from walkerlab.gait.contact_rules import STEPS
 from walkerlab.gait.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
 from walkerlab.gait.contact_signals import SIGNALS
-from walkerlab.gait.contact_walk import STEPS
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.walker import ContactWalker

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.gait.contact_rules import LAST_TOUCH
 from walkerlab.gait.contact_run import NEVER, Ground, MethodSettings, new_ledger, new_observer, walk_free
 from walkerlab.gait.contact_signals import SIGNALS, Frame, feet_motion
-from walkerlab.gait.contact_walk import LAST_TOUCH, LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.gait.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import contact_walker
 from walkerlab.physics.contact.friction import Coulomb
