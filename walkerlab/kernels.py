@@ -17,8 +17,10 @@ from typing import Any, TypeVar, cast
 # the only packages in which compiled functions may stand (a test says so)
 KERNEL_HOMES = ("physics", "solvers", "gait")
 KEPT_GENERATIONS = 8
-# no licence to contract or reorder: code compiled twice computes the same to the last bit
-FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}}
+# No licence to contract or reorder: code compiled twice computes the same to the last bit.
+# No counting of references (_nrt): kernels allocate nothing and borrow all arrays from their caller, and counting takes
+# as long as the arithmetic.
+FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 # parts of a kernel are never entered from outside
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
 

@@ -62,7 +62,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
                 for column in range(n):
                     same = 1.0 if i == j and row == column else 0.0
                     tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
-    factor(tangent.system, tangent.pivots)
+    factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
         carry_direction(tangent, direction, h)
 
@@ -77,7 +77,7 @@ def carry_direction(tangent: Tangent, direction: int, h: float) -> None:
             for k in range(n):
                 total += tangent.stages[i, row, k] * tangent.Phi[k, direction]
             tangent.rates[i * n + row] = total
-    solve(tangent.system, tangent.pivots, tangent.rates)
+    solve(tangent.system, tangent.pivots, tangent.rates, 0, 3 * n)
     for row in range(n):
         change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
         tangent.Phi[row, direction] += h * change

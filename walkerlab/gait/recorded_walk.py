@@ -12,22 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.gait.outcome import Outcome
-from walkerlab.gait.rigid_walk import (
+from walkerlab.gait.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
     INTEGRAL,
     LATEST,
-    LONGEST_SWING,
     MAX_FRICTION_RATIO,
     MAX_SCUFF_DEPTH,
     MIN_NORMAL_FORCE,
-    SIGNALS,
     Observer,
-    hip_above_fall,
     new_observer,
     observe_start,
-    walk,
 )
+from walkerlab.gait.rigid_walk import LONGEST_SWING, SIGNALS, hip_above_fall, walk
 from walkerlab.kernels import uncompiled
 from walkerlab.physics.rigid.walker import RigidWalker, step_length
 from walkerlab.physics.system import State

@@ -4,22 +4,14 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 """
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 import walkerlab.physics.rigid.swing  # noqa: F401 (the equations of a RigidWalker, found by its type)
 from walkerlab.gait.outcome import Outcome
+from walkerlab.gait.rigid_observer import observe, observe_start, wants_dense
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.physics.rigid.heel_strike import feet_on_slope, impact
-from walkerlab.physics.rigid.walker import (
-    RigidWalker,
-    accelerations,
-    ground_reaction,
-    kinetic_energy,
-    potential_energy,
-    swing_foot_height,
-)
+from walkerlab.physics.rigid.walker import RigidWalker, accelerations
 from walkerlab.physics.system import State
 from walkerlab.solvers.dop853 import Dop853
 from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing, value_at
@@ -40,128 +32,13 @@ from walkerlab.solvers.stepping import (
 )
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
+HULL_ROOM = 0.125
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 HEEL_STRIKE, FALL, AHEAD = 0, 1, 2  # signals of the finder
 SIGNALS = 3
-NO_FORCE = 1e300  # above any normal force
 WALKED, FELL = int(Outcome.WALKED), int(Outcome.FELL)
 NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
-
-# indices into Observer.extremes
-MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT = 0, 1, 2, 3
-# indices into Observer.energy
-LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
-# composite Simpson rule on eighths
-SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
-
-
-class Unobserved(NamedTuple):
-    """A walk of which only the heel strikes are wanted."""
-
-
-class Observer(NamedTuple):
-    """What is recorded of a walk besides its heel strikes."""
-
-    times: Any  # (samples,) s, rising
-    states: Any  # (samples, 4)
-    steps: Any  # (samples,) which step a sample belongs to
-    recorded: Any  # (1,) samples recorded so far
-    extremes: Any  # (4,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J
-    energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
-
-
-@by_type
-def observe_start(observer: Any, walker: RigidWalker, y: State) -> None:
-    """Take note of the start of a swing phase."""
-
-
-@by_type
-def observe(observer: Any, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
-    """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
-
-
-@by_type
-def wants_dense(observer: Any) -> bool:
-    """Whether `observe` needs the dense output of every integration step."""
-
-
-@observe_start.case(Unobserved)
-def ignore_start(observer: Unobserved, walker: RigidWalker, y: State) -> None:
-    """Nothing."""
-
-
-@observe.case(Unobserved)
-def ignore(observer: Unobserved, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
-    """Nothing."""
-
-
-@wants_dense.case(Unobserved)
-def without_dense(observer: Unobserved) -> bool:
-    """No."""
-    return False
-
-
-def new_observer(times: Any) -> Observer:
-    """An observer with memory for samples at `times` (s, rising)."""
-    extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0])
-    steps = np.zeros(times.size, np.int64)
-    return Observer(times, np.zeros((times.size, 4)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
-
-
-@inlined
-def total_energy(walker: RigidWalker, y: State) -> float:
-    """Kinetic and potential energy (J), from the stance foot."""
-    return kinetic_energy(walker, y[0], y[1], y[2], y[3]) + potential_energy(walker, y[0], y[1])
-
-
-@observe_start.case(Observer)
-def record_start(observer: Observer, walker: RigidWalker, y: State) -> None:
-    """The energy that the swing phase must keep."""
-    energy = total_energy(walker, y)
-    observer.energy[LEAST], observer.energy[MOST] = energy, energy
-    record_extremes(observer, walker, y)
-
-
-@inlined
-def record_extremes(observer: Observer, walker: RigidWalker, y: State) -> None:
-    """Keep the worst of what the model assumes (section 3.1 of the paper), and the energy."""
-    extremes, energy = observer.extremes, observer.energy
-    along, normal = ground_reaction(walker, y[0], y[1], y[2], y[3])
-    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], normal)
-    if normal > 0.0:
-        extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], abs(along) / normal)
-    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], -swing_foot_height(walker, y[0], y[1]))
-    now = total_energy(walker, y)
-    energy[LEAST], energy[MOST], energy[LATEST] = min(energy[LEAST], now), max(energy[MOST], now), now
-    extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], energy[MOST] - energy[LEAST])
-
-
-@observe.case(Observer)
-def record(observer: Observer, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
-    """Samples that fall into the integration step; extremes and the energy's integral from eighths of it."""
-    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    t_end = t + fraction * h
-    mean_energy = SIMPSON[0] * observer.energy[LATEST]
-    for eighth in range(1, 9):
-        record_extremes(observer, walker, interpolate(method, system, 0.125 * eighth * fraction))
-        mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
-    observer.energy[INTEGRAL] += mean_energy * fraction * h
-    observer.energy[DURATION] += fraction * h
-    index = observer.recorded[0]
-    while index < observer.times.size and observer.times[index] <= t_end:
-        y = interpolate(method, system, (observer.times[index] - t) / h)
-        for i in range(4):
-            observer.states[index, i] = y[i]
-        observer.steps[index] = step
-        index += 1
-    observer.recorded[0] = index
-
-
-@wants_dense.case(Observer)
-def with_dense(observer: Observer) -> bool:
-    """Yes."""
-    return True
 
 
 @inlined
@@ -172,17 +49,33 @@ def hip_above_fall(walker: RigidWalker, y: State) -> float:
 
 @inlined
 def may_end(walker: RigidWalker, method: Any, y: State) -> bool:
-    """Whether the last step, which led to y, may hold a heel strike or a fall: false early in a swing.
+    """Whether the last step, which led to y, may hold a heel strike or a fall: false through most of a swing.
 
-    A heel strike needs the swing leg ahead of the stance leg; twice the faster of the relative velocities at the
-    step's ends bounds how far the legs move apart within it.
+    A heel strike needs the swing leg ahead of the stance leg and the feet's line to fall onto the slope. Both signals
+    are linear in the angles, whose values and velocities at the step's ends are known.
     """
     if hip_above_fall(walker, y) < 0.0:
         return True
-    old = method.y_old
-    h = method.clock[T] - method.clock[T_OLD]
-    reach = 2.0 * h * max(abs(old[2] - old[3]), abs(y[2] - y[3]))
-    return max(old[0] - old[1], y[0] - y[1]) + reach > 0.0
+    old, h = method.y_old, method.clock[T] - method.clock[T_OLD]
+    ahead = hull(old[0] - old[1], h * (old[2] - old[3]), y[0] - y[1], h * (y[2] - y[3]))
+    if ahead[1] <= 0.0:
+        return False
+    start, end = feet_on_slope(walker, old[0], old[1]), feet_on_slope(walker, y[0], y[1])
+    guard = hull(start, h * (old[2] + old[3]), end, h * (y[2] + y[3]))
+    return guard[0] <= 0.0
+
+
+@inlined
+def hull(start: float, start_rate: float, end: float, end_rate: float) -> tuple[float, float]:
+    """Bounds of a signal within a step, from its values and rates per step at the ends.
+
+    Those of the Bernstein coefficients of Hermite's cubic, an eighth of their spread further apart: what the cubic
+    leaves out is far less.
+    """
+    second, third = start + start_rate / 3.0, end - end_rate / 3.0
+    least, most = min(start, second, third, end), max(start, second, third, end)
+    room = HULL_ROOM * (most - least)
+    return least - room, most + room
 
 
 @inlined

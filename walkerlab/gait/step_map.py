@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.gait.outcome import Outcome
-from walkerlab.gait.rigid_walk import Unobserved, slide_onto_slope, swing
+from walkerlab.gait.rigid_observer import Unobserved
+from walkerlab.gait.rigid_walk import slide_onto_slope, swing
 from walkerlab.kernels import inlined, kernel
 from walkerlab.physics.rigid.heel_strike import impact, impact_jacobian
 from walkerlab.physics.rigid.swing import SwingVariation
@@ -46,6 +47,9 @@ class Shooting(NamedTuple):
     system: Any  # (3, 3) Newton's matrix
     pivots: Any  # (3,)
     impact: Any  # (4, 4) derivative of the impact
+    move: Any  # (3,) Newton's
+    best: Any  # (3,) the best state that Newton's method has met
+    best_DP: Any  # (3, 3) the derivative there
 
 
 def new_shooting(walker: RigidWalker, method: Any, finder: CrossingFinder) -> Shooting:
@@ -53,8 +57,9 @@ def new_shooting(walker: RigidWalker, method: Any, finder: CrossingFinder) -> Sh
     square = (SECTION, SECTION)
     pivots = np.zeros(SECTION, np.int64)
     return Shooting(
-        walker, method, finder, np.zeros(SECTION), np.zeros(square), np.zeros(square), pivots, np.zeros((4, 4))
-    )
+        walker, method, finder, np.zeros(SECTION), np.zeros(square), np.zeros(square), pivots, np.zeros((4, 4)),
+        np.zeros(SECTION), np.zeros(SECTION), np.zeros(square),
+    )  # fmt: skip
 
 
 @inlined
@@ -113,7 +118,7 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
     and the steps of walking it took.
     """
     clear_counts(shooting.method)
-    best, move, DP = np.zeros(SECTION), np.zeros(SECTION), np.zeros((SECTION, SECTION))
+    best, move, DP = shooting.best, shooting.move, shooting.best_DP
     best_status, best_period, best_residual = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL
     scale, evaluations = 1.0, 0
     while evaluations < MOST_EVALUATIONS:
@@ -152,9 +157,9 @@ def newton_move(shooting: Shooting, z: Any, move: Any) -> bool:
         move[i] = shooting.z_next[i] - z[i]
         for j in range(SECTION):
             shooting.system[i, j] = (1.0 if i == j else 0.0) - shooting.DP[i, j]
-    if not factor(shooting.system, shooting.pivots):
+    if not factor(shooting.system, shooting.pivots, SECTION):
         return False
-    solve(shooting.system, shooting.pivots, move)
+    solve(shooting.system, shooting.pivots, move, 0, SECTION)
     return True
 
 

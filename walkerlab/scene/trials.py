@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.gait.outcome import Outcome
+from walkerlab.gait.rigid_observer import Unobserved
 from walkerlab.gait.rigid_walk import SIGNALS as RIGID_SIGNALS
-from walkerlab.gait.rigid_walk import Unobserved, walk
+from walkerlab.gait.rigid_walk import walk
 from walkerlab.kernels import uncompiled
 from walkerlab.physics.rigid.walker import RigidWalker
 from walkerlab.scene.user_script import walk_as_a_script

@@ -126,6 +126,12 @@ def scaled_norm(method: Dop853, y: State, v: State) -> float:
     return math.sqrt(total)
 
 
+@inlined
+def change_of_step(error: float) -> float:
+    """How much the next step may differ from one with this error: the eighth root in three square roots."""
+    return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
+
+
 @begin.case(Dop853)
 def begin_dop853(method: Dop853, system: Any, t: float, y: State, h: float) -> None:
     """Derivative at the start and, for h = 0, the first step after Hairer's hinit."""
@@ -162,7 +168,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
         error = try_step(method, system, t, y, k1, h)
         if error <= 1.0:
             method.counts[ACCEPTED] += 1
-            growth = limit if error == 0.0 else min(limit, max(SHRINK_MOST, SAFETY * error**-EXPONENT))
+            growth = limit if error == 0.0 else min(limit, change_of_step(error))
             store(y, method.y_old, 0)
             clock[T_OLD], clock[T] = t, t_end if last else t + h
             # a step cut short by t_end says little about the next one
@@ -171,7 +177,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
         method.counts[REJECTED] += 1
         limit = 1.0
         # a step whose error is not a number is cut hard
-        h *= max(SHRINK_MOST, SAFETY * error**-EXPONENT) if error < 1e300 else 0.1
+        h *= change_of_step(error) if error < 1e300 else 0.1
         clock[H_NEXT] = h
         if h <= SMALLEST_STEP * max(abs(t), 1.0):
             outcome = STEP_TOO_SMALL

@@ -6,13 +6,21 @@ from walkerlab.kernels import inlined
 
 
 @inlined
-def factor(A: Any, pivots: Any) -> bool:
-    """LU factors of A (n, n) with row exchanges, in place; False if A is singular. Works for real and complex A."""
-    n = A.shape[0]
+def size(x: Any) -> float:
+    """Real and imaginary part's sizes together: enough to choose a pivot by, and without a root."""
+    return abs(x.real) + abs(x.imag)
+
+
+@inlined
+def factor(A: Any, pivots: Any, n: int) -> bool:
+    """LU factors of the first n rows and columns of A with row exchanges, in place; False if they are singular.
+
+    Works for real and complex A. The diagonal holds the pivots' reciprocals.
+    """
     for k in range(n):
         best = k
         for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[best, k]):
+            if size(A[i, k]) > size(A[best, k]):
                 best = i
         pivots[k] = best
         if A[best, k] == 0.0:
@@ -20,9 +28,9 @@ def factor(A: Any, pivots: Any) -> bool:
         if best != k:
             for j in range(n):
                 A[k, j], A[best, j] = A[best, j], A[k, j]
-        scale = 1.0 / A[k, k]
+        A[k, k] = 1.0 / A[k, k]
         for i in range(k + 1, n):
-            A[i, k] *= scale
+            A[i, k] *= A[k, k]
             multiple = A[i, k]
             if multiple != 0.0:
                 for j in range(k + 1, n):
@@ -31,17 +39,19 @@ def factor(A: Any, pivots: Any) -> bool:
 
 
 @inlined
-def solve(A: Any, pivots: Any, b: Any) -> None:
-    """Solve with the factors from `factor`, overwriting b (n,)."""
-    n = A.shape[0]
+def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
+    """Solve with the factors from `factor`, overwriting the n numbers of b from `first` on."""
     for k in range(n):
         best = pivots[k]
         if best != k:
-            b[k], b[best] = b[best], b[k]
-    for k in range(n):
-        for i in range(k + 1, n):
-            b[i] -= A[i, k] * b[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
+            b[first + k], b[first + best] = b[first + best], b[first + k]
+    for i in range(1, n):
+        total = b[first + i]
+        for j in range(i):
+            total -= A[i, j] * b[first + j]
+        b[first + i] = total
+    for i in range(n - 1, -1, -1):
+        total = b[first + i]
+        for j in range(i + 1, n):
+            total -= A[i, j] * b[first + j]
+        b[first + i] = total * A[i, i]

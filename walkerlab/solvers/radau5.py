@@ -4,18 +4,30 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (199
 """
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from walkerlab.kernels import inlined
 from walkerlab.physics.system import State, blank, derivative, jacobian
-from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.radau5_tableau import ALPHA, BETA, ERROR, GAMMA, INV_1, INV_2, INV_3, P_1, P_2, P_3, T_1, T_2, C
+from walkerlab.solvers.radau5_stages import (
+    ERROR_OLD,
+    FRESH,
+    H_FACTORED,
+    H_OLD,
+    NEWTON_MOST,
+    RATE,
+    SMOOTH,
+    UNKNOWNS,
+    Radau5,
+    factor_matrices,
+    new_radau5,
+    solve_real,
+    solve_stages,
+)
+from walkerlab.solvers.radau5_tableau import ERROR, P_1, P_2, P_3
+from walkerlab.solvers.shifted_system import unknowns
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     BUDGET,
-    COUNTS,
     H_NEXT,
     JACOBIANS,
     OUT_OF_BUDGET,
@@ -36,50 +48,12 @@ from walkerlab.solvers.stepping import (
 )
 from walkerlab.solvers.vectors import combine, load, store
 
-NEWTON_MOST = 7
+__all__ = ["Radau5", "new_radau5"]
+
 SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
 KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios within which the factored matrices are kept
 FRESH_RATE = 1e-3  # Newton convergence below which the Jacobian is kept
 FIRST_STEP = 1e-6
-
-# indices into `control`
-H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH = 0, 1, 2, 3, 4, 5
-
-
-class Radau5(NamedTuple):
-    """The method with its memory for n equations."""
-
-    rtol: float
-    atol: float
-    clock: Any
-    y_old: Any
-    y: Any
-    counts: Any
-    slope: Any  # (2, n) derivative at the start of the next step, and of the last
-    z: Any  # (3, n) stages less the step's start
-    w: Any  # (3, n) the same, transformed
-    f: Any  # (3, n) stage derivatives, transformed; Newton's right-hand sides
-    dense: Any  # (3, n) coefficients of the collocation polynomial
-    J: Any  # (n, n)
-    real: Any  # (n, n) factors of gamma/h I - J
-    pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
-    pivots: Any  # (2, n)
-    move: Any  # (n,) Newton's move, real part of the transformed system
-    move_pair: Any  # (n,) complex, the pair's
-    control: Any  # (6,) see the indices above
-
-
-def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
-    """A Radau IIA method for n equations that may evaluate `budget` right-hand sides."""
-    counts = np.zeros(COUNTS, np.int64)
-    counts[BUDGET] = budget
-    three, square = (3, n), (n, n)
-    return Radau5(
-        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros((2, n)),
-        np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
-        np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
-        np.zeros(n), np.zeros(n, np.complex128), np.zeros(6),
-    )  # fmt: skip
 
 
 @begin.case(Radau5)
@@ -89,96 +63,9 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: State, h: float) -> N
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_STEP
     store(y, method.y, 0)
     store(derivative(system, t, y), method.slope, 0)
-    jacobian(system, t, y, method.J)
     method.counts[RHS] += 1
-    method.counts[JACOBIANS] += 1
-    control[H_FACTORED], control[H_OLD], control[RATE] = 0.0, 0.0, 1.0
-    control[SMOOTH], control[FRESH] = 0.0, 1.0
-
-
-@inlined
-def factor_matrices(method: Radau5, h: float) -> bool:
-    """Factors of both matrices of the simplified Newton iteration for step h."""
-    n = method.y.size
-    J, real, pair = method.J, method.real, method.pair
-    for i in range(n):
-        for j in range(n):
-            real[i, j] = -J[i, j]
-            pair[i, j] = -J[i, j]
-        real[i, i] += GAMMA / h
-        pair[i, i] += complex(ALPHA / h, -BETA / h)
-    method.control[H_FACTORED] = h
-    return factor(real, method.pivots[0]) and factor(pair, method.pivots[1])
-
-
-@inlined
-def first_guess(method: Radau5, h: float) -> None:
-    """Stages from the collocation polynomial of the step before, or zero after a start."""
-    ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
-    z, w, dense = method.z, method.w, method.dense
-    for i in range(method.y.size):
-        start = dense[0, i] + dense[1, i] + dense[2, i]
-        for stage in range(3):
-            s = 1.0 + C[stage] * ratio
-            z[stage, i] = s * (dense[0, i] + s * (dense[1, i] + s * dense[2, i])) - start if ratio > 0.0 else 0.0
-        w[0, i] = INV_1[0] * z[0, i] + INV_1[1] * z[1, i] + INV_1[2] * z[2, i]
-        w[1, i] = INV_2[0] * z[0, i] + INV_2[1] * z[1, i] + INV_2[2] * z[2, i]
-        w[2, i] = INV_3[0] * z[0, i] + INV_3[1] * z[1, i] + INV_3[2] * z[2, i]
-
-
-@inlined
-def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> float:
-    """One simplified Newton iteration on the stages; returns the size of its move relative to the tolerance."""
-    z, w, f = method.z, method.w, method.f
-    for stage in range(3):
-        at = combine((1.0, 1.0), (y, load(z, stage, y)))
-        store(derivative(system, t + C[stage] * h, at), f, stage)
-    method.counts[RHS] += 3
-    n = method.y.size
-    real = method.move
-    for i in range(n):
-        f1, f2, f3 = f[0, i], f[1, i], f[2, i]
-        real[i] = INV_1[0] * f1 + INV_1[1] * f2 + INV_1[2] * f3 - GAMMA / h * w[0, i]
-        re = INV_2[0] * f1 + INV_2[1] * f2 + INV_2[2] * f3 - (ALPHA * w[1, i] + BETA * w[2, i]) / h
-        im = INV_3[0] * f1 + INV_3[1] * f2 + INV_3[2] * f3 - (ALPHA * w[2, i] - BETA * w[1, i]) / h
-        method.move_pair[i] = complex(re, im)
-    solve(method.real, method.pivots[0], real)
-    solve(method.pair, method.pivots[1], method.move_pair)
-    size = 0.0
-    for i in range(n):
-        d1, d2, d3 = real[i], method.move_pair[i].real, method.move_pair[i].imag
-        scale = 1.0 / (method.atol + method.rtol * abs(y[i]))
-        size += (d1 * scale) ** 2 + (d2 * scale) ** 2 + (d3 * scale) ** 2
-        w1, w2, w3 = w[0, i] + d1, w[1, i] + d2, w[2, i] + d3
-        w[0, i], w[1, i], w[2, i] = w1, w2, w3
-        z[0, i] = T_1[0] * w1 + T_1[1] * w2 + T_1[2] * w3
-        z[1, i] = T_2[0] * w1 + T_2[1] * w2 + T_2[2] * w3
-        z[2, i] = w1 + w2
-    return math.sqrt(size / (3 * n))
-
-
-@inlined
-def solve_stages(method: Radau5, system: Any, t: float, y: State, h: float) -> int:
-    """Iterate until the stages are accurate to a part of the tolerance; the iterations used, 0 if they diverge."""
-    tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
-    first_guess(method, h)
-    size_old, rate = 0.0, method.control[RATE]
-    for iteration in range(1, NEWTON_MOST + 1):
-        size = newton_move(method, system, t, y, h)
-        if not size < 1e100:
-            return 0
-        if iteration > 1:
-            rate = size / size_old
-            if rate >= 0.99:
-                return 0
-            ahead = rate ** (NEWTON_MOST - iteration) / (1.0 - rate) * size
-            if ahead > 10.0 * tolerance:
-                return 0
-            method.control[RATE] = rate
-        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size <= tolerance):
-            return iteration
-        size_old = max(size, 1e-300)
-    return 0
+    refresh(method, system, t, y)
+    control[H_OLD], control[RATE], control[SMOOTH] = 0.0, 1.0, 0.0
 
 
 @inlined
@@ -189,7 +76,7 @@ def step_error(method: Radau5, system: Any, t: float, y: State, h: float, again:
     for i in range(n):
         method.f[1, i] = (ERROR[0] * z[0, i] + ERROR[1] * z[1, i] + ERROR[2] * z[2, i]) / h
         error[i] = method.slope[0, i] + method.f[1, i]
-    solve(method.real, method.pivots[0], error)
+    solve_real(method, error)
     size = error_size(method, y, error)
     if size >= 1.0 and again:
         at = combine((1.0, 1.0), (y, load(method.f, 0, y)))
@@ -197,7 +84,7 @@ def step_error(method: Radau5, system: Any, t: float, y: State, h: float, again:
         method.counts[RHS] += 1
         for i in range(n):
             error[i] += method.f[1, i]
-        solve(method.real, method.pivots[0], error)
+        solve_real(method, error)
         size = error_size(method, y, error)
     return size
 
@@ -257,6 +144,7 @@ def refresh(method: Radau5, system: Any, t: float, y: State) -> None:
     jacobian(system, t, y, method.J)
     method.counts[JACOBIANS] += 1
     method.control[FRESH], method.control[H_FACTORED] = 1.0, 0.0
+    method.control[UNKNOWNS] = unknowns(method.J)
 
 
 @inlined

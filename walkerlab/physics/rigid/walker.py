@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from walkerlab.kernels import inlined
+from walkerlab.physics.fused import fused
 from walkerlab.physics.trigonometry import sine_cosine
 
 CORRECTED = -1.0
@@ -61,13 +62,13 @@ def accelerations(
     c = swing_constants(walker)
     s1, c1 = sine_cosine(theta_1)
     s2, c2 = sine_cosine(theta_2)
-    sin_d = s2 * c1 - c2 * s1
-    cos_d = c2 * c1 + s2 * s1
+    sin_d = fused(s2, c1, -c2 * s1)
+    cos_d = fused(c2, c1, s2 * s1)
     d12 = -c.mLb * cos_d
-    r1 = -c.mLb * omega_2 * omega_2 * sin_d - walker.gravity * c.mb * s1
-    r2 = -walker.c21_sign * c.mLb * omega_1 * omega_1 * sin_d + walker.gravity * c.K * s2
-    scale = 1.0 / (c.d11 * c.d22 - d12 * d12)
-    return (c.d22 * r1 - d12 * r2) * scale, (c.d11 * r2 - d12 * r1) * scale
+    r1 = fused(-c.mLb * omega_2 * omega_2, sin_d, -walker.gravity * c.mb * s1)
+    r2 = fused(-walker.c21_sign * c.mLb * omega_1 * omega_1, sin_d, walker.gravity * c.K * s2)
+    scale = 1.0 / fused(-d12, d12, c.d11 * c.d22)
+    return fused(c.d22, r1, -d12 * r2) * scale, fused(c.d11, r2, -d12 * r1) * scale
 
 
 @inlined
