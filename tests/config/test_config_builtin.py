@@ -54,6 +54,7 @@ def test_a_resolved_config_loads_back_to_itself(name: str, loaded: Callable[...,
 
 
 number = st.floats(1e-3, 0.45)
+INSTALLED = [method for method in METHODS if not method.startswith("cvode")]
 
 
 @st.composite
@@ -64,7 +65,7 @@ def configs(draw: st.DrawFn) -> dict[str, Any]:
         "slope_rad": draw(st.floats(-1.5, 1.5)),
         "strides": draw(st.integers(1, 10_000)),
         "contact": draw(st.none() | st.fixed_dictionaries({"pad_pitch": number | st.sampled_from(["rigid", "own"])})),
-        "solver": {"rigid": {"method": draw(st.sampled_from(METHODS)), "rtol": draw(st.floats(1e-14, 0.1))}},
+        "solver": {"rigid": {"method": draw(st.sampled_from(INSTALLED)), "rtol": draw(st.floats(1e-14, 0.1))}},
         "outputs": draw(st.lists(st.sampled_from(OUTPUTS))),
     }
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from walkerlab.config import schema
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config, Contact
 from walkerlab.errors import ConfigError
@@ -175,3 +176,13 @@ def test_the_exit_code_is_3_and_the_advice_names_a_command(write: Write) -> None
         load(write("foo: 1\n"))
     assert caught.value.exit_code == 3
     assert "walkerlab schema" in caught.value.advice
+
+
+def test_a_method_of_an_extra_that_is_not_installed_says_what_to_install(
+    refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(schema, "find_spec", lambda name: None)
+    message = refused("solver: {contact: {method: cvode-bdf}}\n")
+    assert message.startswith("mine.yaml:1:")
+    assert "solver.contact.method: 'cvode-bdf'" in message
+    assert "pip install 'walkerlab[cvode]'" in message

@@ -1,4 +1,4 @@
-"""Stiff and smooth problems as systems, and a kernel that drives Radau through them."""
+"""Stiff and smooth problems as systems, where the stiff ones end, and a kernel that drives Radau through them."""
 
 import math
 from typing import Any, NamedTuple
@@ -99,6 +99,18 @@ def kinetics_jacobian(system: Kinetics, t: float, y: Any, J: Any) -> None:
     J[5, 3], J[5, 4], J[5, 5], J[5, 6], J[5, 7] = 0.69, 1.71, -280.0 * y[7] - 0.43, 0.69, -280.0 * y[5]
     J[6, 5], J[6, 6], J[6, 7] = 280.0 * y[7], -1.81, 280.0 * y[5]
     J[7, 5], J[7, 6], J[7, 7] = -280.0 * y[7], 1.81, -280.0 * y[5]
+
+
+# Mazzia, Magherini: Test set for initial value problem solvers, release 2.4, Bari 2008
+VDPOL_END = (0.1706167732170483e1, -0.8928097010247975)
+ROBERTSON_END = (0.2083340149701255e-7, 0.8333360770334713e-13, 0.9999999791665050)
+HIRES_END = (
+    0.7371312573325668e-3, 0.1442485726316185e-3, 0.5888729740967575e-4, 0.1175651343283149e-2,
+    0.2386356198831331e-2, 0.6238968252742796e-2, 0.2849998395185769e-2, 0.2850001604814231e-2,
+)  # fmt: skip
+ROBERTSON_START = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+HIRES_START = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057)
+STIFF = Planar(VAN_DER_POL, 1e-6, 0.0, 1.0)  # mu = 1 / eps = 1e6
 
 
 @kernel

@@ -1,11 +1,11 @@
 """DOP853: its tableau, the orders it shows, a published orbit, and SciPy's version of it."""
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+import rooted_trees
 from scipy.integrate import solve_ivp
 
 from walkerlab.kernels import kernel
@@ -44,45 +44,12 @@ def matrix(stages):
 A, B, C = matrix(12), np.array(tableau.A_13), np.array(tableau.C[:12])
 
 
-@cache
-def trees(order):
-    """Rooted trees of an order: each the sorted tuple of its root's subtrees."""
-    if order == 1:
-        return ((),)
-    return tuple(sorted({tuple(sorted(forest)) for forest in forests(order - 1)}))
-
-
-def forests(nodes):
-    if nodes == 0:
-        yield ()
-    for first in range(1, nodes + 1):
-        for tree in trees(first):
-            for rest in forests(nodes - first):
-                yield (tree, *rest)
-
-
-def nodes(tree):
-    return 1 + sum(map(nodes, tree))
-
-
-def density(tree):
-    return nodes(tree) * math.prod(map(density, tree))
-
-
-def stage_weights(tree):
-    """Elementary weight of each stage: the product over the subtrees of A times theirs."""
-    weights = np.ones(len(A))
-    for subtree in tree:
-        weights = weights * (A @ stage_weights(subtree))
-    return weights
-
-
 def defects(weights, order):
-    return [weights @ stage_weights(tree) - 1.0 / density(tree) for tree in trees(order)]
+    return rooted_trees.defects(A, weights, order)
 
 
 def test_there_are_as_many_trees_as_cayley_counted():
-    assert [len(trees(order)) for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
+    assert [len(rooted_trees.trees(order)) for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
 
 
 def test_stages_are_consistent():
@@ -94,7 +61,7 @@ def test_stages_are_consistent():
 @pytest.mark.parametrize("order", range(1, 9))
 def test_solution_fulfils_every_condition_up_to_order_8(order):
     # coefficients have 30 digits on paper and 16 here, products grow to some tens
-    assert defects(B, order) == pytest.approx([0.0] * len(trees(order)), abs=1e-14)
+    assert defects(B, order) == pytest.approx([0.0] * len(rooted_trees.trees(order)), abs=1e-14)
 
 
 def test_solution_is_not_of_order_9():
@@ -105,7 +72,7 @@ def test_solution_is_not_of_order_9():
 def test_error_weights_compare_with_solutions_of_order_5_and_3(error, order):
     embedded = B - np.array(error)
     for lower in range(1, order + 1):
-        assert defects(embedded, lower) == pytest.approx([0.0] * len(trees(lower)), abs=1e-14)
+        assert defects(embedded, lower) == pytest.approx([0.0] * len(rooted_trees.trees(lower)), abs=1e-14)
     assert max(map(abs, defects(embedded, order + 1))) > 1e-6
 
 

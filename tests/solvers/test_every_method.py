@@ -107,6 +107,25 @@ def driven(name, rtol, t_end, budget=PLENTY):
     return method, called(name, drive, method, ORBIT, START, t_end)
 
 
+# without a moon a circle around the earth, seen from the rotating frame: Kepler's third law gives its rate
+NO_MOON = Satellite(0.0)
+RADIUS = 0.64
+TURN = RADIUS**-1.5 - 1.0
+
+
+def on_circle(t):
+    x, y = RADIUS * math.cos(TURN * t), RADIUS * math.sin(TURN * t)
+    return (x, y, -TURN * y, TURN * x)
+
+
+def circled(name, rtol):
+    """Steps of one turn, and the error of its end."""
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
+    t_end = 2.0 * math.pi / TURN
+    assert called(name, drive, method, NO_MOON, on_circle(0.0), t_end) == STEP_DONE
+    return int(method.counts[ACCEPTED]), np.abs(method.y - on_circle(t_end)).max()
+
+
 @pytest.fixture(scope="module")
 def early():
     """The satellite after a tenth of its period, by the most exact of all."""
@@ -130,6 +149,22 @@ def test_error_falls_with_the_tolerance(name, early):
     errors = [np.abs(driven(name, rtol, 0.1 * PERIOD)[0].y - early).max() for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 1e-4
+
+
+@every_method
+def test_observed_order(name):
+    """On a circle, where steps are equally long, the error falls with the steps to the power of minus the order.
+
+    The fit runs from where the error per step is no more than a thousandth to where rounding and the tolerances of
+    inner iterations are far below it. Both ends of it hold the order from below only: the error constants of the next
+    order are the larger ones in good methods, so that on steps this long the error falls faster. A method that varies
+    its order has none to observe; its order rises as the tolerance falls, so that the error falls at least as that of
+    a method of order four would, whatever it begins with.
+    """
+    lowest, highest = METHODS[name].orders
+    steps, errors = zip(*(circled(name, 10.0**-digits) for digits in range(5, 10)), strict=True)
+    observed = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert observed > (highest - 0.25 if lowest == highest else 4.0)
 
 
 @every_method
@@ -177,8 +212,3 @@ def test_the_same_run_gives_the_same_bits(name):
 @every_method
 def test_dense_degree_is_that_of_a_polynomial(name):
     assert 3 <= dense_degree(method_named(name).new(4, 1e-6, 1e-8, PLENTY)) <= 10
-
-
-def test_an_unknown_method_is_an_error_that_names_the_known():
-    with pytest.raises(KeyError, match="dop853, radau5"):
-        method_named("euler")

@@ -8,7 +8,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from stiff_problems import CURVE, EXPLOSION, HIRES, LINEAR, ROBERTSON, VAN_DER_POL, Kinetics, Planar, drive
+from stiff_problems import (
+    CURVE,
+    EXPLOSION,
+    HIRES,
+    HIRES_END,
+    HIRES_START,
+    LINEAR,
+    ROBERTSON,
+    ROBERTSON_END,
+    ROBERTSON_START,
+    STIFF,
+    VAN_DER_POL,
+    VDPOL_END,
+    Kinetics,
+    Planar,
+    drive,
+)
 
 from walkerlab.kernels import kernel
 from walkerlab.physics.system import derivative
@@ -165,16 +181,6 @@ def test_dense_output_is_the_collocation_polynomial_of_order_three():
 
 # ---- published problems --------------------------------------------------------------------------------------------
 
-# Mazzia, Magherini: Test set for initial value problem solvers, release 2.4, Bari 2008
-VDPOL_END = (0.1706167732170483e1, -0.8928097010247975)
-ROBERTSON_END = (0.2083340149701255e-7, 0.8333360770334713e-13, 0.9999999791665050)
-HIRES_END = (
-    0.7371312573325668e-3, 0.1442485726316185e-3, 0.5888729740967575e-4, 0.1175651343283149e-2,
-    0.2386356198831331e-2, 0.6238968252742796e-2, 0.2849998395185769e-2, 0.2850001604814231e-2,
-)  # fmt: skip
-HIRES_START = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057)
-STIFF = Planar(VAN_DER_POL, 1e-6, 0.0, 1.0)
-
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-8])
 def test_van_der_pol_ends_as_published(tol):
@@ -185,7 +191,7 @@ def test_van_der_pol_ends_as_published(tol):
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-8])
 def test_robertsons_reaction_ends_as_published(tol):
-    method = integrated(Kinetics(ROBERTSON), (1.0,) + (0.0,) * 7, 1e11, tol, 1e-8 * tol)
+    method = integrated(Kinetics(ROBERTSON), ROBERTSON_START, 1e11, tol, 1e-8 * tol)
     np.testing.assert_allclose(method.y[:3], ROBERTSON_END, rtol=20 * tol)
     assert not method.y[3:].any()
     assert method.y.sum() == pytest.approx(1.0, abs=1e-12)  # mass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.util import find_spec
 from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
@@ -35,12 +36,23 @@ __all__ = [
 
 Equations = Literal["corrected", "as-printed"]
 Output = Literal["states", "energies", "forces"]
-Method = Literal["dop853", "radau5", "scipy-rk45", "scipy-dop853", "scipy-lsoda", "scipy-radau", "scipy-bdf"]
+Method = Literal[
+    "dop853",
+    "radau5",
+    "scipy-rk45",
+    "scipy-dop853",
+    "scipy-lsoda",
+    "scipy-radau",
+    "scipy-bdf",
+    "cvode-bdf",
+    "cvode-adams",
+]
 
 OUTPUTS: Final[tuple[Output, ...]] = get_args(Output)
 METHODS: Final[tuple[Method, ...]] = get_args(Method)
 
 RIGHT_ANGLE: Final = math.pi / 2
+CVODE_PACKAGE: Final = "sksundae"
 
 
 class SlopeInDegrees(Block):
@@ -158,6 +170,13 @@ class SolverSettings(Block):
     method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "dop853"
     rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-10
     atol: Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _TOLERANCE, gt=0.0, le=1.0)] = 1.0e-12
+
+    @field_validator("method")
+    @classmethod
+    def _is_installed(cls, value: Method) -> Method:
+        if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
+            raise PydanticCustomError("extra", "needs CVODE, which is not installed: pip install 'walkerlab[cvode]'")
+        return value
 
 
 class RigidSolver(SolverSettings):

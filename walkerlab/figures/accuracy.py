@@ -29,6 +29,8 @@ LOOKS = {
     "scipy-lsoda": Look("scipy-lsoda", ORANGE, DASHED, 1.0, "^"),
     "scipy-radau": Look("scipy-radau", VERMILLION, DASHED, 1.0, "s"),
     "scipy-bdf": Look("scipy-bdf", PURPLE, DASHED, 1.0, "D"),
+    "cvode-bdf": Look("cvode-bdf", PURPLE, DOTTED, 1.0, "d"),
+    "cvode-adams": Look("cvode-adams", GREEN, DOTTED, 1.0, "<"),
     "scipy-dop853-numpy": Look("scipy-dop853-numpy", GREY, DOTTED, 1.2, "P"),
 }
 OTHERS = Look("", BLACK, DOTTED, 1.0, "*")

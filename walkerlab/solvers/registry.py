@@ -9,7 +9,7 @@ from typing import Any
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.events import CrossingFinder, new_crossing_finder
 from walkerlab.solvers.radau5 import new_radau5
-from walkerlab.solvers.scipy_methods import SCIPY_CLASSES, ScipyMethod, new_scipy_method
+from walkerlab.solvers.scipy_methods import CVODE, LIBRARIES, ScipyMethod, new_scipy_method
 from walkerlab.solvers.stepping import dense_degree
 
 
@@ -20,30 +20,35 @@ class Method:
     name      as in configs
     new       builds it: (equations, rtol, atol, budget of right-hand sides)
     compiled  whether whole walks compile with it; a library's method walks in Python
+    stiff     whether it is meant for stiff problems
+    orders    lowest and highest; the same but for methods that vary it
     """
 
     name: str
     new: Callable[[int, float, float, int], Any]
     compiled: bool
-    implicit: bool
+    stiff: bool
+    orders: tuple[int, int]
 
 
 OWN = (
-    Method("dop853", new_dop853, compiled=True, implicit=False),
-    Method("radau5", new_radau5, compiled=True, implicit=True),
+    Method("dop853", new_dop853, compiled=True, stiff=False, orders=(8, 8)),
+    Method("radau5", new_radau5, compiled=True, stiff=True, orders=(5, 5)),
 )
-SCIPY = tuple(
-    Method(name, new_scipy_method(name), compiled=False, implicit=entry.implicit)
-    for name, entry in SCIPY_CLASSES.items()
+OF_LIBRARIES = tuple(
+    Method(name, new_scipy_method(entry), compiled=False, stiff=entry.stiff, orders=entry.orders)
+    for name, entry in LIBRARIES.items()
 )
-METHODS = {method.name: method for method in (*OWN, *SCIPY)}
+METHODS = {method.name: method for method in (*OWN, *OF_LIBRARIES)}
 
 
 def method_named(name: str) -> Method:
     """The method of that name; KeyError names those there are."""
-    if name not in METHODS:
-        raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
-    return METHODS[name]
+    if name in METHODS:
+        return METHODS[name]
+    if name in CVODE:
+        raise KeyError(f"{name} needs CVODE, which is not installed: pip install 'walkerlab[cvode]'")
+    raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
 
 
 def finder_for(method: Any, signals: int) -> CrossingFinder:

@@ -1,4 +1,4 @@
-"""SciPy's integrators behind the same functions as our own, with the compiled right-hand side.
+"""Libraries' integrators behind the same functions as our own, with the compiled right-hand side: SciPy's, and CVODE.
 
 They serve as peers and as a check. Walks with them run in Python: the same source, uncompiled.
 """
@@ -6,6 +6,7 @@ They serve as peers and as a check. Walks with them run in Python: the same sour
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numba
@@ -13,6 +14,7 @@ import numpy as np
 
 from walkerlab.kernels import kernel
 from walkerlab.physics.system import State, blank, derivative, jacobian
+from walkerlab.solvers import cvode
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     BUDGET,
@@ -37,19 +39,44 @@ from walkerlab.solvers.vectors import load, store
 
 
 class Entry(NamedTuple):
-    """A class of scipy.integrate, by name so that SciPy is imported only where it is used."""
+    """A library's class of solvers, loaded only where it is used.
 
-    class_name: str
-    implicit: bool
+    load    gives what makes a solver, called as the classes of scipy.integrate are
+    stiff   whether it is meant for stiff problems
+    orders  lowest and highest
+    told    whether it takes the Jacobian
+    """
+
+    load: Callable[[], Callable[..., Any]]
+    stiff: bool
+    orders: tuple[int, int]
+    told: bool
 
 
-SCIPY_CLASSES = {
-    "scipy-rk45": Entry("RK45", False),
-    "scipy-dop853": Entry("DOP853", False),
-    "scipy-lsoda": Entry("LSODA", True),
-    "scipy-radau": Entry("Radau", True),
-    "scipy-bdf": Entry("BDF", True),
+def of_scipy(class_name: str) -> Callable[[], Callable[..., Any]]:
+    """Loads a class of scipy.integrate."""
+
+    def load() -> Callable[..., Any]:
+        from scipy import integrate
+
+        solver_class: Callable[..., Any] = getattr(integrate, class_name)
+        return solver_class
+
+    return load
+
+
+SCIPY = {
+    "scipy-rk45": Entry(of_scipy("RK45"), stiff=False, orders=(5, 5), told=False),
+    "scipy-dop853": Entry(of_scipy("DOP853"), stiff=False, orders=(8, 8), told=False),
+    "scipy-lsoda": Entry(of_scipy("LSODA"), stiff=True, orders=(1, 12), told=True),
+    "scipy-radau": Entry(of_scipy("Radau"), stiff=True, orders=(5, 5), told=True),
+    "scipy-bdf": Entry(of_scipy("BDF"), stiff=True, orders=(1, 5), told=True),
 }
+CVODE = {
+    "cvode-bdf": Entry(lambda: partial(cvode.CvodeSolver, "BDF"), stiff=True, orders=(1, 5), told=True),
+    "cvode-adams": Entry(lambda: partial(cvode.CvodeSolver, "Adams"), stiff=False, orders=(1, 12), told=True),
+}
+LIBRARIES = {**SCIPY, **(CVODE if cvode.is_installed() else {})}
 DENSE_DEGREE = 7
 
 
@@ -95,17 +122,17 @@ class ScipyMethod:
         return np.ascontiguousarray(self.dense(t_old + fractions * (t - t_old)).T)
 
 
-def new_scipy_method(name: str) -> Callable[[int, float, float, int], ScipyMethod]:
-    """A builder of the method of that name."""
+def new_scipy_method(entry: Entry) -> Callable[[int, float, float, int], ScipyMethod]:
+    """A builder of methods with such solvers."""
 
     def build(n: int, rtol: float, atol: float, budget: int) -> ScipyMethod:
-        return ScipyMethod(SCIPY_CLASSES[name], n, rtol, atol, budget)
+        return ScipyMethod(entry, n, rtol, atol, budget)
 
     return build
 
 
 def counted(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """The compiled right-hand side as SciPy calls it, counting and keeping the budget."""
+    """The compiled right-hand side as libraries call it, counting and keeping the budget."""
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
     counts = method.counts
@@ -122,7 +149,7 @@ def counted(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], 
 
 
 def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """The compiled Jacobian as SciPy calls it, counting."""
+    """The compiled Jacobian as libraries call it, counting."""
     code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
 
     def jac(t: float, y: Any) -> Any:
@@ -136,19 +163,17 @@ def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[floa
 
 @begin.case(ScipyMethod)
 def begin_scipy(method: ScipyMethod, system: Any, t: float, y: State, h: float) -> None:
-    """Make a new solver; SciPy chooses its first step itself."""
-    from scipy import integrate
-
+    """Make a new solver; it chooses its first step itself."""
     n = method.y.size
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
-    if method.entry.implicit:
+    if method.entry.told:
         options["jac"] = counted_jacobian(method, system, n)
     method.dense = None
     try:
-        solver_class = getattr(integrate, method.entry.class_name)
-        method.solver = solver_class(counted(method, system, n), t, method.y.copy(), np.inf, **options)
+        new_solver = method.entry.load()
+        method.solver = new_solver(counted(method, system, n), t, method.y.copy(), np.inf, **options)
     except OutOfBudgetError:
         method.solver = None
 

@@ -1,0 +1,44 @@
+"""Conditions on a Runge-Kutta tableau, one for each rooted tree; Butcher; Hairer, Norsett, Wanner I, section II.2."""
+
+import math
+from functools import cache
+
+import numpy as np
+
+
+@cache
+def trees(order):
+    """Rooted trees of an order: each the sorted tuple of its root's subtrees."""
+    if order == 1:
+        return ((),)
+    return tuple(sorted({tuple(sorted(forest)) for forest in forests(order - 1)}))
+
+
+def forests(nodes):
+    if nodes == 0:
+        yield ()
+    for first in range(1, nodes + 1):
+        for tree in trees(first):
+            for rest in forests(nodes - first):
+                yield (tree, *rest)
+
+
+def nodes(tree):
+    return 1 + sum(map(nodes, tree))
+
+
+def density(tree):
+    return nodes(tree) * math.prod(map(density, tree))
+
+
+def stage_weights(A, tree):
+    """Elementary weight of each stage: the product over the subtrees of A times theirs."""
+    weights = np.ones(len(A))
+    for subtree in tree:
+        weights = weights * (A @ stage_weights(A, subtree))
+    return weights
+
+
+def defects(A, weights, order):
+    """How far each condition of an order is from being met."""
+    return [weights @ stage_weights(A, tree) - 1.0 / density(tree) for tree in trees(order)]
