@@ -227,23 +227,6 @@ def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degree
         assert np.abs(map_.z_next - z).max() < 1e-11 * np.sqrt(9.81)
 
 
-@pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
-def test_step_maps_derivative_is_its_slope(walker):
-    map_ = shooting(walker)
-    z = np.array([0.17, -0.6, -0.85])
-    evaluate(map_, z)
-    DP, h = map_.DP.copy(), 1e-5
-    for j in range(3):
-        ends = {}
-        for steps in (-2, -1, 1, 2):
-            moved = z.copy()
-            moved[j] += steps * h
-            evaluate(map_, moved)
-            ends[steps] = map_.z_next.copy()
-        slope = (8.0 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / (12.0 * h)
-        assert DP[:, j] == pytest.approx(slope, abs=1e-7)
-
-
 def test_newton_gives_up_where_no_step_is_taken():
     status, _, residual, evaluations = newton(shooting(PAPER), np.array([0.17, 3.0, 3.0]), 1e-12)
     assert status != Outcome.WALKED

@@ -16,6 +16,7 @@ from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.radau5_tableau import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
+THIS_SIDE = 4e-12  # s, some times as much as the time of an event is uncertain by
 ROOT6 = 6.0**0.5
 # Radau IIA, Hairer and Wanner II (5.6)
 A = np.array(
@@ -31,7 +32,7 @@ class Tangent(NamedTuple):
     """The derivative Phi and the memory to carry it along."""
 
     Phi: Any  # (n, directions); no directions if the tangent is not wanted
-    stages: Any  # (3, n, n) Jacobians at the stages
+    stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
     system: Any  # (3 n, 3 n)
     pivots: Any  # (3 n,)
     rates: Any  # (3 n,) stage derivatives of one direction
@@ -42,7 +43,7 @@ def new_tangent(n: int, directions: int) -> Tangent:
     m = n if directions else 0
     return Tangent(
         np.zeros((n, directions)),
-        np.zeros((3, m, m)),
+        np.zeros((4, m, m)),
         np.zeros((3 * m, 3 * m)),
         np.zeros(3 * m, np.int64),
         np.zeros(3 * m),
@@ -54,8 +55,9 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
     """Carry Phi over the last step of `method`."""
     n = tangent.Phi.shape[0]
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    for i in range(3):
+    for i in range(2):
         jacobian(system, t + C[i] * h, interpolate(method, system, C[i]), tangent.stages[i])
+    jacobian_at_end(tangent, method, system, t, h)
     for i in range(3):
         for j in range(3):
             for row in range(n):
@@ -65,6 +67,22 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
     factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
         carry_direction(tangent, direction, h)
+
+
+@inlined
+def jacobian_at_end(tangent: Tangent, method: Any, system: Any, t: float, h: float) -> None:
+    """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
+
+    A step that ends at a join of the force law ends on either side of it, and the Jacobian jumps there.
+    """
+    near = min(0.25, THIS_SIDE / h)
+    for i in range(2):
+        before = 1.0 - (1 + i) * near
+        jacobian(system, t + before * h, interpolate(method, system, before), tangent.stages[2 + i])
+    n = tangent.Phi.shape[0]
+    for row in range(n):
+        for column in range(n):
+            tangent.stages[2, row, column] += tangent.stages[2, row, column] - tangent.stages[3, row, column]
 
 
 @inlined
