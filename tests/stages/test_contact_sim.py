@@ -206,6 +206,13 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch)
     assert "rtol" in caught.value.advice
 
 
+def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypatch):
+    monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", 0)
+    with pytest.raises(NoAnswer) as caught:
+        run()
+    assert caught.value.partial["trajectory"]["time"].size == 0
+
+
 def test_a_hinged_first_step_says_what_it_does_without():
     content = run("contact.stance=pinned", "solver.contact.method=scipy-radau", "strides=1")
     assert content.summary["outcome"] == "walked"

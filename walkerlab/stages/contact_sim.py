@@ -26,6 +26,7 @@ from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
 SAMPLES_PER_PENDULUM_TIME = 200
+HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
 TIME, LEG = "time", "leg"
 
 
@@ -59,6 +60,18 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
             partial=content,
         )
     return content
+
+
+def compile_kernels(config: Config) -> None:
+    """Have everything compiled that `run` calls, by walks that may evaluate next to nothing: hinged and free."""
+    scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
+    y = start_state(scene, (-HALF_ANGLE, HALF_ANGLE, 0.0, 0.0))
+    settings = config.solver.contact
+    methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, 1)
+    interval = scene.frame.pendulum_time if config.outputs else None
+    for pinned in dict.fromkeys((scene.pinned, None)):
+        result = walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, y, methods, 1, interval)
+        groups(config, scene, result)
 
 
 def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, tuple[float, ...]]:
@@ -204,7 +217,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) ->
     of_foot = walker.tree.mass * (walker.gravity_down * foot_height - walker.gravity_along * foot_along)
     potential = energies[:, 1] - of_foot
     lost = samples.dissipated_J
-    residual = energies[:, 2] + lost.sum(axis=1) - energies[0, 2]
+    residual = energies[:, 2] + lost.sum(axis=1) - energies[:1, 2]
     rows = (
         ("kinetic_J", energies[:, 0], "kinetic energy"),
         ("potential_J", potential, "potential energy from the current stance foot"),

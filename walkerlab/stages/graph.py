@@ -48,6 +48,7 @@ class Stage:
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
+    compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     """
 
     name: str
@@ -60,6 +61,7 @@ class Stage:
     draws: bool = False
     walks: bool = False
     has_cells: bool = False
+    compiles_long: bool = False
 
 
 class Graph:
@@ -111,6 +113,7 @@ PIPELINE = Graph(
         inputs=gait_for_start_or_pads,
         needs_contact=True,
         walks=True,
+        compiles_long=True,
     ),
     Stage(
         "tune",

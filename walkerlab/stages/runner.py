@@ -13,6 +13,7 @@ from typing import Any
 from walkerlab.config.canonical import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.stages.ahead import Ahead
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, no_answer, plan
 from walkerlab.stages.progress import Reporter, Silent
@@ -133,10 +134,13 @@ class Run:
         self.jobs = jobs
         self.done: list[Done] = []
         self.announced = False
+        self.ahead = Ahead()
+        self.later: Sequence[Stage] = ()
 
     def carry_out(self, stages: Sequence[Stage]) -> None:
         """Decide on one stage after another, and do it."""
-        for stage in stages:
+        for index, stage in enumerate(stages):
+            self.later = stages[index + 1 :]
             self.planner.look_at_current(stage, stages)
             step = self.planner.decide(stage)
             if step.damaged:
@@ -185,6 +189,7 @@ class Run:
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(stage.module).run
         self._announce_compilation()
+        self.ahead.wait_for(stage)
         config = only(self.planner.config, stage.reads)
         extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
         if stage.draws:
@@ -203,6 +208,7 @@ class Run:
         if kernels is not None and not self.announced and kernels.nothing_compiled_yet():
             self.announced = True
             self.reporter.note("compiling the models for this machine, once; later runs use the compiled code")
+            self.ahead.begin(self.later, self.planner.config)
 
     def report(self, target: Stage, wall_s: float) -> StageReport:
         """How it went."""
