@@ -191,7 +191,9 @@ def memory_line() -> Line:
     # a time and the states before and after each heel strike
     allowed = 8 * (1 + 4 + 4)
     measured = f"{a_step:.0f} bytes a step more, its time and states are {allowed}"
-    return Line("memory, 10,000 strides without stored states", measured, "flat", MET if a_step <= allowed else MISSED)
+    return Line(
+        "memory, 10,000 strides without stored states", measured, "flat", MET if round(a_step) <= allowed else MISSED
+    )
 
 
 def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
