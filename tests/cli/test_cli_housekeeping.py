@@ -8,11 +8,11 @@ def states(done):
 
 
 def test_status_says_missing_current_stale_damaged_and_left_out(toy):
-    assert set(states(toy("status", "--json")).values()) == {"missing"}
+    assert set(states(toy("status", "--json")).values()) == {"missing", "not run"}
     assert not list(toy.folder.iterdir())
     toy("page")
     runs = toy.folder / "runs"
-    assert set(states(toy("status", "--json")).values()) == {"current"}
+    assert set(states(toy("status", "--json")).values()) == {"current", "not run"}
     (runs / "paper@strides=3").mkdir()
     (runs / "paper@strides=3" / "roll.h5").write_bytes((runs / "paper" / "roll.h5").read_bytes())
     (runs / "paper@strides=3" / "drop.h5").write_bytes(b"broken")
@@ -22,6 +22,7 @@ def test_status_says_missing_current_stale_damaged_and_left_out(toy):
         "roll": "stale",
         "bounce": "missing",
         "survey": "missing",
+        "census": "not run",
         "picture": "missing",
         "page": "missing",
     }

@@ -1,6 +1,7 @@
 """Methods measured by hand, in the layout that `accuracy` stores."""
 
 import numpy as np
+from synthetic_maps import stability_maps
 from synthetic_walks import both_models, stored
 
 from walkerlab.store.content import Group, Variable
@@ -59,4 +60,4 @@ def measured_methods(scenes=SCENES):
 
 
 def everything():
-    return both_models(**measured_methods())
+    return both_models(**measured_methods(), **stability_maps())

@@ -6,6 +6,7 @@ import re
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
+from synthetic_maps import stability_maps
 from synthetic_methods import measured_methods
 from synthetic_walks import both_models, contact, rigid, rigid_alone
 
@@ -20,6 +21,7 @@ RESULTS = {
     "a plane": both_models(**{"contact-sim": contact(pads=False)}),
     "one stride": both_models(simulate=rigid(2), **{"contact-sim": contact(2, 0.72)}),
     "methods measured": measured_methods(),
+    "stability mapped": stability_maps(),
     "one step": both_models(**{"contact-sim": contact(1, outcome="fell")}),
 }
 CASES = [
@@ -28,7 +30,7 @@ CASES = [
     for figure in FIGURES
     if figure.why_left_out(results, {}) is None
 ]
-WITH_UNIT = re.compile(r".+ \((m|s|rad|rad/s|J|N|1|SI)\)")
+WITH_UNIT = re.compile(r".+ \((m|s|m/s|rad|rad/s|J|N|N/m\$\^\{2\.2\}\$|1|SI)\)")
 VISIBLE = 0.1
 """Least difference of brightness between lines that lie on one another."""
 

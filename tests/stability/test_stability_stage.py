@@ -24,8 +24,19 @@ RIGHT = Known("ball", "time, s", 1.0, 1.0, "closed form", 1e-6, "tolerance", 0.1
 WRONG = replace(RIGHT, name="block", value=2.0)
 
 
-def report_of(summary):
-    stored = {} if summary is None else {"stability": SimpleNamespace(summary=summary, groups={})}
+MAPS = {
+    "outcomes": {"walked": 5, "slid": 4},
+    "ends_otherwise_sharper": 1,
+    "median_error": 1e-7,
+    "largest_error": 1e-3,
+    "fixed_step": {"fine": 3, "diverges": 6},
+}
+
+
+def report_of(summary, **others):
+    stored = {name: SimpleNamespace(summary=value, groups={}) for name, value in others.items()}
+    if summary is not None:
+        stored["stability"] = SimpleNamespace(summary=summary, groups={})
     return section(Results(None, stored))
 
 
@@ -62,6 +73,14 @@ def test_report_names_the_other_method_or_why_there_is_none():
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[3].text for row in table.bodies[0].rows] == ["dop853", "none"]
     assert "alone: dop853 budget-exhausted" in table.note
+
+
+def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_them():
+    summary = summary_of([GOOD], [RIGHT], [])
+    assert "walkerlab stability --full" in report_of(summary).blocks[-1].text
+    said = report_of(summary, **{"stability-maps": MAPS}).blocks[-1].text
+    assert "5 walked and 4 slid; 1 end otherwise" in said
+    assert "3 fine and 6 diverges" in said
 
 
 def test_one_and_two_processes_find_the_same():

@@ -15,6 +15,7 @@ from walkerlab.cli.options import (
     ConfigFile,
     DryRun,
     Force,
+    Full,
     Jobs,
     NoWait,
     Quiet,
@@ -72,6 +73,7 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         strides: Strides = None,
         runs: Runs = RUNS,
         jobs: Jobs = 1,
+        full: Full = False,
         force: Force = False,
         dry_run: DryRun = False,
         no_wait: NoWait = False,
@@ -85,9 +87,10 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
             from walkerlab.cli.stage import run_stage
 
             request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
-            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=jobs)
+            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=jobs, full=full)
 
-    meaningless = {name for name, has in {"strides": stage.walks, "jobs": uses_jobs(stage, graph)}.items() if not has}
+    meant = {"strides": stage.walks, "jobs": uses_jobs(stage, graph), "full": bool(graph.campaigns_of(stage.name))}
+    meaningless = {name for name, has in meant.items() if not has}
     signature = inspect.signature(command)
     options = [option for name, option in signature.parameters.items() if name not in meaningless]
     command.__signature__ = signature.replace(parameters=options)  # type: ignore[attr-defined]

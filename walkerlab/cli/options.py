@@ -18,6 +18,7 @@ Strides = Annotated[
     int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
 ]
 Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Processes for independent cells.")]
+Full = Annotated[bool, typer.Option("--full", help="Run the long campaign too; interrupted, it goes on the next time.")]
 Force = Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would happen and why; touch nothing.")]
 NoWait = Annotated[bool, typer.Option("--no-wait", help="Give up (exit 6) if another process works in the run folder.")]

@@ -15,16 +15,16 @@ from walkerlab.stages.runner import StageReport, execute, preview
 
 
 def run_stage(
-    request: Request, stage: Stage, graph: Graph, *, force: bool, dry_run: bool, wait: bool, jobs: int
+    request: Request, stage: Stage, graph: Graph, *, force: bool, dry_run: bool, wait: bool, jobs: int, full: bool
 ) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
     config, folder = request.resolved, request.folder
     if dry_run:
-        report = preview(config, stage.name, folder, force=force, graph=graph)
+        report = preview(config, stage.name, folder, force=force, full=full, graph=graph)
         show(request, as_json(report) | {"dry_run": True}, planned(report))
         return
     report = execute(
-        config, stage.name, folder, force=force, wait=wait, jobs=jobs, reporter=request.console, graph=graph
+        config, stage.name, folder, force=force, wait=wait, jobs=jobs, full=full, reporter=request.console, graph=graph
     )
     show(request, as_json(report), printed(report))
     if report.no_answer is not None:

@@ -84,3 +84,4 @@ class Stability(Block):
             sequence=True,
         ),
     ] = ()
+    map_cells: Annotated[int, key("1", "cells along each axis of the maps that --full makes", _HERE, ge=2, le=201)] = 25

@@ -13,6 +13,7 @@ from walkerlab.figures import (
     figure_10,
     figure_11,
     figure_12,
+    stability_maps,
 )
 from walkerlab.figures.illustration import Illustration
 
@@ -27,4 +28,5 @@ FIGURES: tuple[Illustration, ...] = (
     figure_11.FIGURE,
     figure_12.FIGURE,
     *accuracy.FIGURES,
+    *stability_maps.FIGURES,
 )

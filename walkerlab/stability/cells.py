@@ -10,6 +10,7 @@ from walkerlab.stability.catalogue import config_of
 from walkerlab.stability.contact_case import judge_contact
 from walkerlab.stability.known import PROBLEMS, Known
 from walkerlab.stability.ordinary import Choice, choices
+from walkerlab.stability.processes import in_order
 from walkerlab.stability.rigid_case import judge_rigid
 from walkerlab.stability.verdict import CaseResult
 
@@ -47,27 +48,9 @@ def cells_of(cases: Sequence[Case]) -> list[Cell]:
     return [*(KnownCell(index) for index in range(len(PROBLEMS))), *(CaseCell(case) for case in cases)]
 
 
-def run_cell(cell: Cell) -> Found:
-    """One piece; a function that other processes can be sent."""
-    return cell.run()
-
-
 def run_cells(cells: Sequence[Cell], jobs: int) -> Iterator[Found]:
     """The pieces' results in their order, whoever ran them."""
-    if jobs <= 1:
-        yield from map(run_cell, cells)
-        return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    # compiled here before several processes would each compile the same
-    ready = {index: run_cell(cells[index]) for index in first_of_each_model(cells)}
-    waiting = [cell for index, cell in enumerate(cells) if index not in ready]
-    # compiled code and threads do not survive a fork
-    with ProcessPoolExecutor(min(jobs, len(cells)), get_context("spawn")) as pool:
-        others = pool.map(run_cell, waiting)
-        for index in range(len(cells)):
-            yield ready[index] if index in ready else next(others)
+    return in_order(cells, jobs, first_of_each_model(cells))
 
 
 def first_of_each_model(cells: Sequence[Cell]) -> list[int]:

@@ -154,16 +154,22 @@ def library(
 
 
 def fixed(
-    case: str, h: float, ready: Prepared, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
+    case: str,
+    h: float,
+    ready: Prepared,
+    end: float,
+    reference: NDArray[np.float64],
+    units: NDArray[np.float64],
+    cap: int = CAP,
 ) -> Choice:
-    """Semi-implicit Euler with a fixed step."""
+    """Semi-implicit Euler with a fixed step, at most `cap` of them."""
     system = OnPads(ready.scene.walker, ready.scene.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
-    taken = int(semi_implicit_euler(system, y, end, h, CAP))
+    taken = int(semi_implicit_euler(system, y, end, h, cap))
     wall_s = time.perf_counter() - began
     arrived: NDArray[np.float64] | None = y
-    if taken == CAP and taken * h < end * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY)):
+    if taken == cap and taken * h < end * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY)):
         arrived = None
     return judged(case, f"semi-implicit Euler, {h:g} s", arrived, reference, units, taken, wall_s)
 

@@ -49,6 +49,8 @@ class Stage:
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
+    campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
+    keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     """
 
     name: str
@@ -62,6 +64,8 @@ class Stage:
     walks: bool = False
     has_cells: bool = False
     compiles_long: bool = False
+    campaign_of: str = ""
+    keeps_parts: bool = False
 
 
 class Graph:
@@ -85,6 +89,10 @@ class Graph:
             if stage.name in needed:
                 needed.update(stage.inputs(config))
         return tuple(stage for stage in self.stages if stage.name in needed)
+
+    def campaigns_of(self, target: str) -> tuple[Stage, ...]:
+        """What `--full` runs besides."""
+        return tuple(stage for stage in self.stages if stage.campaign_of == target)
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
@@ -143,8 +151,17 @@ PIPELINE = Graph(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
-        reads=("stability",),
+        reads=("stability.cases",),
         has_cells=True,
+    ),
+    Stage(
+        "stability-maps",
+        "walkerlab.stages.stability_maps",
+        "Map stability over stiffness, stiction velocity and step size; goes on where it was interrupted.",
+        reads=("stability.map_cells",),
+        has_cells=True,
+        campaign_of="stability",
+        keeps_parts=True,
     ),
     Stage(
         "plot",
@@ -152,7 +169,7 @@ PIPELINE = Graph(
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune"),
+        if_current=("accuracy", "tune", "stability-maps"),
         draws=True,
     ),
     Stage(
@@ -161,6 +178,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
+        if_current=("stability-maps",),
         draws=True,
     ),
 )

@@ -65,7 +65,8 @@ class Planner:
         for stage in stages:
             self.look_at_current(stage, stages)
             step = self.decide(stage)
-            self.expect(step)
+            if not (stage.campaign_of and step.action == "run"):  # a campaign is counted on once it is there
+                self.expect(step)
             steps.append(step)
         return tuple(steps)
 
@@ -126,6 +127,9 @@ class Planner:
         return Step(stage, "run", reason or "--force", identity, verdict.artifact, verdict.damaged)
 
     def _why_absent(self, name: str) -> str:
+        main = self.graph[name].campaign_of
+        if main:
+            return self.left_out.get(name, f"it was not asked for; `walkerlab {main} --full` makes it")
         return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
 
     def _why_left_out(self, stage: Stage) -> str | None:

@@ -21,6 +21,7 @@ from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
+from walkerlab.store.parts import Parts
 from walkerlab.store.runfolder import RunFolder
 
 __all__ = ["Done", "StageReport", "execute", "plan", "preview"]
@@ -69,6 +70,7 @@ def execute(
     force: bool = False,
     wait: bool = True,
     jobs: int = 1,
+    full: bool = False,
     reporter: Reporter | None = None,
     graph: Graph = PIPELINE,
 ) -> StageReport:
@@ -77,13 +79,14 @@ def execute(
     force  run the target and all it needs
     wait   for another process that works in the folder, and reuse what it made
     jobs   processes for stages with independent cells
+    full   run the target's campaigns too
 
     Raises ConfigError if the config has not what the target needs, LockedError (only without `wait`), StorageError.
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
     refuse_without_contact(graph[target], config)
-    stages = graph.needed_for(target, config)
+    stages = asked_for(target, config, graph, full)
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
     run = Run(planner, reporter or Silent(), jobs)
@@ -99,7 +102,13 @@ def execute(
 
 
 def preview(
-    config: Config, target: str, folder: RunFolder, *, force: bool = False, graph: Graph = PIPELINE
+    config: Config,
+    target: str,
+    folder: RunFolder,
+    *,
+    force: bool = False,
+    full: bool = False,
+    graph: Graph = PIPELINE,
 ) -> StageReport:
     """What `execute` would do, as the report it would give before anything has run; touches nothing.
 
@@ -109,9 +118,15 @@ def preview(
     refuse_without_contact(graph[target], config)
     planner = Planner(config, folder, graph, force)
     run = Run(planner, Silent(), jobs=1)
-    for step in planner.plan(graph.needed_for(target, config)):
+    for step in planner.plan(asked_for(target, config, graph, full)):
         run.skip(step)
     return run.report(graph[target], time.perf_counter() - started)
+
+
+def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[Stage, ...]:
+    """The stages that asking for a target means, in the order in which they run."""
+    stages = graph.needed_for(target, config)
+    return (*stages, *graph.campaigns_of(target)) if full else stages
 
 
 def refuse_without_contact(stage: Stage, config: Config) -> None:
@@ -178,20 +193,33 @@ class Run:
         begun = provenance.begin(self.planner.config, digests)
         complete = True
         try:
-            content = self._call(stage, inputs)
+            content = self._call(step, inputs)
         except NoAnswer as error:
             content, complete = unanswered(error), False
         path = self.folder.artifact(stage.name)
-        return artifact.write(path, content, identity, begun.until_now(), complete)
+        stored = artifact.write(path, content, identity, begun.until_now(), complete)
+        if stage.keeps_parts:
+            self._parts(step).forget()
+        return stored
 
-    def _call(self, stage: Stage, inputs: dict[str, Stored]) -> Content:
+    def _parts(self, step: Step) -> Parts:
+        """What an earlier run has left of a result."""
+        assert step.identity is not None, "a stage that is left out has no parts"
+        return Parts(self.folder.parts(step.stage.name), step.identity.key)
+
+    def _call(self, step: Step, inputs: dict[str, Stored]) -> Content:
         """Call a stage's `run` with what it declared and nothing else."""
+        stage = step.stage
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(stage.module).run
         self._announce_compilation()
         self.ahead.wait_for(stage)
         config = only(self.planner.config, stage.reads)
         extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
+        if stage.keeps_parts:
+            extra["parts"] = parts = self._parts(step)
+            if self.planner.force:
+                parts.forget()
         if stage.draws:
             extra |= {"folder": self.folder.path, "left_out": self.planner.missing_inputs(stage)}
             with drawing_into(self.folder.path):
@@ -214,11 +242,14 @@ class Run:
         """How it went."""
         result = self.planner.results.get(target.name)
         summary = dict(result.summary) if result is not None else {}
+        for campaign in self.planner.graph.campaigns_of(target.name):
+            if campaign.name in self.planner.results:
+                summary[campaign.name] = self.planner.results[campaign.name].summary
         return StageReport(
             stage=target.name,
             run_dir=self.folder.path,
             artifact=self.folder.artifact(target.name) if result is not None else None,
-            reused=self.done[-1].action == "reuse",
+            reused=any(done.stage == target.name and done.action == "reuse" for done in self.done),
             wall_s=wall_s,
             left_out=self._left_out(target, summary.pop("left_out", [])),
             summary=summary,
@@ -227,8 +258,13 @@ class Run:
         )
 
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
-        """Stages that were left out on the way, results that a drawing did without, and what the stage itself says."""
+        """Stages that were left out on the way, results that a drawing did without, and what the stage itself says.
+
+        A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
+        """
+        graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
+        found = [entry for entry in found if not graph[entry.what].campaign_of]
         found += [LeftOut(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         found += [LeftOut(str(entry["what"]), str(entry["why"])) for entry in by_stage]
         return tuple(dict.fromkeys(found))

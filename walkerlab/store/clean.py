@@ -19,7 +19,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
     """The artifacts of these stages, the files that they list, and what killed writers left; those that exist."""
     found = {path for pattern in (*DRAWN, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     for stage in stages:
-        found.add(folder.artifact(stage))
+        found |= {folder.artifact(stage), folder.parts(stage)}
         found.update(listed_files(folder, stage))
     return sorted(path for path in found if path.is_file() or path.is_symlink())
 

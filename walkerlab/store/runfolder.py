@@ -36,6 +36,10 @@ class RunFolder:
         """The file of a stage's result."""
         return self.path / f"{stage}.h5"
 
+    def parts(self, stage: str) -> Path:
+        """The file of what there is of a stage's result while it is in the making."""
+        return self.path / f"{stage}.parts"
+
     @contextlib.contextmanager
     def locked(self, wait: bool = True, say: Callable[[str], None] | None = None) -> Iterator[None]:
         """Hold the folder's lock, which the system takes back when this process ends, in whatever way.

@@ -12,6 +12,7 @@ GRAPH = Graph(
     Stage("roll", "toy.roll", "Roll on.", ("gravity", "start", "strides"), drop_unless_start_is_given, walks=True),
     Stage("bounce", "toy.bounce", "Bounce.", ("contact",), results_of("drop"), needs_contact=True),
     Stage("survey", "toy.survey", "Time it.", ("seed",), has_cells=True),
+    Stage("census", "toy.census", "Count the stones.", ("seed",), campaign_of="survey", keeps_parts=True),
     Stage(
         "picture",
         "toy.picture",
@@ -27,6 +28,7 @@ GRAPH = Graph(
         "Write it up.",
         ("name",),
         results_of("drop", "roll", "bounce", "survey", "picture"),
+        if_current=("census",),
         draws=True,
     ),
 )

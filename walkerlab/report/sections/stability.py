@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import Block, Body, Cell, Column, Paragraph, Section, Table, Tone, body, table
-from walkerlab.report.numbers import count, number
+from walkerlab.report.numbers import count, listed, number
 from walkerlab.report.results import Results
 
 VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
@@ -23,6 +23,7 @@ def section(results: Results) -> Section | None:
     blocks: list[Block] = [*failures(cases, known), passed(summary), case_table(cases), known_table(known)]
     if summary["ordinary"]:
         blocks.append(ordinary_table(summary))
+    blocks.append(maps(results))
     return Section("stability", "Stiff and extreme cases", tuple(blocks))
 
 
@@ -54,6 +55,24 @@ def passed(summary: Mapping[str, Any]) -> Paragraph:
         "tenfold tolerance and by another method; walkers of other sizes also agree with a twin of ordinary size."
     )
     return Paragraph(f"{summary['passed']} of {count(total, 'case')} and known problems came out right. {judged}")
+
+
+def maps(results: Results) -> Paragraph:
+    """What the maps came to, or how to make them."""
+    summary = results.summary("stability-maps")
+    if summary is None:
+        return Paragraph(
+            "`walkerlab stability --full` maps whole planes too: stiffness and stiction velocity by the default "
+            "method, stiffness and step size by a game engine’s. It takes minutes, and goes on where it is interrupted."
+        )
+    ends = listed(f"{many} {name}" for name, many in summary["outcomes"].items())
+    fixed = listed(f"{many} {name}" for name, many in summary["fixed_step"].items())
+    return Paragraph(
+        f"Two of the figures map whole planes. Over stiffness and stiction velocity the default method’s walks ended: "
+        f"{ends}; {summary['ends_otherwise_sharper']} end otherwise at a tenfold tolerance, the others differ by "
+        f"{number(summary['median_error'], 2)} in the median and {number(summary['largest_error'], 2)} at most. Over "
+        f"stiffness and step size a game engine’s method was: {fixed}."
+    )
 
 
 def case_table(cases: Rows) -> Table:

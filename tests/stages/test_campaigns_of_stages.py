@@ -1,0 +1,94 @@
+"""Long campaigns: run with `--full` only, kept once there, and gone on with where a run was cut off."""
+
+import pytest
+
+from walkerlab.cli.status import state_of
+from walkerlab.stages.plan import survey
+from walkerlab.store.artifact import read
+
+
+def actions(report):
+    return {done.stage: done.action for done in report.steps}
+
+
+def states(toy, *sets):
+    config, folder = toy.loaded(*sets)
+    return {step.stage.name: state_of(step) for step in survey(config, folder, toy.graph)}
+
+
+def cut_off(toy, monkeypatch, after, **options):
+    """A run of the census that is interrupted after so many stones."""
+    monkeypatch.setenv("TOY_STONES", str(after))
+    with pytest.raises(KeyboardInterrupt):
+        toy.execute("census", **options)
+    monkeypatch.delenv("TOY_STONES")
+
+
+def test_only_full_runs_it(toy):
+    assert actions(toy.execute("survey")) == {"survey": "run"}
+    report = toy.execute("survey", full=True)
+    assert actions(report) == {"survey": "reuse", "census": "run"}
+    assert report.reused
+    assert report.summary["census"]["stones"] == [0.1 * number for number in range(4)]
+
+
+def test_what_is_there_is_neither_lost_nor_made_anew(toy):
+    toy.execute("survey", full=True)
+    before = (toy.runs / "paper" / "census.h5").stat().st_mtime_ns
+    assert actions(toy.execute("survey", full=True)) == {"survey": "reuse", "census": "reuse"}
+    assert "census" not in actions(toy.execute("page"))
+    toy.execute("survey", force=True)
+    assert (toy.runs / "paper" / "census.h5").stat().st_mtime_ns == before
+    assert "census" in (toy.runs / "paper" / "report.html").read_text().partition("]")[0]
+
+
+def test_a_page_without_it_says_how_to_make_it_and_is_made_anew_once_it_is_there(toy):
+    toy.execute("page")
+    assert (
+        "<p>census: it was not asked for; `walkerlab survey --full` makes it</p>"
+        in (toy.runs / "paper" / "report.html").read_text()
+    )
+    toy.execute("survey", full=True)
+    assert actions(toy.execute("page"))["page"] == "run"
+
+
+def test_nothing_is_stale_without_it(toy):
+    toy.execute("page")
+    assert states(toy)["census"] == "not run"
+    toy.execute("survey", full=True)
+    assert states(toy)["census"] == "current"
+    toy.edit("census", "0.1 * number", "0.2 * number")
+    assert states(toy)["census"] == "outdated"
+
+
+def test_it_goes_on_where_it_was_cut_off_and_comes_to_the_same(toy, monkeypatch):
+    toy.execute("census", config="rigid-only")
+    cut_off(toy, monkeypatch, after=3)
+    journal = toy.runs / "paper" / "census.parts"
+    assert journal.read_bytes().count(b"\n") == 1 + 3
+    monkeypatch.setenv("TOY_STONES", "1")  # three of four are there
+    toy.execute("census")
+    assert not journal.exists()
+    undisturbed = read(toy.runs / "rigid-only" / "census.h5")
+    assert read(toy.runs / "paper" / "census.h5").digest() == undisturbed.digest()
+
+
+def test_parts_of_another_key_are_of_no_use(toy, monkeypatch):
+    cut_off(toy, monkeypatch, after=3)
+    toy.edit("census", "0.1 * number", "0.2 * number")
+    monkeypatch.setenv("TOY_STONES", "3")
+    with pytest.raises(KeyboardInterrupt):
+        toy.execute("census")
+
+
+def test_force_begins_anew(toy, monkeypatch):
+    cut_off(toy, monkeypatch, after=3)
+    cut_off(toy, monkeypatch, after=2, force=True)
+    assert (toy.runs / "paper" / "census.parts").read_bytes().count(b"\n") == 1 + 2
+
+
+def test_a_preview_tells_of_it(toy):
+    config, folder = toy.loaded()
+    from walkerlab.stages.runner import preview
+
+    assert actions(preview(config, "survey", folder, full=True, graph=toy.graph)) == {"survey": "run", "census": "run"}

@@ -1,0 +1,17 @@
+"""Count the stones one by one; a run may be cut off after as many as the test says."""
+
+import os
+
+from walkerlab.store.content import Content
+
+
+def run(config, inputs, progress, parts):
+    stones = [f"stone {number}" for number in range(4)]
+    counted_now = 0
+    for number, stone in enumerate(stones):
+        if stone not in parts.kept:
+            if counted_now == int(os.environ.get("TOY_STONES", 4)):
+                raise KeyboardInterrupt
+            parts.keep(stone, [0.1 * number])
+            counted_now += 1
+    return Content({}, {"stones": [parts.kept[stone][0] for stone in stones], "seed": config.seed})

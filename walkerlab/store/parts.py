@@ -1,0 +1,79 @@
+"""Parts of a result that is long in the making, kept so that a run that was cut off goes on where it stopped.
+
+A journal beside the artifact: a line for each part, each with a checksum, the first line with the key of the result
+they belong to. Lines are only ever added; a last one that was cut short is dropped.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from pathlib import Path
+
+from walkerlab.store.files import storing
+
+Numbers = list[float]
+
+
+class Parts:
+    """The parts of one result."""
+
+    def __init__(self, path: Path, key: str) -> None:
+        """Take up what a run with the same key has left at `path`; anything else is begun anew with the first part."""
+        self.path, self.key = path, key
+        self.kept: dict[str, Numbers] = {}
+        self._intact = 0  # bytes of the file that are to be kept
+        self._load()
+
+    def keep(self, name: str, numbers: Numbers) -> None:
+        """Add a part; StorageError if the system refuses."""
+        self.kept[name] = numbers
+        with storing(self.path), self.path.open("r+b" if self._intact else "wb") as file:
+            file.truncate(self._intact)
+            file.seek(self._intact)
+            if not self._intact:
+                file.write(line([self.key]))
+            file.write(line([name, numbers]))
+            file.flush()
+            os.fsync(file.fileno())
+            self._intact = file.tell()
+
+    def forget(self) -> None:
+        """Remove all parts; StorageError if the system refuses."""
+        self.kept, self._intact = {}, 0
+        with storing(self.path):
+            self.path.unlink(missing_ok=True)
+
+    def _load(self) -> None:
+        try:
+            lines = self.path.read_bytes().splitlines(keepends=True)
+        except OSError:
+            return
+        if not lines or lines[0] != line([self.key]):
+            return
+        self._intact = len(lines[0])
+        for text in lines[1:]:
+            part = part_in(text)
+            if part is None:
+                return
+            self.kept[part[0]] = part[1]
+            self._intact += len(text)
+
+
+def line(value: object) -> bytes:
+    """A value as a line with its checksum; numbers read back as they were."""
+    text = json.dumps(value, allow_nan=False).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+def part_in(text: bytes) -> tuple[str, Numbers] | None:
+    """The part in a line; None if the line is not whole."""
+    checksum, _, rest = text.partition(b" ")
+    if not rest.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(rest[:-1]):
+        return None
+    try:
+        name, numbers = json.loads(rest)
+        return str(name), [float(number) for number in numbers]
+    except (ValueError, TypeError):
+        return None
