@@ -1,18 +1,22 @@
 """Kill -9 runs at random moments, and check after each that no broken result is accepted and the next run completes.
 
     python scripts/kill_campaign.py                      # 200 kills of forced rigid-only runs
-    python scripts/kill_campaign.py --stage report --config paper --kills 20
-    python scripts/kill_campaign.py --together 8         # eight reports on one folder at once
+    python scripts/kill_campaign.py --stage report --config paper --kills 20 --spread
+    python scripts/kill_campaign.py --stage report --config paper --together 2 8   # so many on one folder at once
 
 Half of the moments fall anywhere in a run, half are when a file of the folder has just begun to change.
+With --spread the moments fall on all results alike: each time another one is missing from a whole folder and being made
+when the run is killed, so that a kill takes no longer than its result.
 Prints a table in Markdown; exits 1 if anything was lost.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,12 +24,14 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 from walkerlab.store import artifact
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 LONGEST_S = 600.0
+LOCK = ".lock"
 
 
 def command(stage: str, config: str, runs: Path, *options: str) -> list[str]:
@@ -38,7 +44,7 @@ def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         arguments,
         env=ENVIRONMENT,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -54,9 +60,11 @@ def finish(arguments: Sequence[str]) -> tuple[int, str, float]:
 
 
 def state_of(folder: Path) -> dict[str, tuple[int, int]]:
-    """Sizes and times of all files, to see when one begins to change."""
+    """Sizes and times of all files but the lock, to see when one begins to change."""
     found = {}
     for path in folder.rglob("*"):
+        if path.name == LOCK:
+            continue
         try:
             status = path.stat()
         except OSError:
@@ -98,44 +106,98 @@ def unreadable(runs: Path) -> list[str]:
     return broken
 
 
+class Campaign:
+    """Kills of one kind of run, one after another, and what they did."""
+
+    def __init__(self, stage: str, config: str, seed: int, place: Path) -> None:
+        """Nothing is killed yet; the undisturbed run and the disturbed ones are in folders of `place`."""
+        self.stage, self.config, self.drawn = stage, config, random.Random(seed)
+        self.undisturbed, self.runs = place / "undisturbed", place / "runs"
+        self.moments: Counter[str] = Counter()
+        self.lost: list[str] = []
+        self.code, self.expected = 0, {}
+
+    def undisturbed_run(self, *options: str) -> float:
+        """What each disturbed run is held against; returns its time (s)."""
+        self.code, said, took_s = finish(command(self.stage, self.config, self.undisturbed, *options))
+        if self.code not in (0, 4):
+            raise SystemExit(f"the undisturbed run exits {self.code}: {said}")
+        self.expected = digests(self.undisturbed)
+        return took_s
+
+    def kill(self, most_s: float, about: str, *options: str) -> None:
+        """Kill a run within so many seconds, look what is there, and run again."""
+        at_write, delay_s = self.drawn.random() < 0.5, self.drawn.uniform(0.0, most_s)
+        process = start(command(self.stage, self.config, self.runs, *options))
+        moment = kill_at(process, self.runs, delay_s, at_write)
+        self.moments[moment] += 1
+        number = sum(self.moments.values())
+        self.lost += [f"kill {number}, {about}: {broken}" for broken in unreadable(self.runs)]
+        code, said, _ = finish(command(self.stage, self.config, self.runs))
+        if code != self.code:
+            self.lost.append(f"kill {number}, {about}: the next run exits {code}: {said[-500:]}")
+        else:
+            found = digests(self.runs)
+            differ = sorted(name for name in {*found, *self.expected} if found.get(name) != self.expected.get(name))
+            if differ:
+                self.lost.append(f"kill {number}, {about}: not those of the undisturbed run: {', '.join(differ)}")
+        print(f"kill {number}, {about}, {moment}: {len(self.lost)} lost so far", file=sys.stderr, flush=True)
+
+
 def campaign(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Kill, look, run again, compare; returns when the kills were and everything that was lost."""
-    drawn = random.Random(seed)
-    moments: Counter[str] = Counter()
-    lost: list[str] = []
+    """Kill forced runs; returns when the kills were and everything that was lost."""
     with tempfile.TemporaryDirectory() as place:
-        undisturbed, runs = Path(place) / "undisturbed", Path(place) / "runs"
-        finish(command(stage, config, undisturbed))
-        code, said, usual_s = finish(command(stage, config, undisturbed, "--force"))
-        if code not in (0, 4):
-            return moments, [f"the undisturbed run exits {code}: {said}"]
-        expected = digests(undisturbed)
+        one = Campaign(stage, config, seed, Path(place))
+        one.undisturbed_run()
+        usual_s = one.undisturbed_run("--force")
+        one.runs.mkdir()
+        for _ in range(kills):
+            one.kill(usual_s, "forced", "--force")
+        return one.moments, one.lost
+
+
+def spread(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Kill runs that make one missing result of a whole folder, each result in turn."""
+    with tempfile.TemporaryDirectory() as place:
+        one = Campaign(stage, config, seed, Path(place))
+        one.undisturbed_run()
+        starting_s = one.undisturbed_run()
+        makings = {path: making_s(one.undisturbed / path) for path in one.expected}
         for number in range(kills):
-            runs.mkdir(exist_ok=True)
-            process = start(command(stage, config, runs, "--force"))
-            moments[kill_at(process, runs, drawn.uniform(0.0, usual_s), drawn.random() < 0.5)] += 1
-            lost += [f"kill {number}: {broken}" for broken in unreadable(runs)]
-            again, said, _ = finish(command(stage, config, runs))
-            if again != code:
-                lost.append(f"kill {number}: the next run exits {again}: {said[-500:]}")
-            elif digests(runs) != expected:
-                lost.append(f"kill {number}: results differ from the undisturbed run's")
-    return moments, lost
+            missing = list(makings)[number % len(makings)]
+            shutil.rmtree(one.runs, ignore_errors=True)
+            shutil.copytree(one.undisturbed, one.runs)
+            (one.runs / missing).unlink()
+            one.kill(starting_s + makings[missing], f"{Path(missing).stem} missing")
+        return one.moments, one.lost
 
 
-def together(stage: str, config: str, count: int) -> list[str]:
-    """Start several runs on one folder at once; returns what went wrong."""
-    wrong = []
+def making_s(path: Path) -> float:
+    """How long (s) a result took to be made."""
+    origin = artifact.read(path).provenance
+    return (datetime.fromisoformat(origin.ended_utc) - datetime.fromisoformat(origin.started_utc)).total_seconds()
+
+
+def together(stage: str, config: str, counts: Sequence[int]) -> list[str]:
+    """Start several runs on one folder at once, so many and then so many; returns what went wrong."""
+    wrong: list[str] = []
     with tempfile.TemporaryDirectory() as place:
-        runs, alone = Path(place) / "runs", Path(place) / "alone"
-        processes = [start(command(stage, config, runs)) for _ in range(count)]
-        for process in processes:
-            _, said = process.communicate(timeout=LONGEST_S)
-            if process.returncode not in (0, 4):
-                wrong.append(f"one of {count} exits {process.returncode}: {said[-500:]}")
-        finish(command(stage, config, alone))
-        if digests(runs) != digests(alone):
-            wrong.append(f"{count} at once give other results than one")
+        alone = Path(place) / "alone"
+        usual_code, _, _ = finish(command(stage, config, alone))
+        for count in counts:
+            runs = Path(place) / f"{count}"
+            processes = [start(command(stage, config, runs, "--json")) for _ in range(count)]
+            made: Counter[str] = Counter()
+            for process in processes:
+                printed, said = process.communicate(timeout=LONGEST_S)
+                if process.returncode != usual_code:
+                    wrong.append(f"one of {count} exits {process.returncode}: {said[-500:]}")
+                    continue
+                made.update(done["stage"] for done in json.loads(printed)["stages"] if done["action"] == "run")
+            wrong += [f"{count} at once make {name} {times} times" for name, times in made.items() if times > 1]
+            if digests(runs) != digests(alone):
+                wrong.append(f"{count} at once give other results than one")
+            print(f"{count} at once: {len(wrong)} wrong so far", file=sys.stderr, flush=True)
     return wrong
 
 
@@ -146,20 +208,22 @@ def main() -> int:
     parser.add_argument("--config", default="rigid-only")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--together", type=int, default=0, metavar="N", help="instead: N runs at once")
+    parser.add_argument("--spread", action="store_true", help="kill while each of the results is made in turn")
+    parser.add_argument("--together", type=int, nargs="+", metavar="N", help="instead: N runs at once")
     asked = parser.parse_args()
     began = time.perf_counter()
     if asked.together:
         wrong = together(asked.stage, asked.config, asked.together)
-        print(
-            f"| {asked.together} x {asked.stage} at once | {len(wrong)} wrong | {time.perf_counter() - began:.0f} s |"
-        )
+        counts = " and ".join(map(str, asked.together))
+        print(f"| {counts} x {asked.stage} ({asked.config}) at once | {len(wrong)} wrong |")
     else:
-        moments, wrong = campaign(asked.stage, asked.config, asked.kills, asked.seed)
+        kill = spread if asked.spread else campaign
+        moments, wrong = kill(asked.stage, asked.config, asked.kills, asked.seed)
         print(f"| killed {asked.stage} ({asked.config}) | times |\n|---|---|")
         for when, times in sorted(moments.items()):
             print(f"| {when} | {times} |")
-        print(f"| lost or broken | {len(wrong)} |\n| time | {time.perf_counter() - began:.0f} s |")
+        print(f"| lost or broken | {len(wrong)} |")
+    print(f"\n{time.perf_counter() - began:.0f} s")
     print("\n".join(wrong), file=sys.stderr)
     return 1 if wrong else 0
 

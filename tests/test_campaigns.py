@@ -55,8 +55,14 @@ def test_killed_runs_lose_nothing(kill):
     assert sum(moments.values()) == 4
 
 
+def test_runs_killed_while_each_result_is_made_lose_nothing(kill):
+    moments, lost = kill.spread("simulate", "rigid-only", kills=2, seed=1)
+    assert lost == []
+    assert sum(moments.values()) == 2
+
+
 def test_two_runs_at_once_do_not_disturb_each_other(kill):
-    assert kill.together("simulate", "rigid-only", 2) == []
+    assert kill.together("simulate", "rigid-only", [2]) == []
 
 
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])

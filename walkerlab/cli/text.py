@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 INDENT = "  "
+LONGEST_CELL = 100
+"""Letters; a column with longer cells, which are sentences, is left out of a table."""
 
 
 def described_summary(summary: Mapping[str, Any], indent: str = INDENT) -> Iterator[str]:
@@ -28,9 +30,13 @@ def is_rows(value: Any) -> bool:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Objects as rows of a table, their keys as its head."""
+    """Objects as rows of a table, their keys as its head; below it what has no room there."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
-    return aligned([columns, *([in_words(row[key]) if key in row else "" for key in columns] for row in rows)])
+    cells = {key: [in_words(row[key]) if key in row else "" for row in rows] for key in columns}
+    shown = [key for key in columns if max(map(len, cells[key])) <= LONGEST_CELL] or columns
+    long = [key for key in columns if key not in shown]
+    lines = aligned([shown, *([cells[key][row] for key in shown] for row in range(len(rows)))])
+    return [*lines, f"with --json also: {', '.join(long)}"] if long else lines
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
