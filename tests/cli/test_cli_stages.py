@@ -35,7 +35,7 @@ def test_json_is_one_object_with_the_fixed_keys(toy):
     assert first["artifact"] == "runs/paper@strides=3/roll.h5"
     assert first["reused"] is False
     assert first["steps"] == 6
-    assert first["left_out"] == [{"what": "forces", "why": "a stone has none"}]
+    assert first["left_out"] == [{"what": "forces", "why": "a stone has none", "saves": ""}]
     assert [(done["stage"], done["action"]) for done in first["stages"]] == [("drop", "run"), ("roll", "run")]
     assert one_object(toy("roll", "--json", "--strides", "3"))["reused"] is True
 
@@ -70,7 +70,9 @@ def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
     assert not list(toy.folder.iterdir())
     plan = one_object(toy("page", "--config", "rigid-only", "--dry-run", "--json"))
     assert plan["dry_run"] is True
-    assert plan["left_out"] == [{"what": "bounce", "why": "the config has no contact block"}]
+    (entry,) = plan["left_out"]
+    assert (entry["what"], entry["why"]) == ("bounce", "the config has no contact block")
+    assert "compiling" in entry["saves"]
     assert {step["reason"] for step in plan["stages"]} == {"not there yet", "the config has no contact block"}
 
 

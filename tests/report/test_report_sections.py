@@ -98,20 +98,24 @@ def test_what_was_never_wanted_is_no_failure():
 
 
 def test_all_that_is_missing_is_listed_with_its_reason():
-    walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs"}])
+    walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs", "saves": "2 numbers"}])
     found = sections([], absent=WITHOUT_GAIT, simulate=walk)["left-out"]
     assert rows(found) == {
-        "fixedpoint": [NO_GAIT],
-        "simulate and contact-sim": ["for want of fixedpoint"],
-        "forces": ["not among the outputs"],
+        "fixedpoint": [NO_GAIT, ""],
+        "simulate and contact-sim": ["for want of fixedpoint", ""],
+        "forces": ["not among the outputs", "2 numbers"],
     }
 
 
 def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
     why = "the config has no contact block"
-    absent = [Absent("contact-sim", why), Absent("compare", why), Absent("figure 6", f"it needs contact-sim: {why}")]
+    absent = [Absent(name, why, saves="contact code") for name in ("contact-sim", "compare")]
+    absent.append(Absent("figure 6", f"it needs contact-sim: {why}"))
     found = sections([], absent=absent)["left-out"]
-    assert rows(found) == {"contact-sim and compare": [why], "figure 6": ["for want of contact-sim and compare"]}
+    assert rows(found) == {
+        "contact-sim and compare": [why, "contact code"],
+        "figure 6": ["for want of contact-sim and compare", ""],
+    }
 
 
 def test_nothing_missing_is_said_too():
@@ -303,7 +307,7 @@ def test_a_section_is_one_function_and_one_entry():
 
 
 def test_the_report_loads_no_plotting_and_no_compiler():
-    heavy = ("matplotlib", "numba", "scipy", "walkerlab.physics", "walkerlab.scene")
+    heavy = ("matplotlib", "numba", "scipy", "walkerlab.physics", "walkerlab.scene.rigid")
     code = f"import sys, walkerlab.stages.report; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

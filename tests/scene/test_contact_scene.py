@@ -12,7 +12,8 @@ from walkerlab.config.loader import load
 from walkerlab.gait.contact_signals import feet_motion, hip_height
 from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
-from walkerlab.scene.contact import contact_scene, damping_ratio, left_out, start_state, static_penetration
+from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
+from walkerlab.scene.left_out import of_contact_walk
 
 STEP = 0.3714
 
@@ -73,7 +74,7 @@ def test_a_scene_without_friction_has_another_law_not_a_zero():
     config = load(None, ("contact.friction=none",)).config
     scene = contact_scene(config, STEP)
     assert isinstance(scene.walker.friction, Frictionless)
-    assert any("friction" in row["why"] for row in left_out(config))
+    assert any("friction" in row["why"] for row in of_contact_walk(config))
 
 
 def test_pads_are_laid_by_the_step_that_the_config_asks_for():

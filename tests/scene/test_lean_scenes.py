@@ -17,10 +17,14 @@ from walkerlab.physics.contact.friction import Coulomb, Frictionless
 from walkerlab.physics.contact.motion import OnGround
 from walkerlab.physics.multibody.parts import Assembly, Body, Particle
 from walkerlab.physics.system import derivative, jacobian
+from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.scene.rigid import SWING_EQUATIONS
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.runner import execute, preview
+from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.6, -0.86)
 NO_FRICTION = Coulomb(0.0, 0.0, 0.1, 1.0)
@@ -161,3 +165,38 @@ def test_outputs_that_are_asked_for_are_those_of_the_full_result(walks, stage):
         same = {key: value for key, value in part.summary.items() if key != "left_out"}
         assert same == {key: value for key, value in full.summary.items() if key != "left_out"}
     assert seen == {(path, name) for path, group in full.groups.items() for name in group.variables}
+
+
+@pytest.mark.parametrize(
+    ("stage", "numbers"),
+    [(simulate, left_out.RIGID_NUMBERS), (contact_sim, left_out.CONTACT_NUMBERS)],
+    ids=["simulate", "contact_sim"],
+)
+@pytest.mark.parametrize("output", ["states", "energies", "forces"])
+def test_what_an_output_is_said_to_take_is_what_it_takes(walks, stage, numbers, output):
+    group = walks[stage][(output,)]["trajectory"]
+    samples = group["time"].size
+    columns = [variable.values.size / samples for variable in group.variables.values() if variable.units != "1"]
+    assert sum(columns) - 1 == numbers[output]  # the time itself
+
+
+def test_what_a_scene_is_said_to_save_is_what_it_saves():
+    said = left_out.of_contact_walk(load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config)
+    saved = {entry["what"]: entry["saves"] for entry in said}
+    assert saved["tangential velocity and friction force"].startswith(f"{ALONG - STICKS_FORWARD} of the {ALONG} ")
+    scene = contact_scene(load(None, ("contact.stance=pinned",)).config, 0.3714)
+    free, hinged = len(scene.walker.blank), len(scene.pinned.blank)
+    assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")
+    rigid = left_out.of_rigid_walk(load(None, ("outputs=[]",)).config)
+    assert rigid[0]["saves"].startswith(f"{free - SWING_EQUATIONS} of {free} ")
+    assert all(entry["what"] and entry["why"] and entry["saves"] for entry in (*said, *rigid))
+
+
+@pytest.mark.parametrize("sets", [("outputs=[]", "contact.friction=none"), ("walker.leg_inertia_kg_m2=0.1",)])
+def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
+    """A preview knows it from the config; nothing has run."""
+    found = load(None, (*sets, "strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714"))
+    folder = RunFolder(tmp_path, found.run_name)
+    before = preview(found.config, "contact-sim", folder).left_out
+    assert execute(found.config, "contact-sim", folder).left_out == before
+    assert any(entry.saves for entry in before)

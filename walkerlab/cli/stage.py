@@ -69,5 +69,8 @@ def planned(report: StageReport) -> str:
 
 
 def left_out_lines(report: StageReport) -> list[str]:
-    """What was left out, and why."""
-    return [f"left out: {entry.what} ({entry.why})" for entry in report.left_out]
+    """What was left out, why, and what that saves."""
+    return [
+        f"left out: {entry.what} ({entry.why})" + (f"; saves {entry.saves}" if entry.saves else "")
+        for entry in report.left_out
+    ]

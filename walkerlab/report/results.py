@@ -14,11 +14,12 @@ from walkerlab.store.content import Group
 
 @dataclass(frozen=True)
 class Absent:
-    """Something that was not computed, and why; `failed` if it was tried and has no answer."""
+    """Something that was not computed, why, and what that saves; `failed` if it was tried and has no answer."""
 
     what: str
     why: str
     failed: bool = False
+    saves: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,23 +147,6 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*hinged[:4], rolled if scene.pinned is None else hinged[4], *hinged[5:])
 
 
-def left_out(config: Config) -> tuple[dict[str, str], ...]:
-    """What the scene of a config does without, and why."""
-    contact = with_contact(config)
-    rows: list[tuple[bool, str, str]] = [
-        (contact.friction == "none", "tangential velocity and friction force", "contact.friction is none"),
-        (
-            contact.stance == "pinned",
-            "floating base and stance contact in the first step",
-            "contact.stance is pinned: two angles suffice",
-        ),
-        ("states" not in config.outputs, "trajectory of the contact walk", "outputs does not ask for states"),
-        ("energies" not in config.outputs, "energies of the contact walk", "outputs does not ask for energies"),
-        ("forces" not in config.outputs, "forces of the contact walk", "outputs does not ask for forces"),
-    ]
-    return tuple({"what": what, "why": why} for absent, what, why in rows if absent)
-
-
 def static_penetration(scene: ContactScene) -> float:
     """Penetration (m) under the walker's whole weight on one foot."""
     law, walker = scene.walker.normal, scene.walker

@@ -26,7 +26,6 @@ class RigidScene:
     states: bool  # whether angles and velocities in time are wanted
     energies: bool
     forces: bool
-    left_out: tuple[dict[str, str], ...]
 
     @property
     def sampled(self) -> bool:
@@ -39,18 +38,12 @@ def rigid_scene(config: Config) -> RigidScene:
     settings = config.solver.rigid
     method = method_named(settings.method).new(SWING_EQUATIONS, settings.rtol, settings.atol, ENDLESS)
     wanted = config.outputs
-    left_out = tuple(
-        {"what": f"{output} of the rigid walk in time", "why": f"outputs does not ask for {output}"}
-        for output in ("states", "energies", "forces")
-        if output not in wanted
-    )
     return RigidScene(
         walker=rigid_walker(config, config.equations),
         method=method,
         states="states" in wanted,
         energies="energies" in wanted,
         forces="forces" in wanted,
-        left_out=left_out,
     )
 
 

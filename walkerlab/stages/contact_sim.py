@@ -19,7 +19,8 @@ from walkerlab.gait.contact_run import (
 )
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.contact.terrain import Checkerboard
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, left_out, scene_measures, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
+from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -119,7 +120,7 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         "jacobians": int(result.work[3]),
         "slope_rad": scene.walker.slope,
         **scene_measures(scene),
-        "left_out": list(left_out(config)),
+        "left_out": list(of_contact_walk(config)),
     }
 
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 Inputs = Callable[["Config"], tuple[str, ...]]
+Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
-def nothing(_config: Config) -> tuple[str, ...]:
-    """No results of other stages."""
+def nothing(_config: Config) -> tuple[Any, ...]:
+    """No results of other stages, or nothing that is left out."""
     return ()
 
 
@@ -51,6 +54,7 @@ class Stage:
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
+    does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
     name: str
@@ -66,6 +70,7 @@ class Stage:
     compiles_long: bool = False
     campaign_of: str = ""
     keeps_parts: bool = False
+    does_without: Lacks = nothing
 
 
 class Graph:
@@ -112,6 +117,7 @@ PIPELINE = Graph(
         reads=(*MODEL, "solver.rigid"),
         inputs=gait_unless_start_is_given,
         walks=True,
+        does_without=of_rigid_walk,
     ),
     Stage(
         "contact-sim",
@@ -122,6 +128,7 @@ PIPELINE = Graph(
         needs_contact=True,
         walks=True,
         compiles_long=True,
+        does_without=of_contact_walk,
     ),
     Stage(
         "tune",

@@ -21,10 +21,19 @@ Action = Literal["reuse", "run", "leave out"]
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that was not computed, and why."""
+    """Something that was not computed, why, and what that saves, if anything but the work itself."""
 
     what: str
     why: str
+    saves: str = ""
+
+
+NO_CONTACT = "the config has no contact block"
+
+
+def left_out(stage: str, why: str) -> LeftOut:
+    """A stage that does not run."""
+    return LeftOut(stage, why, "loading and compiling contact code" if why == NO_CONTACT else "")
 
 
 @dataclass(frozen=True)
@@ -107,7 +116,7 @@ class Planner:
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
         """The results that a stage does without, and why."""
         wanted = (*stage.inputs(self.config), *stage.if_current)
-        return tuple(LeftOut(name, self._why_absent(name)) for name in wanted if name not in self._keys)
+        return tuple(left_out(name, self._why_absent(name)) for name in wanted if name not in self._keys)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
         why = self._why_left_out(stage)
@@ -134,7 +143,7 @@ class Planner:
 
     def _why_left_out(self, stage: Stage) -> str | None:
         if stage.needs_contact and self.config.contact is None:
-            return "the config has no contact block"
+            return NO_CONTACT
         if stage.draws:
             return None
         for name in stage.inputs(self.config):

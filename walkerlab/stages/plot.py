@@ -45,7 +45,10 @@ def run(
             remove(figure, folder)
             missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
-    return Content({index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing})
+    # captions of measured run times are among them
+    return Content(
+        {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
+    )
 
 
 def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int]:

@@ -61,7 +61,7 @@ def whole(config: Config) -> Config:
 def absent(config: Config, left_out: Sequence[LeftOut]) -> tuple[Absent, ...]:
     """What there is no result of; what was tried itself, and not given up for want of another, has failed."""
     names = {entry.what for entry in left_out}
-    return tuple(Absent(entry.what, entry.why, has_failed(config, entry.what, names)) for entry in left_out)
+    return tuple(Absent(one.what, one.why, has_failed(config, one.what, names), one.saves) for one in left_out)
 
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:

@@ -15,7 +15,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.ahead import Ahead
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, no_answer, plan
+from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, left_out, no_answer, plan
 from walkerlab.stages.progress import Reporter, Silent
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
@@ -258,15 +258,19 @@ class Run:
         )
 
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
-        """Stages that were left out on the way, results that a drawing did without, and what the stage itself says.
+        """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
 
         A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
         """
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
         found = [entry for entry in found if not graph[entry.what].campaign_of]
-        found += [LeftOut(done.stage, done.reason) for done in self.done if done.action == "leave out"]
-        found += [LeftOut(str(entry["what"]), str(entry["why"])) for entry in by_stage]
+        found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
+        entries = [*by_stage]
+        for done in self.done:
+            if done.action != "leave out":
+                entries += graph[done.stage].does_without(self.planner.config)
+        found += [LeftOut(str(entry["what"]), str(entry["why"]), str(entry.get("saves", ""))) for entry in entries]
         return tuple(dict.fromkeys(found))
 
     def _no_answer(self, said: dict[str, str] | None) -> NoAnswer | None:

@@ -12,6 +12,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.gait.recorded_walk import RecordedWalk, Samples, as_state, take_walk
 from walkerlab.gait.rigid_measures import energies, reactions
 from walkerlab.physics.system import State
+from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import COORDINATES, RigidScene, rigid_scene
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -25,7 +26,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     steps = 2 * config.strides
     progress.start("simulate", steps)
     walk = take_walk(scene.walker, scene.method, start_state(config, inputs), steps, scene.sampled, progress.advance)
-    content = Content(groups(scene, walk), summary(config, scene, walk))
+    content = Content(groups(scene, walk), summary(config, walk))
     if not walk.outcome.answered:
         raise NoAnswer(f"simulate: {walk.outcome.label} after {walk.steps} steps", walk.outcome.advice, content)
     return content
@@ -37,7 +38,7 @@ def start_state(config: Config, inputs: Mapping[str, Content]) -> State:
     return as_state(given)
 
 
-def summary(config: Config, scene: RigidScene, walk: RecordedWalk) -> dict[str, Any]:
+def summary(config: Config, walk: RecordedWalk) -> dict[str, Any]:
     """What the command prints."""
     return {
         "outcome": walk.outcome.label,
@@ -57,7 +58,7 @@ def summary(config: Config, scene: RigidScene, walk: RecordedWalk) -> dict[str, 
         "rejected_steps": walk.work.rejected,
         "equations": config.equations,
         "slope_rad": config.slope_rad,
-        "left_out": list(scene.left_out),
+        "left_out": list(of_rigid_walk(config)),
     }
 
 

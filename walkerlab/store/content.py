@@ -28,7 +28,7 @@ class Variable:
     dims       one name for each axis; a variable named like its only dimension is that dimension's coordinate
     units      'rad', 'N', ...; '1' for a pure number, '' for text
     long_name  what it is, in words, for axes and tables
-    timing     measured run times: stored, but no part of the content's digest
+    timing     measured run times, or what shows them: stored, but no part of the content's digest
     missing    NaN is allowed, and marks a gap
 
     Raises ValueError or TypeError for what cannot be stored faithfully.

@@ -15,8 +15,8 @@ def section(results: Results) -> Section:
     if not rows:
         said = Paragraph("Nothing: every result that the pipeline has is there.")
         return Section("left-out", "Left out", (said,))
-    columns = [Column("what"), Column("why", wide=True)]
-    missing = table("What was left out of this scene, and why", columns, rows, wordy=True)
+    columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
+    missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
     return Section("left-out", "Left out", (missing,))
 
 
@@ -26,8 +26,9 @@ def rows_of(missing: Sequence[Absent]) -> list[list[str]]:
     rows = []
     for why in causes:
         first = listed(absent.what for absent in missing if absent.why == why)
+        saves = "; ".join(dict.fromkeys(absent.saves for absent in missing if absent.why == why and absent.saves))
         further = listed(absent.what for absent in missing if absent.why != why and cause(absent.why, missing) == why)
-        rows += [[first, why], *([[further, f"for want of {first}"]] if further else [])]
+        rows += [[first, why, saves], *([[further, f"for want of {first}", ""]] if further else [])]
     return rows
 
 
@@ -40,5 +41,6 @@ def everything_absent(results: Results) -> list[Absent]:
     """What is missing as a whole, then what results say that they left out."""
     found = list(results.absent)
     for result in results.stored.values():
-        found += [Absent(str(entry["what"]), str(entry["why"])) for entry in result.summary.get("left_out", [])]
+        said = result.summary.get("left_out", [])
+        found += [Absent(str(one["what"]), str(one["why"]), saves=str(one.get("saves", ""))) for one in said]
     return list(dict.fromkeys(found))

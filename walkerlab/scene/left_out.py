@@ -1,0 +1,69 @@
+"""What the scene of a config does without: what, why, and what that saves.
+
+Known from the config alone, so that it can be said before anything is loaded or run. How much each saves in time and
+bytes is measured by scripts/benchmark.py (docs/performance.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config, Output
+
+LeftOut = dict[str, str]
+RIGID_NUMBERS: Mapping[Output, int] = {"states": 4, "energies": 3, "forces": 2}
+CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
+"""How many numbers a sample each output takes, model by model."""
+
+
+def of_rigid_walk(config: Config) -> tuple[LeftOut, ...]:
+    """What the rigid model's walk does without."""
+    return (
+        left_out(
+            "floating base, stance contact and foot radius of the rigid walk",
+            "its stance foot is a hinge, its feet are points",
+            "4 of 8 equations, all contact code",
+        ),
+        *of_legs(config),
+        *of_outputs(config, "rigid", RIGID_NUMBERS),
+    )
+
+
+def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
+    """What the physical model's walk does without."""
+    contact = config.contact
+    found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
+    if contact is not None and contact.friction == "none":
+        saved = "4 of the 9 signals that a foot is watched by, and the friction law"
+        found.append(left_out("tangential velocity and friction force", "contact.friction is none", saved))
+    if contact is not None and contact.stance == "pinned":
+        what, why = "floating base and stance contact in the first step", "contact.stance is pinned: two angles suffice"
+        found.append(left_out(what, why, "4 of 8 equations and both force laws in that step"))
+    if config.walker.foot_radius_m == 0.0:
+        saved = "nothing: a zero in their place takes no longer"
+        found.append(left_out("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
+    return (*found, *of_legs(config), *of_outputs(config, "contact", CONTACT_NUMBERS))
+
+
+def of_legs(config: Config) -> Iterator[LeftOut]:
+    """What legs without inertia do without."""
+    if config.walker.leg_inertia_kg_m2 == 0.0:
+        saved = "nothing: it is summed into constants before anything runs"
+        yield left_out("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
+
+
+def of_outputs(config: Config, model: str, numbers: Mapping[Output, int]) -> Iterator[LeftOut]:
+    """What is not computed along the walk since nobody asks for it."""
+    for output, count in numbers.items():
+        if output not in config.outputs:
+            what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
+            yield left_out(what, why, f"{count} of {sum(numbers.values())} numbers a sample")
+    if not config.outputs:
+        yield left_out(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
+
+
+def left_out(what: str, why: str, saves: str) -> LeftOut:
+    """An entry as `--json` prints it."""
+    return {"what": what, "why": why, "saves": saves}
