@@ -3,23 +3,29 @@
     python scripts/fuzz_campaign.py                          # 2,000 configs, 200 damaged results
     python scripts/fuzz_campaign.py --configs 50 --damaged 20
 
-Configs are mutated byte by byte, line by line and value by value, from the built-in ones; each is loaded, and each
-eighth is also walked, by the rigid model or on its ground. Damaged results are cut short, have bits flipped, are
-overwritten in part, or are other files. Prints a table in Markdown; exits 1 if anything went wrong.
+Half of the configs are built-in ones mutated byte by byte, line by line and value by value, half are drawn key by key
+by hypothesis; each is loaded, and each fourth is also walked, by the rigid model or on its ground. Damaged results are
+cut short, have bits flipped, are overwritten in part, or are other files. Prints a table in Markdown; exits 1 if
+anything went wrong.
 """
 
 from __future__ import annotations
 
 import argparse
 import faulthandler
+import json
 import random
 import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
+
+import hypothesis
+from hypothesis import strategies as st
 
 from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
@@ -30,7 +36,7 @@ from walkerlab.store.runfolder import RunFolder
 
 LONGEST_S = 20.0  # that a config may take to be refused or walked, once its models are compiled
 HANGS_S = 300.0  # after which the campaign ends with a traceback of where it hangs
-WALKED, WALKED_ON_GROUND = 8, 24  # each how-manieth is walked, and with the contact model
+WALKED, WALKED_ON_GROUND = 4, 8  # each how-manieth is walked, and with the contact model
 TOLD_EVERY = 100
 WORDS = (
     b"nan", b".nan", b".inf", b"-1", b"0", b"1e308", b"-1e-308", b"1e-14", b"null", b"[]", b"{}", b"true", b"'", b'"',
@@ -96,6 +102,58 @@ def fuzzed(drawn: random.Random, texts: list[bytes]) -> bytes:
     return bytes(text)
 
 
+def configs() -> st.SearchStrategy[bytes]:
+    """A few keys over a built-in config: of any value, or of one near to what they are."""
+    usual = dict(leaves_of(load(None).config.model_dump(mode="json"), ()))
+    words = st.sampled_from([word.decode("latin-1") for word in WORDS])
+    anything = st.one_of(st.floats(), st.integers(), st.booleans(), st.none(), words, st.text(), st.lists(st.floats()))
+
+    def value_of(path: tuple[str, ...]) -> st.SearchStrategy[Any]:
+        value = usual[path]
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return st.just(value) | anything
+        scaled = st.floats(0.1, 10.0).map(lambda factor: value * factor)
+        return st.one_of(st.just(value), scaled, scaled, anything)
+
+    pairs = st.sampled_from(sorted(usual)).flatmap(lambda path: st.tuples(st.just(path), value_of(path)))
+    bases = st.sampled_from(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
+    return st.builds(text_of, bases, st.lists(pairs, max_size=4))
+
+
+def leaves_of(block: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Path and value of everything in a config."""
+    for name, value in block.items():
+        if isinstance(value, dict):
+            yield from leaves_of(value, (*above, name))
+        else:
+            yield (*above, name), value
+
+
+def text_of(base: str, pairs: list[tuple[tuple[str, ...], Any]]) -> bytes:
+    """A config as YAML that is JSON as well."""
+    written: dict[str, Any] = {"extends": base}
+    for (*blocks, name), value in pairs:
+        inner = written
+        for block in blocks:
+            inner = inner.setdefault(block, {})
+        inner[name] = value
+    return json.dumps(written).encode()
+
+
+def drawn_texts(count: int, seed: int) -> list[bytes]:
+    """So many configs that hypothesis draws."""
+    found: list[bytes] = []
+
+    @hypothesis.seed(seed)
+    @hypothesis.settings(max_examples=count, database=None, deadline=None, phases=[hypothesis.Phase.generate])
+    @hypothesis.given(configs())
+    def note(text: bytes) -> None:
+        found.append(text)
+
+    note()
+    return found
+
+
 def loaded(path: Path) -> LoadedConfig | None:
     """The config of a file, or None if it is refused in words."""
     try:
@@ -109,13 +167,14 @@ def loaded(path: Path) -> LoadedConfig | None:
 def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
     """Load `count` fuzzed configs, walk some; what became of them, and what went wrong."""
     drawn = random.Random(seed)
-    texts = [path.read_bytes() for path in sorted(BUILTIN_FOLDER.glob("*.yaml"))]
+    builtin = [path.read_bytes() for path in sorted(BUILTIN_FOLDER.glob("*.yaml"))]
+    texts = drawn_texts(count // 2, seed)
+    texts += [fuzzed(drawn, builtin) for _ in range(count - len(texts))]
     fates: Counter[str] = Counter()
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as place:
         path, runs = Path(place) / "fuzzed.yaml", Path(place) / "runs"
-        for number in range(count):
-            text = fuzzed(drawn, texts)
+        for number, text in enumerate(texts):
             path.write_bytes(text)
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
             try:
