@@ -26,6 +26,7 @@ ROWS = [
     row("scipy-bdf", 1e-3, None, 0.3, "slid"),
     row("scipy-bdf", 1e-5, 3e-4, 0.2),
     row("radau5", 1e-3, 4e-4, 5e-3, scene="contact"),
+    row("radau5", 1e-11, 3e-13, 5e-2, scene="contact"),
 ]
 SUMMARY = {
     "rows": ROWS,
@@ -69,7 +70,12 @@ def test_each_method_has_its_least_time_for_each_error_and_its_smallest_error(ma
     costs = tables(made)["Least run time for an error, method by method"]
     assert costs["rigid", "dop853"][:4] == ["0.05", "0.2", "7 × 10⁻¹⁵", "1\u202f234"]
     assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
-    assert costs["contact", "radau5"][:2] == ["5", "–"]
+    assert costs["contact", "radau5"][:2] == ["5", "50"]
+
+
+def test_an_error_below_what_the_reference_is_known_to_is_told_as_a_bound(made):
+    costs = tables(made)["Least run time for an error, method by method"]
+    assert costs["contact", "radau5"][2] == "≤ 1 × 10⁻¹²"
 
 
 def test_a_run_that_ended_otherwise_is_told_with_its_outcome(made):

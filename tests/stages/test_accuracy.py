@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.scene.references import WalkEndsError, reference_for
+from walkerlab.scene.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.trials import USER_SCRIPT, RigidTrial, TrialRun
-from walkerlab.stages import accuracy
-from walkerlab.stages.accuracy import Row, best_methods, climb, conclusion, measure, rows_group, summary_of
+from walkerlab.stages import accuracy_ladder
+from walkerlab.stages.accuracy import best_methods, conclusion, rows_group, summary_of
+from walkerlab.stages.accuracy_ladder import Climb, Row, Run, climb, finished, left_of, measure, row_of
 
 CONFIG = load(None, ("contact=null",)).config
 START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)
@@ -24,9 +25,14 @@ def reference():
     return reference_for(TRIAL)
 
 
+def measured(method, rtol, reference):
+    one = Climb(TRIAL, method, LADDER, (), unfinished=False)
+    return row_of(one, measure(TRIAL, method, rtol, 10**5), reference)
+
+
 @pytest.fixture(scope="module")
 def rows(reference):
-    return [measure(TRIAL, method, rtol, 10**5, reference) for method in FEW for rtol in LADDER]
+    return [measured(method, rtol, reference) for method in FEW for rtol in LADDER]
 
 
 def test_the_reference_is_known_to_rounding_and_by_two_ways(reference):
@@ -52,7 +58,7 @@ def test_a_script_with_numpy_needs_the_work_of_the_same_method(rows):
 
 
 def test_content_is_the_same_each_time_apart_from_timings(reference, rows):
-    again = measure(TRIAL, "dop853", 1e-7, 10**5, reference)
+    again = measured("dop853", 1e-7, reference)
     first = next(row for row in rows if row.method == "dop853" and row.tolerance == 1e-7)
     timings = {"wall_s": 0.0, "least_wall_s": 0.0, "repeats_of_wall_s": 0}
     assert replace(again, **timings) == replace(first, **timings)
@@ -63,13 +69,46 @@ def test_timings_are_marked_as_such(rows):
     assert {name for name, variable in variables.items() if variable.timing} == {"wall_s", "least_wall_s", "repeats"}
 
 
+def test_no_method_is_measured_by_its_own_end(rows, reference):
+    assert all(row.against != row.method for row in rows)
+    near = Reference(End("dop853", np.zeros(4)), End("radau5", np.full(4, 1e-12)))
+    assert near.agreement == 1e-12
+    assert near.for_method("dop853").method == "radau5"
+    assert {near.for_method(method).method for method in ("radau5", "scipy-radau")} == {"dop853"}
+
+
+def test_an_error_below_what_the_reference_is_known_to_is_marked():
+    unsure = Reference(End("heyoka-taylor", np.zeros(4)), End("dop853", np.full(4, 1e-8)))
+    ends = {1e-4: 2e-8, 1e-8: 1e-9}
+    climbed = Climb(TRIAL, "radau5", tuple(ends), (), unfinished=False)
+    runs = [Run(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
+    assert [row_of(climbed, run, unsure).within_reference for run in runs] == [False, True]
+
+
 def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
-    monkeypatch.setattr(accuracy, "BUDGET", 500)
-    measured, not_run = climb(TRIAL, "radau5", reference)
-    assert [row.outcome for row in measured[:-1]] == ["walked"] * (len(measured) - 1)
-    assert (measured[-1].outcome, measured[-1].error) == ("budget-exhausted", None)
-    assert len(measured) + len(not_run) == len(accuracy.OWN_LADDER)
+    monkeypatch.setattr(accuracy_ladder, "BUDGET", 500)
+    one = climb(TRIAL, "radau5")
+    rows = [row_of(one, run, reference) for run in one.runs]
+    assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
+    assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
+    not_run = left_of(one)
+    assert len(rows) + len(not_run) == len(accuracy_ladder.OWN_LADDER)
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
+    whole = [run.result.rhs_evaluations for run in climb(TRIAL, "scipy-dop853").runs]
+    monkeypatch.setattr(accuracy_ladder, "SHORT", whole[2] - 1)
+    short = climb(TRIAL, "scipy-dop853")
+    assert short.unfinished
+    assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
+    other = climb(TRIAL, "dop853")
+    (end,), (made_good, same) = finished([TRIAL], [short, other], jobs)
+    assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
+    assert len(left_of(made_good)) == len(accuracy_ladder.LIBRARY_LADDER) - 3
+    assert same is other
+    assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
 
 
 class SlowAtFirst:
@@ -91,14 +130,14 @@ class SlowAtFirst:
 
 def test_compiling_is_not_measured(reference, monkeypatch):
     trial = SlowAtFirst()
-    monkeypatch.setattr(accuracy.time, "perf_counter", lambda: trial.clock)
-    measured, _ = climb(trial, "dop853", reference)
-    assert [row.wall_s for row in measured] == pytest.approx([1e-3] * len(accuracy.OWN_LADDER))
-    assert {row.repeats_of_wall_s for row in measured} == {accuracy.REPEATS}
+    monkeypatch.setattr(accuracy_ladder.time, "perf_counter", lambda: trial.clock)
+    rows = [row_of(one, run, reference) for one in (climb(trial, "dop853"),) for run in one.runs]
+    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(accuracy_ladder.OWN_LADDER))
+    assert {row.repeats_of_wall_s for row in rows} == {accuracy_ladder.REPEATS}
 
 
 def made(method, error, wall_s):
-    return Row("rigid", method, 1e-6, "walked", error, wall_s, wall_s, 7, 100, 10, 0)
+    return Row("rigid", method, 1e-6, "walked", error, "heyoka-taylor", False, wall_s, wall_s, 7, 100, 10, 0)
 
 
 MADE = [
@@ -122,7 +161,7 @@ def test_the_conclusion_compares_with_the_best_library():
 
 
 def test_the_summary_has_the_fixed_keys(rows, reference):
-    summary = summary_of(rows, [], {"rigid": reference})
+    summary = summary_of(rows, [], {"rigid": reference}, 1)
     assert {"rows", "repeats", "reference", "best"} <= summary.keys()
     fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
     assert fixed <= summary["rows"][0].keys()

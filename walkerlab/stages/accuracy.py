@@ -4,73 +4,66 @@ from __future__ import annotations
 
 import os
 import platform
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from statistics import median
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
-from walkerlab.scene.references import Reference, WalkEndsError, reference_for
+from walkerlab.scene.references import End, Reference, WalkEndsError, second_end
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.trials import RigidTrial, Trial, TrialRun
-from walkerlab.solvers.registry import METHODS
+from walkerlab.scene.trials import RigidTrial, Trial
+from walkerlab.stages.accuracy_ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
-BUDGET = 200_000  # right-hand sides of one run of ours
-LIBRARY_BUDGET = 25_000  # of a library's, whose walk in Python costs a hundred times as much for each
-WARM_UP_BUDGET = 2_000  # right-hand sides after which everything is compiled and loaded
-LONG_LIBRARY_RUN = 12_000  # right-hand sides of a library's run that is the last of its ladder
-REPEATS, REPEAT_TIME_S = 7, 0.3
-OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
-LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
 OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats the one before
 
 
-@dataclass(frozen=True)
-class Row:
-    """One method at one tolerance."""
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Measure every method on every scene.
 
-    scene: str
-    method: str
-    tolerance: float
-    outcome: str
-    error: float | None  # largest difference of the end state from the reference; None if the end was not reached
-    wall_s: float  # median of the repeats
-    least_wall_s: float
-    repeats_of_wall_s: int  # how many the median is of
-    rhs_evaluations: int
-    accepted: int
-    rejected: int
-
-
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Measure every method on every scene."""
-    rows: list[Row] = []
-    not_run: list[dict[str, Any]] = []
-    references: dict[str, Reference] = {}
-    left_out = []
+    jobs  processes for what takes long: first ends of references, and runs of libraries that do not get on. All other
+          runs are measured one after the other, with nothing beside them.
+    """
+    trials: list[Trial] = []
+    seconds: list[End] = []
+    climbs: list[Climb] = []
+    left_out: list[dict[str, Any]] = []
     for trial in scenes(config, inputs):
         progress.start(f"accuracy: {trial.name}", len(trial.methods))
         try:
-            references[trial.name] = reference_for(trial)
+            seconds.append(second_end(trial))
         except WalkEndsError as problem:
-            left_out.append({"what": f"accuracy of the scene {trial.name}", "why": str(problem)})
+            left_out.append(without(trial, problem))
             continue
+        trials.append(trial)
         for method in trial.methods:
-            measured, left = climb(trial, method, references[trial.name])
-            rows += measured
-            not_run += left
+            climbs.append(climb(trial, method))
             progress.advance()
-    summary = {**summary_of(rows, not_run, references), "left_out": left_out}
+    progress.start("accuracy: long runs")
+    firsts, climbs = finished(trials, climbs, jobs)
+    references: dict[str, Reference] = {}
+    for trial, first, second in zip(trials, firsts, seconds, strict=True):
+        if isinstance(first, WalkEndsError):
+            left_out.append(without(trial, first))
+        else:
+            references[trial.name] = Reference(first, second)
+    climbs = [one for one in climbs if one.trial.name in references]
+    rows = [row_of(one, run, references[one.trial.name]) for one in climbs for run in one.runs]
+    not_run = [entry for one in climbs for entry in left_of(one)]
+    summary = {**summary_of(rows, not_run, references, jobs), "left_out": left_out}
     groups = {f"{scene}/rows": rows_group([row for row in rows if row.scene == scene]) for scene in references}
-    return Content(groups, summary, timed=("best", "conclusions"))
+    return Content(groups, summary, timed=("best", "conclusions", "environment"))
+
+
+def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
+    """A scene that nothing can be measured on."""
+    return {"what": f"accuracy of the scene {trial.name}", "why": str(why)}
 
 
 def scenes(config: Config, inputs: Mapping[str, Content]) -> Iterator[Trial]:
@@ -89,61 +82,14 @@ def scenes(config: Config, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     yield near_rigid_trial(config, given, length, NEAR_RIGID_STEPS)
 
 
-def climb(trial: Trial, method: str, reference: Reference) -> tuple[list[Row], list[dict[str, Any]]]:
-    """One method over its ladder of tolerances, until a run takes too much; and what was not run, and why."""
-    own = method in METHODS and METHODS[method].compiled
-    ladder, budget = (OWN_LADDER, BUDGET) if own else (LIBRARY_LADDER, LIBRARY_BUDGET)
-    longest = budget if own else LONG_LIBRARY_RUN
-    trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
-    rows: list[Row] = []
-    for index, tolerance in enumerate(ladder):
-        row = measure(trial, method, tolerance, budget, reference)
-        rows.append(row)
-        if row.rhs_evaluations >= longest:
-            why = f"{row.outcome} with {row.rhs_evaluations} right-hand sides at {tolerance:g} already"
-            left = ladder[index + 1 :]
-            return rows, [{"scene": trial.name, "method": method, "tolerance": rtol, "why": why} for rtol in left]
-    return rows, []
-
-
-def measure(trial: Trial, method: str, tolerance: float, budget: int, reference: Reference) -> Row:
-    """Run once to warm up, then as often as time allows."""
-    walk = trial.prepare(method, tolerance, budget)
-    first_s, result = timed(walk)
-    walls = [first_s] if first_s > REPEAT_TIME_S else []
-    while len(walls) < REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
-        walls.append(timed(walk)[0])
-    error = float(np.max(np.abs(result.state - reference.state))) if result.state.size else None
-    return Row(
-        trial.name,
-        method,
-        tolerance,
-        result.outcome,
-        error,
-        median(walls),
-        min(walls),
-        len(walls),
-        result.rhs_evaluations,
-        result.accepted,
-        result.rejected,
-    )
-
-
-def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
-    """Seconds that a walk takes, and its result."""
-    start = time.perf_counter()
-    result = walk()
-    return time.perf_counter() - start, result
-
-
 def summary_of(
-    rows: Sequence[Row], not_run: list[dict[str, Any]], references: Mapping[str, Reference]
+    rows: Sequence[Row], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
     """What the command prints."""
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": REPEATS,
-        "budgets": {"own": BUDGET, "library": LIBRARY_BUDGET},
+        "budget": BUDGET,
         "reference": {
             name: {
                 "method": reference.method,
@@ -156,7 +102,12 @@ def summary_of(
         "best": {scene: best_methods(rows, scene) for scene in references},
         "conclusions": {scene: conclusion(rows, scene) for scene in references},
         "not_run": not_run,
-        "environment": {"processor": platform.machine(), "cores": os.cpu_count(), "python": platform.python_version()},
+        "environment": {
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+            "python": platform.python_version(),
+            "processes": jobs,
+        },
     }
 
 
@@ -205,17 +156,21 @@ def rows_group(rows: Sequence[Row]) -> Group:
     def numbers(name: str) -> NDArray[Any]:
         return np.array([getattr(row, name) for row in rows])
 
+    def texts(name: str) -> NDArray[Any]:
+        return np.array([getattr(row, name) for row in rows], dtype=object)
+
     reached = np.array([row.error is not None for row in rows], np.int8)
     error = np.array([0.0 if row.error is None else row.error for row in rows])
     row_axis = ("row",)
     return Group(
         {
             "row": Variable(np.arange(len(rows)), row_axis, "1", "row"),
-            "method": Variable(np.array([row.method for row in rows], dtype=object), row_axis, "1", "method"),
-            "outcome": Variable(np.array([row.outcome for row in rows], dtype=object), row_axis, "1", "outcome"),
+            "method": Variable(texts("method"), row_axis, "1", "method"),
+            "outcome": Variable(texts("outcome"), row_axis, "1", "outcome"),
             "tolerance": Variable(numbers("tolerance"), row_axis, "1", "relative tolerance"),
             "reached": Variable(reached, row_axis, "1", "whether the end state was reached"),
             "error": Variable(error, row_axis, "1", "largest difference of the end state from the reference, SI units"),
+            "against": Variable(texts("against"), row_axis, "1", "method of the end that it is measured by"),
             "wall_s": Variable(numbers("wall_s"), row_axis, "s", "median run time", timing=True),
             "least_wall_s": Variable(numbers("least_wall_s"), row_axis, "s", "least run time", timing=True),
             "repeats": Variable(numbers("repeats_of_wall_s"), row_axis, "1", "timed repeats", timing=True),

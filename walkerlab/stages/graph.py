@@ -153,6 +153,7 @@ PIPELINE = Graph(
         "Measure error against run time, method by method.",
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
+        has_cells=True,
     ),
     Stage(
         "stability",

@@ -64,11 +64,12 @@ def methods_of(summary: Mapping[str, Any], scene: str, levels: Sequence[float]) 
     """A row for each method of a scene."""
     rows: list[Row] = [row for row in summary["rows"] if row["scene"] == scene]
     best = set(summary["best"].get(scene, {}).values())
+    known = float(summary["reference"][scene]["agreement"])
     lines: list[list[str | Cell]] = []
     for method in dict.fromkeys(row["method"] for row in rows):
         mine = [row for row in rows if row["method"] == method]
         head = Cell(method, "good") if method in best else Cell(method)
-        lines.append([head, *(milliseconds(mine, level) for level in levels), *smallest(mine), failures(mine)])
+        lines.append([head, *(milliseconds(mine, level) for level in levels), *smallest(mine, known), failures(mine)])
     return body(lines, scene)
 
 
@@ -78,13 +79,14 @@ def milliseconds(rows: Sequence[Row], level: float) -> str:
     return number(1e3 * min(good) if good else None, 3)
 
 
-def smallest(rows: Sequence[Row]) -> tuple[str, str]:
-    """The smallest error reached, and what it cost."""
+def smallest(rows: Sequence[Row], known: float) -> tuple[str, str]:
+    """The smallest error reached, and what it cost; what the reference is known to bounds what can be told of it."""
     reached = [row for row in rows if row["error"] is not None]
     if not reached:
         return number(None), number(None)
     least = min(reached, key=lambda row: float(row["error"]))
-    return number(least["error"], 2), whole(least["rhs_evaluations"])
+    error = number(least["error"], 2) if least["error"] > known else f"≤ {number(known, 2)}"
+    return error, whole(least["rhs_evaluations"])
 
 
 def failures(rows: Sequence[Row]) -> str:
@@ -109,7 +111,11 @@ def references(summary: Mapping[str, Any]) -> Table:
         [scene, entry["method"], entry["second_method"], number(entry["agreement"], 2)]
         for scene, entry in summary["reference"].items()
     ]
-    return table("References", heads, rows, note="An error below this difference says nothing more than that.")
+    note = (
+        "The second method's end is what the reference's own method is measured by, where that is measured too. "
+        "An error below their difference says nothing more than that."
+    )
+    return table("References", heads, rows, note=note)
 
 
 def not_run(summary: Mapping[str, Any]) -> tuple[Table, ...]:
