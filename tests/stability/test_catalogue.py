@@ -81,7 +81,7 @@ def test_lines_that_are_no_config_are_refused():
 
 
 def test_two_cases_of_one_name_are_refused():
-    with pytest.raises(ValueError, match="paper"):
+    with pytest.raises(ConfigError, match="paper"):
         without_doubles([CASES["paper"], CASES["paper"]])
 
 

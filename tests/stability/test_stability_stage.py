@@ -6,12 +6,14 @@ from types import SimpleNamespace
 import pytest
 
 from walkerlab.config.loader import load
+from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
 from walkerlab.report.results import Results
 from walkerlab.report.sections import verdict as verdict_section
 from walkerlab.report.sections.stability import section
-from walkerlab.stability.catalogue import shipped
-from walkerlab.stability.cells import cells_of, run_cells
+from walkerlab.stability.catalogue import config_of, shipped
+from walkerlab.stability.cells import CaseCell, cells_of, run_cells
+from walkerlab.stability.contact_case import judge_contact
 from walkerlab.stability.known import Known
 from walkerlab.stability.verdict import CaseResult, Finding
 from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
@@ -104,6 +106,26 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
         ("name: mine\n", "does not hold a list"),
         ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),
         ("- {name: x, expected: [walked], reason: mine, budgett: 3}\n", "did you mean .*budget"),
+        (
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    walker: {leg_mas_kg: 3}\n",
+            "cases.yaml:5:14: walker.leg_mas_kg: unknown key .3.; did you mean walker.leg_mass_kg",
+        ),
+        (
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config: {contact: {stiffness: -3}}\n",
+            "cases.yaml:4:33: contact.stiffness: -3 is out of bounds",
+        ),
+        (
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    slope_deg: 1\n    slope_rad: 0.1\n",
+            "cases.yaml:6:5: slope_rad: the slope is given already, as slope_deg at .*cases.yaml:5:5",
+        ),
+        (
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    contact: null\n",
+            "cases.yaml:5:5: contact: case x walks on the ground and has none",
+        ),
+        (
+            "- {name: x, expected: [walked], reason: mine}\n- {name: x, expected: [walked], reason: mine}\n",
+            "cases.yaml:2:4: name: x is a case at .*cases.yaml:1:4 already",
+        ),
     ],
 )
 def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
@@ -111,6 +133,27 @@ def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     with pytest.raises(ConfigError, match=said):
         load(tmp_path / "own.yaml")
+
+
+def test_lines_of_a_case_in_the_config_itself_are_told_with_their_place(tmp_path):
+    (tmp_path / "own.yaml").write_text(
+        "extends: paper\nstability:\n  cases:\n  - {name: x, expected: [walked], reason: y, config: {gravity: 3}}\n"
+    )
+    with pytest.raises(ConfigError, match=r"own.yaml:4:\d+: gravity: unknown key .3.; did you mean gravity_m_s2"):
+        load(tmp_path / "own.yaml")
+
+
+def test_a_case_may_have_pads_of_the_contact_gaits_own_pitch():
+    case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": {"pad_pitch": "own"}})
+    assert judge_contact(case, config_of(case)).failures == ()
+
+
+@pytest.mark.parametrize("lines", [{"stance": "pinned"}, {"terrain": "after-mid-swing"}])
+def test_a_scene_that_no_equation_without_events_describes_is_not_tried_with_ordinary_methods(lines):
+    case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": lines})
+    verdict, *shown = CaseCell(case).run()
+    assert verdict.failures == ()
+    assert shown == []
 
 
 def test_the_verdict_names_what_failed():

@@ -12,6 +12,7 @@ from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
 BUILTIN_FOLDER: Final = Path(__file__).parent / "builtin"
+DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
-from walkerlab.config.files import ConfigFile, builtin, find, read_layers, with_cases
+from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
 from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
-from walkerlab.config.numbers import short
+from walkerlab.config.overlay import refuse_bad_cases
+from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping, Position, Scalar
 from walkerlab.config.validation import typed
-
-DEFAULT: Final = "paper"
-MOVED_RAD: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +49,7 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
     changed_tree = with_cases(with_settings(tree, settings), Path())
     changed = typed(changed_tree)
     base = typed(tree) if settings else changed
+    refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
     return LoadedConfig(config, run_name(base, changed, _degrees(changed_tree)), warnings, file.label)
 
@@ -69,19 +67,3 @@ def _named(tree: Mapping, file: ConfigFile) -> Mapping:
 def _degrees(tree: Mapping) -> float | None:
     node = tree.entries.get("slope_deg")
     return float(node.value) if isinstance(node, Scalar) and isinstance(node.value, int | float) else None
-
-
-def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
-    """`config` with theta_1 of its start such that both feet stand on the slope, theta_1 + theta_2 = -2 phi."""
-    if isinstance(config.start, str):
-        return config, ()
-    given, stance, *rates = config.start
-    swing = -2 * config.slope_rad - stance
-    placed = config.model_copy(update={"start": (swing, stance, *rates)})
-    if abs(swing - given) <= MOVED_RAD:
-        return placed, ()
-    moved = (
-        f"{tree.entries['start'].position}: start: theta_1 moved from {short(given)} to {short(swing)} rad, "
-        f"so that both feet stand on the slope of {short(config.slope_rad)} rad"
-    )
-    return placed, (moved,)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping as Keys
 from typing import Any
 
-from walkerlab.config.files import builtin, read_layers
+from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
-from walkerlab.config.loader import DEFAULT, on_the_slope
+from walkerlab.config.placing import on_the_slope
+from walkerlab.config.problems import Problem, refusal
 from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
 from walkerlab.config.validation import typed
 
@@ -23,9 +25,42 @@ def over_paper(lines: Keys[str, Any], source: str) -> Config:
     """
     upper = tree_of(dict(lines), Position(source, 1, 1))
     assert isinstance(upper, Mapping)
+    return block_over_paper(upper)
+
+
+def block_over_paper(upper: Mapping) -> Config:
+    """The built-in paper config with a block of keys over it; ConfigError with their places if they are no config."""
     tree = stacked([*below(upper), upper])
     tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
     return on_the_slope(typed(tree), tree)[0]
+
+
+def refuse_bad_cases(config: Config, tree: Mapping) -> None:
+    """Raise ConfigError with the place of what is wrong with the lines of a config's own stability cases.
+
+    tree  that the config was typed from
+    """
+    if not config.stability.cases:
+        return
+    block = tree.entries["stability"]
+    listed = block.entries["cases"] if isinstance(block, Mapping) else block
+    assert isinstance(listed, Sequence), "cases that are typed are a list"
+    places: dict[str, Position] = {}
+    for case, node in zip(config.stability.cases, listed.items, strict=True):
+        assert isinstance(node, Mapping), "a case that is typed is a block"
+        if case.name in places:
+            raise refusal([Problem(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")])
+        places[case.name] = node.keys["name"]
+        lines = node.entries.get("config", Mapping(node.position))
+        assert isinstance(lines, Mapping), "lines that are typed are a block"
+        refuse_without_ground(case, block_over_paper(lines), lines)
+
+
+def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
+    """Raise ConfigError if a case of the physical model has none."""
+    if case.model == "contact" and config.contact is None:
+        where = lines.keys.get("contact", lines.position)
+        raise refusal([Problem(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")])
 
 
 def below(upper: Mapping) -> list[Mapping]:

@@ -11,12 +11,13 @@ from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.config.tree import Mapping, plain
+from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
 
 
 def shipped() -> tuple[Case, ...]:
-    """The cases that come with the package; ValueError if two have one name."""
+    """The cases that come with the package."""
     root = read(CATALOGUE.read_text(encoding="utf-8"), CATALOGUE.name)
     if not isinstance(root, Mapping):
         raise ValueError(f"{CATALOGUE.name} is no block of families")
@@ -30,11 +31,11 @@ def shipped() -> tuple[Case, ...]:
 
 
 def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """The cases; ValueError if two have one name."""
+    """The cases; ConfigError if two have one name."""
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ValueError(f"more than one case is named {', '.join(doubled)}")
+        raise ConfigError(f"More than one case is named {', '.join(doubled)}.", "Give yours a name of its own.")
     return tuple(cases)
 
 

@@ -16,7 +16,7 @@ from walkerlab.gait.outcome import Outcome
 from walkerlab.physics.contact.compass import STANCE_FOOT
 from walkerlab.physics.rigid.walker import step_length
 from walkerlab.physics.system import State
-from walkerlab.scene.contact import ContactScene, contact_scene, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Method, method_named
 from walkerlab.solvers.stepping import ACCEPTED, RHS
@@ -52,7 +52,10 @@ def prepared(config: Config, case: Case) -> Prepared | None:
     else:
         rigid_state = config.start
         length = abs(float(step_length(walker, rigid_state[1], rigid_state[0])))
-    scene = contact_scene(config, length)
+    own = own_pitch(config, length, rigid_state)
+    if own is None:
+        return None
+    scene = contact_scene(config, length, own)
     y = start_state(scene, rigid_state)
     lowered = case.lowered_m * config.walker.leg_length_m
     y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
@@ -61,6 +64,15 @@ def prepared(config: Config, case: Case) -> Prepared | None:
     law = scene.walker.normal
     stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
     return Prepared(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)
+
+
+def own_pitch(config: Config, rigid_step_m: float, rigid_state: State) -> float | None:
+    """What pads of the contact gait's own pitch are laid for (m), if the case wants them; None if there is no gait."""
+    contact = config.contact
+    if contact is None or contact.pad_pitch != "own":
+        return rigid_step_m
+    found = contact_gait(config, rigid_step_m, rigid_state).gait
+    return None if found is None else found.step.length_m
 
 
 def walked(ready: Prepared, config: Config, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
@@ -189,7 +201,7 @@ def time_difference(
         apart = float(np.max(np.abs(touches[:steps] - others[:steps])))
     else:
         apart = abs(one.end_time_s / unit - other.end_time_s / other_unit)
-    limit = promised(case, one.outcome, config.solver.contact.rtol, int(one.work[ACCEPTED] + other.work[ACCEPTED]))
+    limit = promised(case, config.solver.contact.rtol, int(one.work[ACCEPTED] + other.work[ACCEPTED]))
     return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)
 
 

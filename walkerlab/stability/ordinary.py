@@ -20,6 +20,7 @@ from walkerlab.config.stability import Case
 from walkerlab.gait.contact_run import MethodSettings
 from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
 from walkerlab.physics.contact.on_pads import OnPads
+from walkerlab.physics.contact.terrain import AfterMidSwing
 from walkerlab.scene.rigid import SWING_EQUATIONS
 from walkerlab.scene.user_script import walk_as_a_script
 from walkerlab.solvers.registry import method_named
@@ -70,9 +71,9 @@ def choices(case: Case, config: Config) -> tuple[Choice, ...]:
 
 
 def contact_choices(case: Case, config: Config) -> tuple[Choice, ...]:
-    """Every ordinary method on a case of the physical model."""
+    """Every ordinary method on a case of the physical model; none if no equation without events describes it."""
     ready = prepared(config, case)
-    if ready is None:
+    if ready is None or ready.scene.pinned is not None or isinstance(ready.scene.terrain, AfterMidSwing):
         return ()
     name, rtol, atol = REFERENCE
     walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)

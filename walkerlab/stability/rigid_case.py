@@ -214,5 +214,5 @@ def time_difference(
     strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit
     steps = min(strikes.size, others.size, case.compared_steps)
     apart = float(np.max(np.abs(strikes[:steps] - others[:steps]))) if steps else 0.0
-    limit = promised(case, one.outcome, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
+    limit = promised(case, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
     return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)

@@ -62,15 +62,12 @@ def second_walk(configured: str, budget: int, walk: Callable[[Method, int], W]) 
     return Second("", None, ", ".join(tried))
 
 
-def promised(case: Case, outcome: Outcome, rtol: float, steps: int) -> float:
+def promised(case: Case, rtol: float, steps: int) -> float:
     """How far two walks' times may be apart, in pendulum times.
 
     rtol   the looser of their tolerances
     steps  of the solver, both together
 
-    A tolerance lets every step be wrong by its share of numbers of the order of one. A slide is noticed at a step's
-    end, so its time is as exact as steps are short; then the case itself says what is right.
+    A tolerance lets every step be wrong by its share of numbers of the order of one.
     """
-    if outcome is Outcome.SLID:
-        return case.agreement
     return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.stability.catalogue import config_of, shipped, without_doubles
+from walkerlab.stability.catalogue import shipped, without_doubles
 from walkerlab.stability.cells import cells_of, run_cells
 from walkerlab.stability.known import Known
 from walkerlab.stability.ordinary import CAP, FINE, Choice
@@ -22,10 +22,8 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs
 
     jobs  processes
 
-    Raises ConfigError if a case's lines are no config.
+    Raises ConfigError if a case has the name of another.
     """
-    for case in config.stability.cases:
-        config_of(case)  # a bad one is told before anything runs
     cells = cells_of(without_doubles([*shipped(), *config.stability.cases]))
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
