@@ -11,7 +11,7 @@ from walkerlab.gait.step_map import Shooting, newton
 WIDEST_STRIDE, NARROWEST_STRIDE = 1.6, 1.001  # from one slope to the next, as ratio of cube roots
 REMEMBERED = 3  # points that the next one is extrapolated from
 JUMP = 0.02  # a gait further than this from where it was expected is another gait
-SLACK = 1e-8  # residual that is good enough on the way, relative
+SLACK = 1e-6  # residual that is good enough on the way, relative
 
 
 class Reached(NamedTuple):

@@ -35,7 +35,8 @@ from walkerlab.solvers.stepping import (
 )
 from walkerlab.solvers.vectors import combine, load, shifted, store
 
-SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.333, 6.0
+# Hairer's code has 0.9: a fifth of a walk's steps was rejected, and the same error took 11 % more work.
+SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
 STAGES, EXTRA_STAGES = 12, 3
 
@@ -155,7 +156,7 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: State, h: float) -> N
 
 @advance.case(Dop853)
 def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
-    """One accepted step with Hairer's step control."""
+    """One accepted step with Hairer's step control, a little more careful."""
     clock = method.clock
     t, h = clock[T], clock[H_NEXT]
     y, k1 = load(method.y, 0, blank(system)), load(method.stages, K13, blank(system))
