@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
+from whole_process import whole_process_times
 
 from walkerlab.gait.continuation import Branch
 from walkerlab.gait.fixed_point import Search, SearchSettings, find_gaits
@@ -196,6 +197,14 @@ def memory_line() -> Line:
     )
 
 
+def process_line(repeats: int) -> Line:
+    """What the command line, the config and the results' book-keeping cost a user who types one command."""
+    simulate, bare = whole_process_times(repeats)
+    work = "`walkerlab simulate` as a whole process, against one that imports, calls one kernel and writes one file"
+    line = at_most(work, simulate / bare, "x", 1.5, 1.2)
+    return replace(line, measured=f"{line.measured}: {simulate:.2f} s against {bare:.2f} s")
+
+
 def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
     """Error and work with steps that end at the force law's joins, and without."""
     smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_joins=False)))
@@ -246,7 +255,7 @@ def main() -> None:
     lines += contact_lines(trial, reference, watch)
     repeats = 5 if options.quick else 15
     sides = times_ns(repeats)
-    lines += [*rhs_lines(sides), memory_line()]
+    lines += [*rhs_lines(sides), memory_line(), process_line(repeats)]
     parts = {
         "environment": f"{environment()}.\n\n{conclusion(lines)}\n",
         "speed": markdown(

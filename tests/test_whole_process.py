@@ -1,0 +1,34 @@
+"""The whole process of a warm `walkerlab simulate`, against one that does no more than it must: what each loads."""
+
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = runpy.run_path(str(Path(__file__).parents[1] / "scripts" / "whole_process.py"))
+# what nobody needs who walks from a gait that is there already
+HEAVY = ("scipy.integrate", "scipy.optimize", "matplotlib", "heyoka", "sksundae", "sympy")
+LOADED = "\nimport sys\nprint(*(name for name in {heavy!r} if name in sys.modules), file=sys.stderr)\n"
+
+
+def loaded_by(code, *arguments):
+    """Which of the heavy packages a process has loaded at its end."""
+    told = code + LOADED.format(heavy=HEAVY)
+    done = subprocess.run([sys.executable, "-c", told, *arguments], capture_output=True, text=True, check=True)
+    return done.stderr.splitlines()[-1].split()
+
+
+def test_the_bare_process_walks_writes_and_is_bare(tmp_path):
+    assert loaded_by(SCRIPT["BARE"], str(tmp_path / "bare.h5")) == []
+    assert (tmp_path / "bare.h5").stat().st_size > 0
+
+
+def test_a_warm_simulate_loads_no_more_heavy_packages_than_the_bare_process(tmp_path):
+    simulate = (
+        "import walkerlab.cli.main as cli\ntry:\n    cli.main()\nexcept SystemExit as end:\n    assert not end.code\n"
+    )
+    arguments = ("simulate", "--quiet", "--runs", str(tmp_path))
+    loaded_by(simulate, *arguments)
+    (tmp_path / "paper" / "simulate.h5").unlink()
+    assert loaded_by(simulate, *arguments) == []
+    assert (tmp_path / "paper" / "simulate.h5").exists()
