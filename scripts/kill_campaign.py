@@ -32,6 +32,7 @@ from walkerlab.store import artifact
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 LONGEST_S = 600.0
 LOCK = ".lock"
+LATEST = 0.85  # of the usual time: a run that is over cannot be killed
 
 
 def command(stage: str, config: str, runs: Path, *options: str) -> list[str]:
@@ -127,7 +128,7 @@ class Campaign:
 
     def kill(self, most_s: float, about: str, *options: str) -> None:
         """Kill a run within so many seconds, look what is there, and run again."""
-        at_write, delay_s = self.drawn.random() < 0.5, self.drawn.uniform(0.0, most_s)
+        at_write, delay_s = self.drawn.random() < 0.5, self.drawn.uniform(0.0, LATEST * most_s)
         process = start(command(self.stage, self.config, self.runs, *options))
         moment = kill_at(process, self.runs, delay_s, at_write)
         self.moments[moment] += 1
