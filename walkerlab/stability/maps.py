@@ -17,7 +17,8 @@ from walkerlab.config.stability import Case
 from walkerlab.gait.contact_run import ContactWalkResult, MethodSettings
 from walkerlab.solvers.registry import method_named
 from walkerlab.stability.catalogue import config_of
-from walkerlab.stability.contact_case import TENFOLD, Prepared, prepared, walked, walked_with
+from walkerlab.stability.contact_case import TENFOLD, walked, walked_with
+from walkerlab.stability.contact_start import Prepared, prepared
 from walkerlab.stability.ordinary import REFERENCE, STEPS, fixed, natural_units
 from walkerlab.stability.scaling import pendulum_time
 from walkerlab.stability.verdict import finite

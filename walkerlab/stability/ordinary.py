@@ -26,7 +26,8 @@ from walkerlab.scene.user_script import walk_as_a_script
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
-from walkerlab.stability.contact_case import RATES, Prepared, prepared, walked_with
+from walkerlab.stability.contact_case import walked_with
+from walkerlab.stability.contact_start import RATES, Prepared, prepared
 from walkerlab.stability.rigid_case import Prepared as RigidPrepared
 from walkerlab.stability.rigid_case import prepared as rigid_prepared
 from walkerlab.stability.scaling import pendulum_time

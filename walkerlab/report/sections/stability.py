@@ -51,8 +51,9 @@ def passed(summary: Mapping[str, Any]) -> Paragraph:
     total = summary["passed"] + summary["failed"]
     judged = (
         "A case passes if it ends as expected, within its budget of right-hand sides, with finite numbers, its energy "
-        "balanced, nothing won back from friction or damping, momentum kept at heel strikes, and the same times at a "
-        "tenfold tolerance and by another method; walkers of other sizes also agree with a twin of ordinary size."
+        "balanced, nothing won back from friction or damping, momentum kept at rigid heel strikes and elsewhere given "
+        "by ground and gravity, and the same times at a tenfold tolerance and by another method; walkers of other "
+        "sizes also agree with a twin of ordinary size."
     )
     return Paragraph(f"{summary['passed']} of {count(total, 'case')} and known problems came out right. {judged}")
 
