@@ -31,7 +31,7 @@ def test_an_unknown_method_is_an_error_that_names_the_known():
 
 def test_a_method_that_is_not_installed_says_what_to_install(monkeypatch):
     monkeypatch.setattr(registry_module, "METHODS", {})
-    with pytest.raises(KeyError, match="pip install 'walkerlab\\[cvode\\]'"):
+    with pytest.raises(KeyError, match="pip install scikit-sundae"):
         method_named("cvode-bdf")
 
 

@@ -175,7 +175,7 @@ class SolverSettings(Block):
     @classmethod
     def _is_installed(cls, value: Method) -> Method:
         if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
-            raise PydanticCustomError("extra", "needs CVODE, which is not installed: pip install 'walkerlab[cvode]'")
+            raise PydanticCustomError("extra", "needs CVODE, which is not installed: pip install scikit-sundae")
         return value
 
 

@@ -76,7 +76,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     text = f"{'.'.join(path)}: {value} {_REASONS.get(detail['type'], detail['msg'])}"
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field)) if word else ""
-    return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant)
+    return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant if meant != word else "")
 
 
 def _unknown_key(path: tuple[str, ...], tree: Mapping) -> Problem:

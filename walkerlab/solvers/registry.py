@@ -47,7 +47,7 @@ def method_named(name: str) -> Method:
     if name in METHODS:
         return METHODS[name]
     if name in CVODE:
-        raise KeyError(f"{name} needs CVODE, which is not installed: pip install 'walkerlab[cvode]'")
+        raise KeyError(f"{name} needs CVODE, which is not installed: pip install scikit-sundae")
     raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
 
 
