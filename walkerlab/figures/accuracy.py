@@ -161,11 +161,13 @@ def caption(scene: str, results: Results) -> str:
         for tolerance, outcome, reached in zip(one.tolerance, one.outcome, one.reached, strict=True)
         if not reached
     ]
+    itself = any(one.look.label == reference["method"] for one in series_of(scene, results))
+    own = f" {reference['method']} itself is measured by {reference['second_method']}." if itself else ""
     missed = f" The end was not reached by {', '.join(failures)}." if failures else ""
     return (
         f"Largest error of the end state, tolerance by tolerance, warm, medians. {summary['conclusions'][scene]} "
         f"The reference is {reference['method']}, from which {reference['second_method']} differs by "
-        f"{reference['agreement']:.1e}; smaller errors are drawn there.{missed}"
+        f"{reference['agreement']:.1e}; smaller errors are drawn there.{own}{missed}"
     )
 
 
