@@ -5,8 +5,8 @@
 
 Half of the configs are built-in ones mutated byte by byte, line by line and value by value, half are drawn key by key
 by hypothesis; each is loaded, and each fourth is also walked, by the rigid model or on its ground. Damaged results are
-cut short, have bits flipped, are overwritten in part, or are other files. Prints a table in Markdown; exits 1 if
-anything went wrong.
+cut short, have bits flipped, are overwritten in part, are other files, or are altered and sealed again: other shapes,
+numbers, versions, hostile attributes, ten gigabytes declared. Prints a table in Markdown; exits 1 if anything is wrong.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis
+from damage import WAYS
 from hypothesis import strategies as st
 
 from walkerlab.config.files import BUILTIN_FOLDER
@@ -215,31 +216,6 @@ def fate_of(path: Path, runs: Path, number: int) -> str:
     return f"accepted, {stage} walked" if report.no_answer is None else f"accepted, {stage} has no answer, told"
 
 
-def cut(drawn: random.Random, data: bytes) -> bytes:
-    """Cut short."""
-    return data[: drawn.randrange(len(data))]
-
-
-def flip(drawn: random.Random, data: bytes) -> bytes:
-    """A bit flipped."""
-    changed = bytearray(data)
-    changed[drawn.randrange(len(data))] ^= 1 << drawn.randrange(8)
-    return bytes(changed)
-
-
-def overwrite(drawn: random.Random, data: bytes) -> bytes:
-    """A block of noise or zeros."""
-    changed, at = bytearray(data), drawn.randrange(len(data))
-    length = min(drawn.randrange(1, 4096), len(data) - at)
-    changed[at : at + length] = drawn.randbytes(length) if drawn.random() < 0.5 else bytes(length)
-    return bytes(changed)
-
-
-def replace_all(drawn: random.Random, data: bytes) -> bytes:
-    """Another file altogether."""
-    return drawn.choice((b"", b"\x89HDF\r\n\x1a\n", b"text\n", drawn.randbytes(len(data))))
-
-
 def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
     """Damage a stored result `count` times; what was said of it, and what went wrong."""
     drawn = random.Random(seed)
@@ -253,7 +229,7 @@ def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
         whole = path.read_bytes()
         good = artifact.read(path)
         for number in range(count):
-            how = drawn.choice((cut, flip, overwrite, replace_all))
+            how = drawn.choice(WAYS)
             damaged = how(drawn, whole)
             path.write_bytes(damaged)
             try:

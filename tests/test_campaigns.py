@@ -19,6 +19,7 @@ MARKUP = "<script>alert(1)</script>"
 
 
 def script(name):
+    sys.path.insert(0, str(SCRIPTS))  # as for a script that is run
     spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
