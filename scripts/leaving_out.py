@@ -28,7 +28,7 @@ from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
 from walkerlab.store.key import Identity
-from walkerlab.store.provenance import begin
+from walkerlab.store.provenance import Provenance, begin
 
 ROOT = Path(__file__).resolve().parent.parent
 # nothing but the stage itself runs: the start and the pads ask for no gait
@@ -53,14 +53,18 @@ class Scene:
 
     def once(self, artifact: Path) -> None:
         """Run the stage alone, and store what it makes."""
-        config = self.config
-        content = import_module(PIPELINE[self.stage].module).run(config, {}, Silent())
-        write(artifact, content, IDENTITY, begin(config, {}))
+        content = import_module(PIPELINE[self.stage].module).run(self.config, {}, Silent())
+        write(artifact, content, IDENTITY, self.origin)
 
     @cached_property
     def config(self) -> Config:
         """The paper's, changed."""
         return loader.load(None, self.sets).config
+
+    @cached_property
+    def origin(self) -> Provenance:
+        """What is stored of where the result comes from."""
+        return begin(self.config, {})
 
     def command(self, runs: Path) -> list[str]:
         """The command line of a run."""
@@ -249,9 +253,14 @@ def compile_s(scene: Scene, place: Path) -> float:
 def row_of(one: Reduction) -> list[str]:
     """A row: each quantity as full -> reduced."""
     pairs = [one.found.get(name) for name in QUANTITIES]
-    cells = ["" if pair is None else f"{pair[0]:.3g} → {pair[1]:.3g}" for pair in pairs]
+    cells = ["" if pair is None else f"{digits(pair[0])} → {digits(pair[1])}" for pair in pairs]
     note = f"; {one.note}" if one.note else ""
     return [one.what, one.against, *cells, conclusion(one.found) + note]
+
+
+def digits(value: float) -> str:
+    """Three digits, or all before the point."""
+    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def conclusion(found: dict[str, Pair]) -> str:
