@@ -74,7 +74,7 @@ def test_report_names_the_other_method_or_why_there_is_none():
     shown = report_of(summary_of([replace(GOOD, second_method="dop853"), alone], [RIGHT], []))
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[3].text for row in table.bodies[0].rows] == ["dop853", "none"]
-    assert "alone: dop853 budget-exhausted" in table.note
+    assert "dop853 budget-exhausted (alone)" in table.note
 
 
 def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_them():

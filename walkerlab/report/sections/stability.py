@@ -92,14 +92,23 @@ def case_table(cases: Rows) -> Table:
     bodies = tuple(
         Body(family, body([case_row(row) for row in cases if row["family"] == family]).rows) for family in families
     )
-    tried = [f"{row['name']}: {row['second_tried']}" for row in cases if row["second_tried"]]
     note = (
         "Other method: that gives the same times, as far as tolerances promise. Worst measure: the largest of all "
-        "measures of a case, each divided by the most that is allowed."
+        f"measures of a case, each divided by the most that is allowed.{without_answer(cases)}"
     )
-    if tried:
-        note += f" Other methods that gave no answer, or why none was asked: {'; '.join(tried)}."
     return Table("Extreme cases", columns, bodies, wordy=True, note=note)
+
+
+def without_answer(cases: Rows) -> str:
+    """Which other methods gave no answer, or why none was asked: each reason once, with its cases."""
+    by_reason: dict[str, list[str]] = {}
+    for row in cases:
+        if row["second_tried"]:
+            by_reason.setdefault(str(row["second_tried"]), []).append(str(row["name"]))
+    if not by_reason:
+        return ""
+    said = "; ".join(f"{reason} ({', '.join(names)})" for reason, names in by_reason.items())
+    return f" Other methods that gave no answer, or why none was asked: {said}."
 
 
 def case_row(row: Mapping[str, Any]) -> list[str | Cell]:
@@ -147,19 +156,25 @@ def ordinary_table(summary: Mapping[str, Any]) -> Table:
     methods = dict.fromkeys(str(row["method"]) for row in rows)
     names = dict.fromkeys(str(row["case"]) for row in rows)
     found = {(row["case"], row["method"]): row for row in rows}
-    columns = [Column("case"), *(Column(method) for method in methods)]
+    columns = [Column("case"), *(Column(shortened(method)) for method in methods)]
     body_rows: list[list[str | Cell]] = [
         [name, *(ordinary_cell(found.get((name, method))) for method in methods)] for name in names
     ]
     note = (
         "The contact scene as one differential equation without events, the rigid one as a script with an event "
         f"function (libraries only), at most {summary['ordinary_cap']} evaluations, to the end of two steps or where "
-        "the walk ends before. In each cell the error of the state there (leg lengths, radians, pendulum times) and "
-        "the run time. "
+        "the walk ends before. RK45, LSODA and Radau are SciPy’s with nothing but the name given; Euler is "
+        "semi-implicit, with a fixed step, as in game engines. In each cell the error of the state there (leg lengths, "
+        "radians, pendulum times) and the run time. "
         f"Fine: below {number(summary['ordinary_fine'])}; wrong silently: above, and the method says nothing; "
         "diverges: further than ten legs off, or out of all numbers; gives up: fails or uses up its evaluations."
     )
     return table("What an ordinary choice of method does", columns, body_rows, note=note)
+
+
+def shortened(method: str) -> str:
+    """A method's name as a column's head."""
+    return method.removeprefix("SciPy ").removeprefix("semi-implicit ")
 
 
 def ordinary_cell(row: Mapping[str, Any] | None) -> Cell:
