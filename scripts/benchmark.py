@@ -40,6 +40,7 @@ BUDGET = 2_000_000
 LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
 PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
 PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+FEW = " Few repeats (--quick)."
 MET, MISSED, STRETCH = "bar met", "bar missed", "stretch met"
 
 
@@ -257,7 +258,7 @@ def main() -> None:
     sides = times_ns(repeats)
     lines += [*rhs_lines(sides), memory_line(), process_line(repeats)]
     parts = {
-        "environment": f"{environment()}.\n\n{conclusion(lines)}\n",
+        "environment": f"{environment()}.{FEW if options.quick else ''}\n\n{conclusion(lines)}\n",
         "speed": markdown(
             ("work", "measured", "bar", "verdict"), [(one.work, one.measured, one.bar, one.verdict) for one in lines]
         ),
