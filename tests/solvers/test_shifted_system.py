@@ -1,5 +1,7 @@
 """Systems (s I - J) x = r of implicit methods, whole and halved, against NumPy."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -37,8 +39,8 @@ def test_equations_of_motion_are_solved_in_half_their_size(J, s, data):
     r = data.draw(arrays(float, n, elements=entries))
     assert unknowns(J) == n // 2
     expected = np.linalg.solve(matrix, r)
-    # x_v = s x_q - r_q: a rounding of r stays in the velocities
-    allowed = 1e-13 * np.linalg.cond(matrix) ** 2 * np.abs(expected).max() + 1e-15 * np.abs(r).max()
+    # x_q = (r_q + x_v) / s: a rounding of r over the shift stays in the positions
+    allowed = 1e-13 * np.linalg.cond(matrix) ** 2 * np.abs(expected).max() + 1e-15 * np.abs(r).max() / abs(s) + 1e-300
     for left in (n // 2, n):
         assert np.abs(solved(J, left, s, r) - expected).max() <= allowed
 
@@ -58,6 +60,18 @@ def test_a_stiff_contact_step_is_solved_to_rounding():
     x = np.array([0.1, 1e-6, -2.0, 1e-2])
     for s in (3.6e6, 2.7e6 - 3.1e6j):
         np.testing.assert_allclose(solved(J, 2, s, s * x - J @ x), x, rtol=1e-13)
+
+
+@pytest.mark.parametrize("damping", [1.0, 1e6, 1e12])
+@pytest.mark.parametrize("shift", [1.0, 1e3, 1e9])
+def test_velocities_keep_their_digits_where_damping_is_stiff(damping, shift):
+    """They are then far smaller than shift times position, of which no difference may be taken."""
+    J, r = np.array([[0.0, 1.0], [-1e6, -damping]]), np.array([1.0, 1.0])
+    s, k, c = Fraction(shift), Fraction(10**6), Fraction(damping)
+    determinant = s * (s + c) + k
+    exact = np.array([float((s + c + 1) / determinant), float((s - k) / determinant)])
+    # positions keep those that r over the shift has
+    np.testing.assert_array_less(np.abs(solved(J, 1, shift, r) - exact), 1e-14 * np.abs(exact) + [1e-15 / shift, 0.0])
 
 
 def test_a_singular_matrix_is_told():

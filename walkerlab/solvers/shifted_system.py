@@ -1,7 +1,8 @@
 """The linear systems of implicit methods, (s I - J) x = r, in half their size for equations of motion.
 
-With q' = v the upper half of the Jacobian is (0 I). Eliminating the velocities leaves
-(s^2 I - s J_v - J_q) x_q = r_v + (s I - J_v) r_q and x_v = s x_q - r_q: an eighth of the work for the factors.
+With q' = v the upper half of the Jacobian is (0 I). Eliminating the positions leaves
+(s I - J_v - J_q / s) x_v = r_v + J_q r_q / s and x_q = (r_q + x_v) / s: an eighth of the work for the factors.
+The other way round x_v = s x_q - r_q would cancel where damping is stiff.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8, special structure.
 """
@@ -29,11 +30,11 @@ def unknowns(J: Any) -> int:
 @inlined
 def factor_shifted(J: Any, left: int, s: Any, factors: Any, pivots: Any) -> bool:
     """Factors (left, left) for the shift s, real or complex as `factors` is; False if the matrix is singular."""
-    n = J.shape[0]
+    n, wait = J.shape[0], 1.0 / s
     for i in range(left):
         for j in range(left):
-            factors[i, j] = -J[i, j] if left == n else -J[left + i, j] - s * J[left + i, left + j]
-        factors[i, i] += s if left == n else s * s
+            factors[i, j] = -J[i, j] if left == n else -J[left + i, left + j] - wait * J[left + i, j]
+        factors[i, i] += s
     return factor(factors, pivots, left)
 
 
@@ -43,13 +44,14 @@ def solve_shifted(J: Any, left: int, s: Any, factors: Any, pivots: Any, r: Any) 
     if left == J.shape[0]:
         solve(factors, pivots, r, 0, left)
         return
+    wait = 1.0 / s
     for i in range(left):
-        total = r[left + i] + s * r[i]
+        r[i] *= wait
+    for i in range(left):
+        total = r[left + i]
         for j in range(left):
-            total -= J[left + i, left + j] * r[j]
+            total += J[left + i, j] * r[j]
         r[left + i] = total
     solve(factors, pivots, r, left, left)
     for i in range(left):
-        angle = r[left + i]
-        r[left + i] = s * angle - r[i]
-        r[i] = angle
+        r[i] += wait * r[left + i]
