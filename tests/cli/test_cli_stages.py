@@ -107,6 +107,16 @@ def test_a_bad_config_is_one_object_too(toy):
     assert one_object(done)["error"]["exit_code"] == 3
 
 
+def test_a_case_named_as_one_of_the_catalogue_is_refused_before_anything_runs(toy):
+    (toy.folder / "own.yaml").write_text(
+        "extends: paper\nstability: {cases: [{name: moon, expected: [walked], reason: mine}]}\n"
+    )
+    done = toy("drop", "-c", "own.yaml")
+    assert done.returncode == 3
+    assert "The catalogue has cases named moon." in done.stderr
+    assert not (toy.folder / "runs").exists()
+
+
 def test_a_result_that_cannot_be_stored_exits_4(toy):
     (toy.folder / "runs").write_text("a file stands where the folder belongs")
     done = toy("drop")

@@ -105,7 +105,7 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         ("strides: 5.0\n", r"5.0 is not an integer; allowed: integer, from 1 to 10000"),
         ("strides: 0\n", r"0 is out of bounds"),
         ("strides: 1e7\n", r"1e7 is not an integer"),
-        ("name: ../../x\n", r"name: '../../x' is not safe as the name of a folder"),
+        ("name: ../../x\n", r"name: '../../x' is not safe as a name"),
         ("name: /etc\n", r"is not safe"),
         ("name: ''\n", r"is not safe"),
         ("name: a@b\n", r"is not safe"),

@@ -7,6 +7,8 @@ from walkerlab.errors import ConfigError
 from walkerlab.stability.catalogue import config_of, shipped, without_doubles
 from walkerlab.stability.cells import CaseCell
 from walkerlab.stability.contact_case import judge_contact
+from walkerlab.stability.contact_start import HEIGHT, prepared
+from walkerlab.stability.rigid_case import judge_rigid
 
 CASES = {case.name: case for case in shipped()}
 QUICK = (
@@ -65,6 +67,24 @@ def test_a_budget_too_small_is_told_with_what_there_was():
     assert result.outcome == "budget-exhausted"
     assert 10_000 <= result.rhs_evaluations < 10_100
     assert 0 < result.steps < 4
+
+
+def test_a_rigid_case_too_ends_with_its_budget():
+    needed = judge_rigid(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"])).rhs_evaluations
+    case = CASES["rigid-single-stride"].model_copy(update={"budget": needed // 2, "expected": ("budget-exhausted",)})
+    result = judge_rigid(case, config_of(case))
+    assert result.failures == ()
+    assert result.outcome == "budget-exhausted"
+    assert case.budget <= result.rhs_evaluations < needed
+
+
+def test_a_start_is_lowered_by_metres_whatever_the_leg():
+    short = Case(name="x", expected=("walked",), reason="x", config={"walker": {"leg_length_m": 1.0}}, lowered_m=-0.01)
+    long = short.model_copy(update={"config": {"walker": {"leg_length_m": 10.0}}})
+    for case in (short, long):
+        there = prepared(config_of(case), case).start
+        on_ground = prepared(config_of(case), case.model_copy(update={"lowered_m": 0.0})).start
+        assert there[HEIGHT] - on_ground[HEIGHT] == pytest.approx(0.01, rel=1e-12)
 
 
 def test_disagreement_with_a_sharper_tolerance_is_told():

@@ -104,6 +104,12 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
     [
         ("- {name: mine, expected: [walkedd], reason: mine}\n", "cases.yaml:1:.*did you mean walked"),
         ("name: mine\n", "does not hold a list"),
+        ("- {expected: [walked], reason: mine}\n", "cases.yaml:1:3: stability.cases.name: is missing; allowed: text"),
+        ("- {name: x, expected: [], reason: mine}\n", "cases.yaml:1:23: .*must name an outcome"),
+        (
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config: {slope_rad: 0, start: [0, 0, 0, 0]}\n",
+            "cases.yaml:4:26: start: case x starts with its feet together",
+        ),
         ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),
         ("- {name: x, expected: [walked], reason: mine, budgett: 3}\n", "did you mean .*budget"),
         (
@@ -132,6 +138,12 @@ def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
     (tmp_path / "cases.yaml").write_text(text)
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     with pytest.raises(ConfigError, match=said):
+        load(tmp_path / "own.yaml")
+
+
+def test_a_file_of_cases_that_is_not_there_is_not_taken_for_a_config(tmp_path):
+    (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
+    with pytest.raises(ConfigError, match=r"own.yaml:2:20: there is no file .*; allowed: a file that holds a list"):
         load(tmp_path / "own.yaml")
 
 

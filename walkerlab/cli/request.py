@@ -39,6 +39,10 @@ class Request:
     def loaded(self) -> LoadedConfig:
         """The config, its warnings said; ConfigError if it is not usable."""
         loaded = load(self.config, self.sets, self.strides)
+        if loaded.config.stability.cases:
+            from walkerlab.stability.catalogue import judged
+
+            judged(loaded.config.stability.cases)
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {self.runs / loaded.run_name}")

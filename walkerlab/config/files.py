@@ -29,11 +29,6 @@ class ConfigFile:
     path: Path
     label: str
 
-    @property
-    def is_builtin(self) -> bool:
-        """Whether the file comes with the package."""
-        return self.path.parent == BUILTIN_FOLDER
-
 
 def builtin_names() -> tuple[str, ...]:
     """Names of the configs that come with the package."""
@@ -96,7 +91,7 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
         return layer
     path = folder / named.value
     file = ConfigFile(path, shown(str(path), SHOWN_PATH))
-    cases = read(_text_of(file, named.position), file.label)
+    cases = read(_text_of(file, named.position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
         problem = Problem(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
         raise refusal([problem])
@@ -131,21 +126,26 @@ def _block_of(text: str, file: ConfigFile) -> Mapping:
     raise refusal([Problem(start, reason, "a block of keys, e.g. `extends: paper`")])
 
 
-def _text_of(file: ConfigFile, asked: Position | None) -> str:
-    """Text of a file; `asked` is where its name stands, for the message if it cannot be read."""
+def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
+    """Text of a file.
+
+    asked   where its name stands, for the message if it cannot be read
+    wanted  what it should be, if not a config
+    """
+    kind = "file" if wanted else "config"
     try:
         mode = file.path.stat().st_mode
         if not stat.S_ISREG(mode):
             what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
-            raise refusal([Problem(asked, f"config {file.label} is {what}", "a YAML file")])
+            raise refusal([Problem(asked, f"{kind} {file.label} is {what}", "a YAML file")])
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
-        problem = Problem(asked, f"there is no config {file.label}", _what_there_is(), _near(file))
+        problem = Problem(asked, f"there is no {kind} {file.label}", wanted or _what_there_is(), _near(file))
         raise refusal([problem]) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise refusal([Problem(asked, f"config {file.label} cannot be read: {reason.lower()}")]) from None
+        raise refusal([Problem(asked, f"{kind} {file.label} cannot be read: {reason.lower()}")]) from None
     return _decoded(data, file)
 
 

@@ -53,7 +53,9 @@ def refuse_bad_cases(config: Config, tree: Mapping) -> None:
         places[case.name] = node.keys["name"]
         lines = node.entries.get("config", Mapping(node.position))
         assert isinstance(lines, Mapping), "lines that are typed are a block"
-        refuse_without_ground(case, block_over_paper(lines), lines)
+        over = block_over_paper(lines)
+        refuse_without_ground(case, over, lines)
+        refuse_without_pads(case, over, lines)
 
 
 def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
@@ -61,6 +63,18 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
     if case.model == "contact" and config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise refusal([Problem(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")])
+
+
+def refuse_without_pads(case: Case, config: Config, lines: Mapping) -> None:
+    """Raise ConfigError if a case's pads are as long as its start's step, and that has none."""
+    if case.model != "contact" or config.contact is None or isinstance(config.start, str):
+        return
+    # a step of no length leaves steps nothing to be judged by on other terrains too
+    by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"
+    if by_start and config.start[0] == config.start[1]:
+        where = lines.keys.get("start", lines.position)
+        text = f"start: case {case.name} starts with its feet together, and so pads of its step have no length"
+        raise refusal([Problem(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")])
 
 
 def below(upper: Mapping) -> list[Mapping]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from walkerlab.config.fields import Block, key
 
@@ -67,7 +68,7 @@ class Case(Block):
     @classmethod
     def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
         if not value:
-            raise ValueError("must name an outcome")
+            raise PydanticCustomError("empty", "must name an outcome")
         return value
 
 

@@ -28,7 +28,7 @@ _REASONS: Final = {
     "less_than_equal": "is out of bounds",
     "missing": "has too few values",
     "too_long": "has too many values",
-    "string_pattern_mismatch": "is not safe as the name of a folder",
+    "string_pattern_mismatch": "is not safe as a name",
 }
 MAX_PROBLEMS: Final = 100
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
@@ -72,6 +72,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         return _unknown_key(tuple(str(part) for part in location), tree)
     path, field = _field_at(model, location)
     node, position = _node_at(tree, location)
+    if node is None and detail["type"] == "missing":
+        return Problem(position, f"{'.'.join(path)}: is missing", allowed(field))
     value = shown_value(node) if node else f"{detail['input']} (its default)"
     text = f"{'.'.join(path)}: {value} {_REASONS.get(detail['type'], detail['msg'])}"
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
@@ -137,4 +139,5 @@ def _node_at(tree: Mapping, location: tuple[int | str, ...]) -> tuple[Node | Non
             position, node = node.keys[part], node.entries[part]
         elif isinstance(node, Sequence) and isinstance(part, int) and part < len(node.items):
             node = node.items[part]
+            position = node.position
     return node, node.position

@@ -100,16 +100,18 @@ def take_walk(
     steps: int,
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
+    budget: int | None = None,
 ) -> RecordedWalk:
     """Walk `steps` steps from `start`, or until the walk ends.
 
     method   an integrator for four equations
     sampled  whether states in time are wanted
     advance  told how many more steps were taken
+    budget   right-hand sides of the whole walk; none: what any step needs, for each
 
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
-    recorder = Recorder(walker, method, start, sampled)
+    recorder = Recorder(walker, method, start, sampled, budget)
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
@@ -124,9 +126,11 @@ def take_walk(
 class Recorder:
     """Walks on from where it is, and keeps what was seen."""
 
-    def __init__(self, walker: RigidWalker, method: Any, start: State, sampled: bool) -> None:
+    def __init__(
+        self, walker: RigidWalker, method: Any, start: State, sampled: bool, budget: int | None = None
+    ) -> None:
         """Stand at `start`, at time 0."""
-        self.walker, self.method, self.sampled = walker, method, sampled
+        self.walker, self.method, self.sampled, self.budget = walker, method, sampled, budget
         self.start = self.state = start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
@@ -149,7 +153,7 @@ class Recorder:
         strikes, before, after = np.zeros(steps), np.zeros((steps, 4)), np.zeros((steps, 4))
         observer = new_observer(self._grid(steps))
         clear_counts(self.method)
-        self.method.counts[BUDGET] = steps * BUDGET_OF_A_STEP
+        self.method.counts[BUDGET] = self._left_for(steps)
         status, taken = self.walk(self.walker, self.method, self.finder, observer, self.state, strikes, before, after)
         self.counts += self.method.counts
         self._keep(observer)
@@ -163,6 +167,11 @@ class Recorder:
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
         return Outcome(status)
+
+    def _left_for(self, steps: int) -> int:
+        """Right-hand sides that the next steps may evaluate."""
+        enough = steps * BUDGET_OF_A_STEP
+        return enough if self.budget is None else min(enough, self.budget - int(self.counts[RHS]))
 
     def _grid(self, steps: int) -> Array:
         """Times of the samples that the next steps may reach, from the start of the first of them."""

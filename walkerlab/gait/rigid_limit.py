@@ -50,7 +50,7 @@ class Setting(NamedTuple):
 
 ALL, ALL_POINT = "all", "all, point foot"
 STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "damping", "stiffness and damping"
-DECADES, HALF_DECADES = 10.0, math.sqrt(10.0)
+HALF_DECADES = math.sqrt(10.0)
 
 
 def series_of(name: str) -> list[Setting]:

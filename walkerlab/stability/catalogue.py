@@ -14,6 +14,7 @@ from walkerlab.config.tree import Mapping, plain
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
+NAME_OF_ITS_OWN: Final = "Give yours a name of its own."
 
 
 def shipped() -> tuple[Case, ...]:
@@ -30,12 +31,21 @@ def shipped() -> tuple[Case, ...]:
     return without_doubles(listed)
 
 
+def judged(own: Sequence[Case]) -> tuple[Case, ...]:
+    """The cases that come with the package and those of a config; ConfigError if two have one name."""
+    catalogue = shipped()
+    taken = {case.name for case in catalogue} & {case.name for case in own}
+    if taken:
+        raise ConfigError(f"The catalogue has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
+    return (*catalogue, *without_doubles(own))
+
+
 def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
     """The cases; ConfigError if two have one name."""
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"More than one case is named {', '.join(doubled)}.", "Give yours a name of its own.")
+        raise ConfigError(f"More than one case is named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
     return tuple(cases)
 
 

@@ -100,8 +100,9 @@ def compared_walks(
     if second.walk is not None:
         compared.append((second.method, second.walk, pendulum_time(config)))
     if case.twin:
-        other = scaled(config, to_twin(config))
-        twin_ready = prepared(other, case)
+        scale = to_twin(config)
+        other = scaled(config, scale)
+        twin_ready = prepared(other, case.model_copy(update={"lowered_m": case.lowered_m * scale.length}))
         if twin_ready is not None:
             compared.append(("twin", walked(twin_ready, other, case, 1.0, sampled=False), pendulum_time(other)))
     return compared

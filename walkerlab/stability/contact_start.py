@@ -43,7 +43,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
         return None
     scene = contact_scene(config, length, own)
     y = start_state(scene, rigid_state)
-    lowered = case.lowered_m * config.walker.leg_length_m
+    lowered = case.lowered_m
     y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
     mass, gravity, leg = scene.walker.tree.mass, config.gravity_m_s2, config.walker.leg_length_m
     speed = float(np.max(np.abs([y[4], y[5], *(leg * rate for rate in y[6:])])))

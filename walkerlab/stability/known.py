@@ -207,8 +207,3 @@ PROBLEMS: Final = (
         "closed form, linearised", 1e-3, "the rod turns a little while it digs",
     ),
 )  # fmt: skip
-
-
-def answers() -> tuple[Known, ...]:
-    """Every known problem with its two numbers."""
-    return tuple(problem.answered() for problem in PROBLEMS)

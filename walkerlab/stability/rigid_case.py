@@ -51,12 +51,15 @@ def prepared(config: Config) -> Prepared | None:
 
 
 def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> RecordedWalk:
-    """Walk a case with the tolerances of its config times `sharper`; each step of it has a budget."""
+    """Walk a case with the tolerances of its config times `sharper`."""
     settings = config.solver.rigid
-    method = method_named(settings.method).new(
-        SWING_EQUATIONS, sharper * settings.rtol, sharper * settings.atol, case.budget
-    )
-    return take_walk(ready.walker, method, ready.start, case.steps)
+    return walked_with(method_named(settings.method), settings.rtol * sharper, settings.atol * sharper, ready, case)
+
+
+def walked_with(method: Method, rtol: float, atol: float, ready: Prepared, case: Case) -> RecordedWalk:
+    """Walk a case by a method, within the case's budget."""
+    solver = method.new(SWING_EQUATIONS, rtol, atol, case.budget)
+    return take_walk(ready.walker, solver, ready.start, case.steps, budget=case.budget)
 
 
 def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[RecordedWalk]:
@@ -64,8 +67,8 @@ def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[Reco
     settings = config.solver.rigid
 
     def walk(method: Method, budget: int) -> RecordedWalk:
-        solver = method.new(SWING_EQUATIONS, settings.rtol, settings.atol, budget)
-        return take_walk(ready.walker, solver, ready.start, case.steps)
+        within = case.model_copy(update={"budget": budget})
+        return walked_with(method, settings.rtol, settings.atol, ready, within)
 
     return second_walk(settings.method, case.budget, walk)
 

@@ -51,7 +51,10 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
 
 def advice(config: Config) -> str:
     """What to do about a slope without a gait."""
-    walk_anyway = "to walk there all the same, give a start state (start: [theta_1, theta_2, dtheta_1, dtheta_2])"
+    walk_anyway = (
+        "to walk there all the same, give a start state (start: [theta_1, theta_2, dtheta_1, dtheta_2]), and the "
+        "contact model a pitch of its pads (contact.pad_pitch: a number)"
+    )
     if config.slope_rad <= 0.0:
         return f"Let the slope descend in walking direction (slope_deg above 0); {walk_anyway}."
     return f"Try a gentler slope, or a walker with more of its mass at the hip; {walk_anyway}."

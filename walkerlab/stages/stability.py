@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.stability.catalogue import shipped, without_doubles
+from walkerlab.stability.catalogue import judged
 from walkerlab.stability.cells import cells_of, run_cells
 from walkerlab.stability.known import Known
 from walkerlab.stability.ordinary import CAP, FINE, Choice
@@ -24,7 +24,7 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs
 
     Raises ConfigError if a case has the name of another.
     """
-    cells = cells_of(without_doubles([*shipped(), *config.stability.cases]))
+    cells = cells_of(judged(config.stability.cases))
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
     known: list[Known] = []

@@ -16,7 +16,6 @@ from walkerlab.store.content import Content, Group
 
 FRAMES_A_SECOND = 40
 MOST_FRAMES = 400
-STILLS_A_STEP = 2
 MOST_STEPS = 10
 
 Array = NDArray[np.float64]
