@@ -48,6 +48,13 @@ def test_a_hinge_pushes_too_so_nothing_is_said():
     assert momentum_findings(prepared(config, case), config, case) == []
 
 
+def test_where_friction_hangs_on_slips_below_the_tolerance_nothing_is_said():
+    ready, config, case = ready_for("stiction-1e-7")
+    found = momentum_balance(ready, config, case)
+    assert found.unresolved > case.agreement > found.unsure
+    assert momentum_findings(ready, config, case) == []
+
+
 def test_where_the_sums_do_not_settle_nothing_is_said():
     ready, config, case = ready_for("paper")
     assert momentum_findings(ready, config, case.model_copy(update={"agreement": 1e-9})) == []

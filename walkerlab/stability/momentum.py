@@ -26,6 +26,7 @@ from walkerlab.gait.contact_run import (
     sampled_feet,
 )
 from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.physics.contact.friction import Coulomb
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.stepping import ACCEPTED
 from walkerlab.stability.contact_start import Prepared
@@ -46,27 +47,30 @@ FEET_ALONG, FEET_HEIGHT, FEET_NORMAL, FEET_FRICTION = 0, 1, 2, 3  # columns of s
 class Balance:
     """Momentum against impulse.
 
-    residual  largest over time and over both directions and the turning, as a share of the walker's momentum
-    unsure    how far the sums of the impulses may be off, as such a share
-    steps     of the solver
+    residual    largest over time and over both directions and the turning, as a share of the walker's momentum
+    unsure      how far the sums of the impulses may be off, as such a share
+    unresolved  what of friction's impulse hangs on slips below the tolerance, as such a share
+    steps       of the solver
     """
 
     residual: float
     unsure: float
+    unresolved: float
     steps: int
 
 
 def momentum_findings(ready: Prepared, config: Config, case: Case) -> list[Finding]:
-    """Momentum against impulse; nothing for a hinged start, whose hinge pushes too, or if the sums do not settle.
+    """Momentum against impulse; nothing for a hinged start, whose hinge pushes too, or where impulses are not known.
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
     """
     if ready.scene.pinned is not None:
         return []
     found = momentum_balance(ready, config, case)
-    if found.unsure > case.agreement:
+    unknown = found.unsure + found.unresolved
+    if unknown > case.agreement:
         return []
-    limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + found.unsure
+    limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
     return [Finding("momentum not given by ground and gravity, over the walker's", finite(found.residual), limit)]
 
 
@@ -88,7 +92,21 @@ def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
         grid = split(samples.time_s, wanting)
     held = momentum(samples, config) / scale
     apart = np.abs(held - held[0] - impulse(samples.time_s, given))
-    return Balance(float(apart.max()), float(change.sum()), int(walk.work[ACCEPTED]))
+    steps = int(walk.work[ACCEPTED])
+    slip = config.solver.contact.atol + config.solver.contact.rtol * speed
+    push = friction_between(ready, slip) * config.gravity_m_s2 * walk.end_time_s / speed
+    return Balance(float(apart.max()), float(change.sum()), push / max(1, steps) ** 0.5, steps)
+
+
+def friction_between(ready: Prepared, slip: float) -> float:
+    """How far the friction coefficient may change within a slip velocity (m/s): by its steepest slope, at no slip.
+
+    In a state between the solver's own the slip is known to its tolerance, with another sign in every step.
+    """
+    law = ready.scene.walker.friction
+    if not isinstance(law, Coulomb):
+        return 0.0
+    return float(law.static * min(1.0, 1.5 * slip / law.stiction_velocity))
 
 
 def samples_of(walk: ContactWalkResult) -> ContactSamples:
