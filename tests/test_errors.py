@@ -15,6 +15,7 @@ from walkerlab import errors
         (errors.StorageError, 4),
         (errors.StaleError, 5),
         (errors.LockedError, 6),
+        (errors.StoppedError, 130),
     ],
 )
 def test_each_failure_has_the_exit_code_of_the_command_line(kind: type[errors.WalkerlabError], exit_code: int) -> None:

@@ -57,3 +57,9 @@ class LockedError(WalkerlabError):
     """Another process holds the run folder (`--no-wait`)."""
 
     exit_code = 6
+
+
+class StoppedError(WalkerlabError):
+    """The user stopped it (Ctrl-C)."""
+
+    exit_code = 130

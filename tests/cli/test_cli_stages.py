@@ -151,6 +151,7 @@ def test_interrupted_exits_130_and_leaves_no_lock(toy, caught):
     os.kill(caught.pid, signal.SIGINT)
     assert caught.wait(timeout=30) == 130
     assert "Traceback" not in caught.stderr.read()
+    assert json.loads(caught.stdout.read())["error"]["exit_code"] == 130
     assert toy("drop", "--no-wait").returncode == 0
 
 

@@ -9,7 +9,7 @@ import pytest
 from html_page import Page
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
-from walkerlab.report.blocks import Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
+from walkerlab.report.blocks import Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
 from walkerlab.report.lead import lead
 from walkerlab.report.page import render
 from walkerlab.report.registry import sections_of
@@ -129,6 +129,12 @@ def test_any_block_may_hold_any_text():
     html = render("t", [], [section])
     assert NASTY not in html
     assert Page(html).said("h2") == [NASTY]
+
+
+@pytest.mark.parametrize("row", [[Cell("it", "good"), "other"], ["other", Cell("it", "good")]])
+def test_a_cell_with_a_tone_is_a_badge_in_the_first_column_too(row):
+    html = render("t", [], [Section("s", "S", (table("t", [Column("a"), Column("b")], [row]),))])
+    assert '<span class="badge good">it</span>' in html
 
 
 def test_the_same_results_give_the_same_bytes(whole):

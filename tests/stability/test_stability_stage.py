@@ -8,6 +8,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
+from walkerlab.report.blocks import Table
 from walkerlab.report.results import Results
 from walkerlab.report.sections import verdict as verdict_section
 from walkerlab.report.sections.stability import section
@@ -15,7 +16,7 @@ from walkerlab.stability.catalogue import config_of, shipped
 from walkerlab.stability.cells import CaseCell, cells_of, run_cells
 from walkerlab.stability.contact_case import judge_contact
 from walkerlab.stability.known import Known
-from walkerlab.stability.verdict import CaseResult, Finding
+from walkerlab.stability.verdict import BUDGET_USED, CaseResult, Finding
 from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
 
 GOOD = CaseResult(
@@ -67,6 +68,13 @@ def test_report_says_in_red_what_failed():
     assert len(red) == 2
     assert "ended as fell, not walked" in red[0]
     assert report_of(None) is None
+
+
+def test_the_worst_measure_is_of_what_is_right_and_not_of_work():
+    busy = replace(GOOD, findings=(Finding(BUDGET_USED, 0.9, 1.0), Finding("x", 0.25, 1.0)))
+    table = next(block for block in report_of(summary_of([busy], [], [])).blocks if isinstance(block, Table))
+    place = [column.title for column in table.columns].index("worst measure over its limit")
+    assert table.bodies[0].rows[0][place].text == "0.25"
 
 
 def test_report_names_the_other_method_or_why_there_is_none():

@@ -8,9 +8,7 @@ from typing import Any
 
 import typer
 
-from walkerlab.errors import WalkerlabError
-
-INTERRUPTED = 130
+from walkerlab.errors import StoppedError, WalkerlabError
 
 
 @contextlib.contextmanager
@@ -24,8 +22,11 @@ def exit_on_failure(command: str, as_json: bool) -> Iterator[None]:
         say(error)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        raise typer.Exit(INTERRUPTED) from None
+        stopped = StoppedError("interrupted", "Stages that were finished are kept; the same command does the rest.")
+        if as_json:
+            print_json(failed(command, stopped))
+        print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
+        raise typer.Exit(stopped.exit_code) from None
 
 
 def say(error: WalkerlabError) -> None:

@@ -18,7 +18,7 @@ from walkerlab.stability.contact_start import Prepared, prepared
 from walkerlab.stability.momentum import momentum_findings
 from walkerlab.stability.scaling import pendulum_time, scaled, to_twin
 from walkerlab.stability.second_method import Second, promised, second_walk
-from walkerlab.stability.verdict import CaseResult, Finding, finite
+from walkerlab.stability.verdict import BUDGET_USED, CaseResult, Finding, finite
 
 TENFOLD = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
@@ -58,10 +58,10 @@ def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[Cont
 
 def judge_contact(case: Case, config: Config) -> CaseResult:
     """Run a case of the physical model and judge it."""
-    started = time.perf_counter()
     ready = prepared(config, case)
     if ready is None:
-        return without_start(case, time.perf_counter() - started)
+        return without_start(case)
+    started = time.perf_counter()
     result = walked(ready, config, case, 1.0, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - started
     findings = [*of_one_run(result, ready, case)]
@@ -108,11 +108,11 @@ def compared_walks(
     return compared
 
 
-def without_start(case: Case, wall_s: float) -> CaseResult:
+def without_start(case: Case) -> CaseResult:
     """A case that asks for a gait where there is none."""
     rejected, none = Outcome.REJECTED.label, "there is no start"
     return CaseResult(
-        case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, wall_s, (), (), "", none
+        case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, 0.0, (), (), "", none
     )
 
 
@@ -123,7 +123,7 @@ def of_one_run(result: ContactWalkResult, ready: Prepared, case: Case) -> list[F
     found = [
         Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
         Finding("energy balance residual over energy", balance, case.balance),
-        Finding("right-hand sides over budget", float(result.work[RHS]) / case.budget, 1.0 + 20.0 / case.budget),
+        Finding(BUDGET_USED, float(result.work[RHS]) / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if result.samples is not None and result.samples.dissipated_J.shape[0] > 1:
         by_channel = result.samples.dissipated_J[:, :2]

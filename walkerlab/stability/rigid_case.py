@@ -20,7 +20,7 @@ from walkerlab.solvers.registry import Method, method_named
 from walkerlab.stability.contact_case import TENFOLD, outcome_differs, without_start
 from walkerlab.stability.scaling import pendulum_time, scaled, to_twin
 from walkerlab.stability.second_method import Second, promised, second_walk
-from walkerlab.stability.verdict import CaseResult, Finding, finite
+from walkerlab.stability.verdict import BUDGET_USED, CaseResult, Finding, finite
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
@@ -75,10 +75,10 @@ def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[Reco
 
 def judge_rigid(case: Case, config: Config) -> CaseResult:
     """Run a case of the rigid model and judge it."""
-    started = time.perf_counter()
     ready = prepared(config)
     if ready is None:
-        return without_start(case, time.perf_counter() - started)
+        return without_start(case)
+    started = time.perf_counter()
     walk = walked(ready, config, case, 1.0)
     wall_s = time.perf_counter() - started
     findings = of_one_walk(walk, ready, case)
@@ -130,7 +130,7 @@ def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding
     found = [
         Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
         Finding("energy drift within a swing over energy", finite(walk.energy_drift / ready.energy), case.balance),
-        Finding("right-hand sides over budget", walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+        Finding(BUDGET_USED, walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if walk.steps:
         walker, before, after = ready.walker, walk.before, walk.after

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
+
+BUDGET_USED: Final = "right-hand sides over budget"
+"""A measure of work, which would hide those of what is right where the largest of all is shown."""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import Block, Body, Cell, Column, Paragraph, Section, Table, Tone, body, table
-from walkerlab.report.numbers import count, listed, number
+from walkerlab.report.numbers import count, listed, number, whole
 from walkerlab.report.results import Results
+from walkerlab.stability.verdict import BUDGET_USED
 
 VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
 
@@ -94,7 +95,8 @@ def case_table(cases: Rows) -> Table:
     )
     note = (
         "Other method: that gives the same times, as far as tolerances promise. Worst measure: the largest of all "
-        f"measures of a case, each divided by the most that is allowed.{without_answer(cases)}"
+        "measures of a case but its use of the budget, each divided by the most that is allowed."
+        f"{without_answer(cases)}"
     )
     return Table("Extreme cases", columns, bodies, wordy=True, note=note)
 
@@ -113,14 +115,15 @@ def without_answer(cases: Rows) -> str:
 
 def case_row(row: Mapping[str, Any]) -> list[str | Cell]:
     """A case."""
-    worst = max((one["value"] / one["limit"] for one in row["measures"] if one["limit"] > 0.0), default=None)
+    judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
+    worst = max((one["value"] / one["limit"] for one in judged), default=None)
     return [
         str(row["name"]),
         Cell(str(row["outcome"]), "good" if row["ok"] else "bad"),
-        str(row["steps"]),
+        whole(row["steps"]),
         str(row["second_method"]) or "none",
         number(worst, 2),
-        str(row["rhs_evaluations"]),
+        whole(row["rhs_evaluations"]),
         number(1e3 * row["wall_s"], 3),
         str(row["reason"]),
     ]
