@@ -69,7 +69,7 @@ def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list
 def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem:
     location = detail["loc"]
     if detail["type"] == "extra_forbidden":
-        return _unknown_key(tuple(str(part) for part in location), tree)
+        return _unknown_key(location, tree)
     path, field = _field_at(model, location)
     node, position = _node_at(tree, location)
     if node is None and detail["type"] == "missing":
@@ -81,15 +81,16 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant if meant != word else "")
 
 
-def _unknown_key(path: tuple[str, ...], tree: Mapping) -> Problem:
+def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
+    path = tuple(part for part in location if isinstance(part, str))  # without places in lists
     block: type[Block] = Config
     for above in path[:-1]:
         if above in block.model_fields:
             block = block_of(block.model_fields[above]) or block
     name = path[-1]
-    parent, _ = _node_at(tree, path[:-1])
+    parent, _ = _node_at(tree, location[:-1])
     position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
-    node, _ = _node_at(tree, path)
+    node, _ = _node_at(tree, location)
     if path == ("extends",):
         return Problem(position, "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
