@@ -36,7 +36,7 @@ NEAR_RIGID = (
 )
 
 
-# ---- measured independently (science notes of the project, two prototypes) ------------------------------------------
+# ---- measured by two other programs ---------------------------------------------------------------------------------
 
 
 def test_ten_steps_are_walked_and_settle_slower_and_shorter_than_the_rigid_gait():

@@ -99,7 +99,7 @@ def test_foot_of_x_p_is_on_the_slope_only_with_the_right_row():
     assert abs(height_over_slope(walker, theta_1, theta_2, MISPRINTED)) > 0.01
 
 
-def test_fixed_point_with_both_misprints_is_the_one_of_another_prototype():
+def test_fixed_point_with_both_misprints_is_the_one_of_another_program():
     walker = walker_of_the_paper(AS_PRINTED)._replace(slope=np.pi / 180)
     state = fixed_point(walker, study_the_paper().as_printed.state, MISPRINTED)
     assert_allclose(state, (-0.2416, 0.2067, -0.2873, -0.9984), atol=5e-5)

@@ -119,7 +119,10 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
             "cases.yaml:4:26: start: case x starts with its feet together",
         ),
         ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),
-        ("- {name: x, expected: [walked], reason: mine, budgett: 3}\n", "cases.yaml:1:47: .*cases.budgett: .*mean .*budget"),
+        (
+            "- {name: x, expected: [walked], reason: mine, budgett: 3}\n",
+            "cases.yaml:1:47: .*cases.budgett: .*mean",
+        ),
         (
             "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    walker: {leg_mas_kg: 3}\n",
             "cases.yaml:5:14: walker.leg_mas_kg: unknown key .3.; did you mean walker.leg_mass_kg",
