@@ -206,6 +206,19 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch)
     assert "rtol" in caught.value.advice
 
 
+@pytest.mark.parametrize(("atol", "told"), [("1e-7", True), ("1e-9", False)])
+def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
+    class Listener(Silent):
+        def note(self, text):
+            notes.append(text)
+
+    notes = []
+    sets = ("contact.units=si", "contact.stiction_velocity=1e-7", "contact.friction_velocity=1e-6", "strides=1")
+    config = load(None, (*sets, f"solver.contact.atol={atol}")).config
+    contact_sim.run(only(config, PIPELINE["contact-sim"].reads), {"fixedpoint": GAIT}, Listener())
+    assert any("stiction_velocity" in note and "lower atol" in note for note in notes) is told
+
+
 def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypatch):
     monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", 0)
     with pytest.raises(NoAnswer) as caught:

@@ -56,7 +56,7 @@ class Case(Block):
     agreement: Annotated[
         float,
         key("1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", _HERE, gt=0.0),
-    ] = 1e-3
+    ] = 1e-4
     compared_steps: Annotated[
         int, key("1", "steps of which the times are compared: fewer where small errors grow", _HERE, ge=1)
     ] = 20

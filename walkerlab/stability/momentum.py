@@ -40,6 +40,7 @@ INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
 MOST_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
 SETTLED: Final = 1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
+MOST_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
 FEET_ALONG, FEET_HEIGHT, FEET_NORMAL, FEET_FRICTION = 0, 1, 2, 3  # columns of sampled_feet
 
 
@@ -68,7 +69,7 @@ def momentum_findings(ready: Prepared, config: Config, case: Case) -> list[Findi
         return []
     found = momentum_balance(ready, config, case)
     unknown = found.unsure + found.unresolved
-    if unknown > case.agreement:
+    if unknown > MOST_UNKNOWN:
         return []
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
     return [Finding("momentum not given by ground and gravity, over the walker's", finite(found.residual), limit)]
@@ -78,7 +79,7 @@ def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
     """Momentum against impulse over the first steps of a case."""
     short = case.model_copy(update={"steps": min(case.steps, STEPS)})
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
-    speed = leg / pendulum_time(config)
+    speed = max(leg / pendulum_time(config), *np.abs(ready.start[4:6]), leg * float(np.max(np.abs(ready.start[6:]))))
     scale = mass * np.array([speed, speed, speed * leg])
     walk = looked_at(ready, config, short, np.zeros(0))
     grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)

@@ -18,6 +18,7 @@ from walkerlab.gait.contact_run import (
     walk_contact,
 )
 from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.physics.contact.friction import Coulomb
 from walkerlab.physics.contact.terrain import Checkerboard
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
 from walkerlab.scene.left_out import of_contact_walk
@@ -27,6 +28,7 @@ from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
 SAMPLES_PER_PENDULUM_TIME = 200
+RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
 TIME, LEG = "time", "leg"
 
@@ -41,6 +43,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     )
     sampled = bool(config.outputs)
     interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+    tell_unresolved_slip(settings.atol, scene, progress)
     progress.start("contact-sim", 1)
     result = walk_contact(
         scene.walker,
@@ -73,6 +76,16 @@ def compile_kernels(config: Config) -> None:
     for pinned in dict.fromkeys((scene.pinned, None)):
         result = walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, y, methods, 1, interval)
         groups(config, scene, result)
+
+
+def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
+    """Say so if the tolerance on velocities (m/s) leaves friction to chance."""
+    law = scene.walker.friction
+    if isinstance(law, Coulomb) and atol > RESOLVED * law.stiction_velocity:
+        progress.note(
+            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against contact.stiction_velocity, "
+            f"{law.stiction_velocity:g} m/s: friction, and how the walk ends, may be chance; lower atol"
+        )
 
 
 def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, tuple[float, ...]]:
