@@ -5,7 +5,7 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_methods import RUNS, SCENES, measured_methods
 
-from walkerlab.figures.accuracy import FIGURES, LOOKS
+from walkerlab.figures.accuracy import FIGURES, LOOKS, entries, series_of
 from walkerlab.figures.canvas import styled
 from walkerlab.solvers.registry import METHODS
 
@@ -40,6 +40,14 @@ def test_runs_that_did_not_reach_the_end_stay_visible_above_all_others():
     failed = points(left, crosses=True)
     assert [x for x, _ in failed] == sorted(run[4] for run in RUNS if run[3] is None)
     assert min(y for _, y in failed) > max(y for _, y in points(left, crosses=False))
+
+
+def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
+    every = list(series_of(SCENES[0], measured_methods()))
+    whole = [one for one in every if one.reached.all()]
+    assert 0 < len(whole) < len(every)
+    for shown, there in ((every, True), (whole, False)):
+        assert ("end not reached" in [entry.get_label() for entry in entries(shown, AGREEMENT)]) is there
 
 
 def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():

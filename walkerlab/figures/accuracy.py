@@ -148,7 +148,8 @@ def entries(every: list[Series], floor: float) -> list[Line2D]:
     ]
     cross = Line2D([], [], color=BLACK, linestyle="none", marker="x", markersize=5.0, label="end not reached")
     known = Line2D([], [], color=PALE, linewidth=6.0, label=f"reference unsure, {floor:.0e}")
-    return [*methods, cross, known]
+    crosses = [] if all(one.reached.all() for one in every) else [cross]
+    return [*methods, *crosses, known]
 
 
 def caption(scene: str, results: Results) -> str:
