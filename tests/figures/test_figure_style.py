@@ -13,7 +13,7 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.figure_08 import AT_SAME_TIME, IN_PHASE, PAPER
 from walkerlab.figures.registry import FIGURES
-from walkerlab.figures.style import CONTACT, LEGS, RIGID, WIDTH, brightness
+from walkerlab.figures.style import CONTACT, LEGS, RIGID, WIDTH
 
 RESULTS = {
     "both models": both_models(),
@@ -112,6 +112,12 @@ def test_legend_names_everything_once(drawn):
     (legend,) = drawn.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert len(set(names)) == len(names)
+
+
+def brightness(colour):
+    """Grey level of a colour '#RRGGBB' on a grey printer, 0 black to 1 white (Rec. 601 luma)."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return 0.299 * red + 0.587 * green + 0.114 * blue
 
 
 @pytest.mark.parametrize(

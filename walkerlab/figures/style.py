@@ -74,9 +74,3 @@ LEGS: Final = (
     Look("leg 1 (swings first)", GREEN, "-", 1.0, "o", order=4),
     Look("leg 2 (stands first)", PURPLE, (0.0, (5.0, 1.2)), 1.0, "s", order=3),
 )
-
-
-def brightness(colour: str) -> float:
-    """Grey level of a colour '#RRGGBB' on a grey printer, 0 black to 1 white (Rec. 601 luma)."""
-    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    return 0.299 * red + 0.587 * green + 0.114 * blue

@@ -43,13 +43,6 @@ class GaitAnswer:
     reason: str  # how it was found, or why not
     advice: str = ""
 
-    @property
-    def required(self) -> ContactGait:
-        """The gait; ValueError if there is none."""
-        if self.gait is None:
-            raise ValueError(self.reason)
-        return self.gait
-
 
 def find_gait_from(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:
     """The contact gait near a start with both feet on the ground (state of the free walker, 8 numbers).

@@ -178,7 +178,7 @@ def momentum(samples: ContactSamples, config: Config) -> Array:
     angle, rate = y[:, 2:4] + config.slope_rad, y[:, 6:8]
     up = np.stack([-np.sin(angle), np.cos(angle)], axis=2)  # samples, legs, axes: from foot to hip
     turned = np.stack([-up[:, :, 1], up[:, :, 0]], axis=2) * rate[:, :, None]
-    b = walker.leg_length_m - walker.foot_to_mass_m
+    b = walker.mass_to_hip_m
     share = walker.leg_mass_kg * b / walker.total_mass_kg
     hip, hip_velocity = y[:, 0:2] + share * up.sum(axis=1), y[:, 4:6] + share * turned.sum(axis=1)
     masses = [(walker.hip_mass_kg, hip, hip_velocity)]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import walkerlab.physics.rigid.swing  # noqa: F401 (what a walk of the rigid model integrates)
 from walkerlab.gait.comparison import Array
 from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
 from walkerlab.gait.rigid_measures import energies
