@@ -25,14 +25,14 @@ from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
 from whole_process import whole_process_times
 
-from walkerlab.gait.continuation import Branch
-from walkerlab.gait.fixed_point import Search, SearchSettings, find_gaits
-from walkerlab.gait.small_slope import seeds
-from walkerlab.gait.step_map import newton
-from walkerlab.scene.contact_trials import contact_trial
-from walkerlab.scene.references import Reference, reference_for
+from walkerlab.benchmarks.contact_trials import contact_trial
+from walkerlab.benchmarks.references import Reference, reference_for
+from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
+from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.small_slope import seeds
+from walkerlab.orbits.step_map import newton
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10

@@ -20,8 +20,8 @@ from statistics import median
 
 from walkerlab.config import loader
 from walkerlab.config.schema import Config
-from walkerlab.gait.contact_run import MethodSettings, walk_contact
-from walkerlab.physics.contact.compass import STANCE_FOOT
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.graph import PIPELINE

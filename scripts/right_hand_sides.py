@@ -12,18 +12,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import walkerlab.physics.rigid.swing  # noqa: F401  (registers the right-hand side of the rigid walker)
+import walkerlab.mechanics.rigid_swing  # noqa: F401  (registers the right-hand side of the rigid walker)
 from walkerlab.config import loader
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.motion import OnGround, ground_wrench
+from walkerlab.ground.walker import ContactWalker, Foot, FootMotion, foot_force, foot_motion
 from walkerlab.kernels import inlined, kernel
-from walkerlab.physics.contact.friction import Coulomb, Frictionless
-from walkerlab.physics.contact.motion import OnGround, ground_wrench
-from walkerlab.physics.contact.walker import ContactWalker, Foot, FootMotion, foot_force, foot_motion
-from walkerlab.physics.multibody.tree import mass_matrix, sines_cosines, with_centrifugal
-from walkerlab.physics.rigid.walker import RigidWalker, step_length
-from walkerlab.physics.system import State, blank, derivative
-from walkerlab.physics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
+from walkerlab.mechanics.tree import mass_matrix, sines_cosines, with_centrifugal
+from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
 from walkerlab.scene.contact import contact_scene, hinged_walker
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.system import State, blank, derivative
 from walkerlab.solvers.vectors import load, store
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
@@ -93,7 +93,7 @@ def wrench_of_point(
 
 @inlined
 def moved(walker: ContactWalker, s: Vector, c: Vector, y: State, wrench: tuple[float, float, Vector]) -> State:
-    """Rates of the state under the ground's force and torques, as in physics/contact/motion.py."""
+    """Rates of the state under the ground's force and torques, as in ground/motion.py."""
     n = len(s)
     torques = with_centrifugal(walker.tree, s, c, y, 4 + n, wrench[2])
     alpha = solve_symmetric(mass_matrix(walker.tree, s, c), torques)

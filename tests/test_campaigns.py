@@ -11,8 +11,8 @@ from walkerlab.errors import ConfigError
 from walkerlab.report.page import render
 from walkerlab.report.results import Results
 from walkerlab.report.sections.stability import section
-from walkerlab.stability.verdict import CaseResult
 from walkerlab.stages.stability import summary_of
+from walkerlab.verification.verdict import CaseResult
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 MARKUP = "<script>alert(1)</script>"

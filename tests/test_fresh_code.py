@@ -11,13 +11,13 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
 from walkerlab.kernels import CACHE_FOLDER
-import walkerlab.gait.trial_of_code as trial
+import walkerlab.orbits.trial_of_code as trial
 print(trial.twice(3.0), CACHE_FOLDER.name)
 """
 CALLER = '''"""A kernel that calls a function of another file."""
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.trial_of_code import once
+from walkerlab.mechanics.trial_of_code import once
 
 
 @kernel
@@ -42,8 +42,8 @@ def copy(tmp_path):
     """A copy of the package with two files more, and a way to run it in a process of its own."""
     package = tmp_path / "walkerlab"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    (package / "gait" / "trial_of_code.py").write_text(CALLER)
-    (package / "physics" / "trial_of_code.py").write_text(CALLED)
+    (package / "orbits" / "trial_of_code.py").write_text(CALLER)
+    (package / "mechanics" / "trial_of_code.py").write_text(CALLED)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
 
     def run():
@@ -62,7 +62,7 @@ def compiled(folder):
 
 def test_an_edited_function_of_another_file_never_runs_stale(copy):
     package, run = copy
-    called = package / "physics" / "trial_of_code.py"
+    called = package / "mechanics" / "trial_of_code.py"
     before = called.stat()
     assert run()[0] == 8.0
     called.write_text(CALLED.replace("x + 1.0", "x + 2.0"))
@@ -90,16 +90,16 @@ def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(copy):
 
 FOREIGN = """
 from typing import NamedTuple
-from walkerlab.physics.trial_of_system import value
-from walkerlab.gait.trial_of_system import valued
+from walkerlab.mechanics.trial_of_system import value
+from walkerlab.orbits.trial_of_system import valued
 class Foreign(NamedTuple):
     number: float
 value.case(Foreign)(lambda system: 3.0)
 result = valued(Foreign(1.0))
 """
 OWN = """
-from walkerlab.physics.trial_of_system import Own
-from walkerlab.gait.trial_of_system import valued
+from walkerlab.mechanics.trial_of_system import Own
+from walkerlab.orbits.trial_of_system import valued
 print(valued(Own(1.0)))
 """
 SYSTEM = '''"""Systems of several types."""
@@ -130,7 +130,7 @@ VALUED = '''"""A kernel for systems of any type."""
 from typing import Any
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.trial_of_system import value
+from walkerlab.mechanics.trial_of_system import value
 
 
 @kernel
@@ -142,8 +142,8 @@ def valued(system: Any) -> float:
 
 def test_code_compiled_for_types_of_another_program_does_not_stand_in_the_way(copy, tmp_path):
     package, _ = copy
-    (package / "physics" / "trial_of_system.py").write_text(SYSTEM)
-    (package / "gait" / "trial_of_system.py").write_text(VALUED)
+    (package / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
+    (package / "orbits" / "trial_of_system.py").write_text(VALUED)
     (tmp_path / "foreign.py").write_text(FOREIGN)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
 

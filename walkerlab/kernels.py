@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 # the only packages in which compiled functions may stand (a test says so)
-KERNEL_HOMES = ("physics", "solvers", "gait")
+KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 KEPT_GENERATIONS = 8
 # No licence to contract or reorder: code compiled twice computes the same to the last bit.
 # No counting of references (_nrt): kernels allocate nothing and borrow all arrays from their caller, and counting takes

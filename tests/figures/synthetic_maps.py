@@ -2,9 +2,9 @@
 
 from synthetic_walks import stored
 
-from walkerlab.gait.outcome import Outcome
-from walkerlab.stability.maps import VERDICTS
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages.stability_maps import step_group, stiction_group, summary_of
+from walkerlab.verification.maps import VERDICTS
 
 CELLS = 3
 # outcome, outcome at a tenfold tolerance, error

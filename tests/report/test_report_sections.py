@@ -170,7 +170,7 @@ def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
 
 
 def test_every_headline_is_of_an_erratum_that_is_looked_for():
-    places = Path(find_spec("walkerlab.gait.paper").submodule_search_locations[0]) / "errata.py"
+    places = Path(find_spec("walkerlab.paper").submodule_search_locations[0]) / "errata.py"
     assert [start for start in HEADLINES if f'"{start}' not in places.read_text()] == []
 
 
@@ -307,7 +307,7 @@ def test_a_section_is_one_function_and_one_entry():
 
 
 def test_the_report_loads_no_plotting_and_no_compiler():
-    heavy = ("matplotlib", "numba", "scipy", "walkerlab.physics", "walkerlab.scene.rigid")
+    heavy = ("matplotlib", "numba", "scipy", "walkerlab.mechanics", "walkerlab.hybrid", "walkerlab.scene.rigid")
     code = f"import sys, walkerlab.stages.report; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
-from walkerlab.gait.contact_signals import feet_motion, hip_height
-from walkerlab.physics.contact.friction import Coulomb, Frictionless
-from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
+from walkerlab.hybrid.contact_events import feet_motion, hip_height
 from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
 from walkerlab.scene.left_out import of_contact_walk
 

@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
-from walkerlab.gait.contact_run import MethodSettings, walk_contact
-from walkerlab.gait.contact_signals import ALONG, STICKS_FORWARD, feet_motion, joins
-from walkerlab.physics.contact.compass import STANCE_FOOT, CompassParts, compass_assembly, contact_walker
-from walkerlab.physics.contact.friction import Coulomb, Frictionless
-from walkerlab.physics.contact.motion import OnGround
-from walkerlab.physics.multibody.parts import Assembly, Body, Particle
-from walkerlab.physics.system import derivative, jacobian
+from walkerlab.ground.compliant import STANCE_FOOT, CompassParts, compass_assembly, contact_walker
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.motion import OnGround
+from walkerlab.hybrid.contact_events import ALONG, STICKS_FORWARD, feet_motion, joins
+from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
+from walkerlab.mechanics.parts import Assembly, Body, Particle
 from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import SWING_EQUATIONS
 from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import derivative, jacobian
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute, preview

@@ -4,8 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import blank, derivative, jacobian
 from walkerlab.solvers.stepping import STEP_DONE, T, advance, begin
+from walkerlab.solvers.system import blank, derivative, jacobian
 from walkerlab.solvers.vectors import load
 
 LINEAR, CURVE, VAN_DER_POL, EXPLOSION = range(4)

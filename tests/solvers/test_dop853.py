@@ -9,7 +9,6 @@ import rooted_trees
 from scipy.integrate import solve_ivp
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import blank, derivative
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.stepping import (
@@ -29,6 +28,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
+from walkerlab.solvers.system import blank, derivative
 
 # ---- tableau -------------------------------------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import blank, derivative, jacobian
 from walkerlab.solvers.registry import METHODS, method_named
 from walkerlab.solvers.stepping import (
     ACCEPTED,
@@ -23,6 +22,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
+from walkerlab.solvers.system import blank, derivative, jacobian
 
 MOON = 0.012277471
 PLENTY = 10**6

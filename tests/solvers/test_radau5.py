@@ -27,7 +27,6 @@ from stiff_problems import (
 )
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import derivative
 from walkerlab.solvers.radau5 import new_radau5
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.solvers.stepping import (
@@ -46,6 +45,7 @@ from walkerlab.solvers.stepping import (
     interpolate,
     rewind,
 )
+from walkerlab.solvers.system import derivative
 from walkerlab.solvers.vectors import store
 
 PLENTY = 10**7

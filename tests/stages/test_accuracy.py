@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walkerlab.benchmarks.ladder import Climb, Row, Run, climb, finished, left_of, measure, row_of
+from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
+from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
-from walkerlab.scene.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.stages import accuracy_ladder
 from walkerlab.stages.accuracy import best_methods, conclusion, rows_group, summary_of
-from walkerlab.stages.accuracy_ladder import Climb, Row, Run, climb, finished, left_of, measure, row_of
 
 CONFIG = load(None, ("contact=null",)).config
 START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)

@@ -13,7 +13,7 @@ from walkerlab.stages.graph import PIPELINE, Stage
 COMPILED_THEN_RUN = """
 import sys
 from walkerlab.config.loader import load
-from walkerlab.gait import contact_run
+from walkerlab.hybrid import contact_run
 from walkerlab.stages import contact_sim
 from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
-from walkerlab.gait.paper.study import study_the_paper
+from walkerlab.paper.study import study_the_paper
 from walkerlab.stages import compare, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent

@@ -9,7 +9,7 @@ import pytest
 from walkerlab.config.canonical import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.gait import recorded_walk
+from walkerlab.hybrid import recorded_walk
 from walkerlab.stages import fixedpoint, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent

@@ -40,7 +40,7 @@ class Request:
         """The config, its warnings said; ConfigError if it is not usable."""
         loaded = load(self.config, self.sets, self.strides)
         if loaded.config.stability.cases:
-            from walkerlab.stability.catalogue import judged
+            from walkerlab.verification.catalogue import judged
 
             judged(loaded.config.stability.cases)
         for warning in loaded.warnings:

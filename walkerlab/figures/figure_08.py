@@ -25,7 +25,7 @@ from walkerlab.figures.walks import (
     shown,
     walk_of,
 )
-from walkerlab.gait.paper.printed import ANGLE_ERROR, VELOCITY_ERROR, Printed
+from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR, Printed
 
 AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
 IN_PHASE: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)

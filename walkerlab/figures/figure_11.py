@@ -17,7 +17,7 @@ from walkerlab.figures.figure_05 import TUNE_STAGE
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import BLACK, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
-from walkerlab.gait.outcome import Outcome
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.store.content import Group
 
 SWING, STANCE = "swing_factor", "stance_factor"

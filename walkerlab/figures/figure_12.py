@@ -15,7 +15,7 @@ from walkerlab.figures.figure_05 import TUNE_STAGE
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, Look
-from walkerlab.gait.paper.printed import ANGLE_ERROR
+from walkerlab.paper.printed import ANGLE_ERROR
 from walkerlab.store.content import Group
 
 ALIGNED, VELOCITY, RAW = "angle_error_rad", "velocity_error_rad_s", "raw_angle_error_rad"

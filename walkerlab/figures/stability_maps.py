@@ -20,7 +20,7 @@ from walkerlab.figures.figure_11 import COLOURS, WHITE
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import BLACK, GREY, ORANGE, PALE, VERMILLION
-from walkerlab.gait.outcome import Outcome
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.store.content import Group
 
 STAGE: Final = "stability-maps"

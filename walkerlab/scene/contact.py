@@ -6,10 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.gait.contact_gait import GaitAnswer, find_gait_from
-from walkerlab.gait.contact_run import Ground, MethodSettings
-from walkerlab.gait.contact_signals import Frame
-from walkerlab.physics.contact.compass import (
+from walkerlab.ground.compliant import (
     STANCE_FOOT,
     CompassParts,
     centre_to,
@@ -17,13 +14,16 @@ from walkerlab.physics.contact.compass import (
     contact_walker,
     pinned_walker,
 )
-from walkerlab.physics.contact.friction import Coulomb, Frictionless
-from walkerlab.physics.contact.normal_force import NormalLaw
-from walkerlab.physics.contact.pinned import Pinned, floating_state
-from walkerlab.physics.contact.terrain import AfterMidSwing, Checkerboard
-from walkerlab.physics.contact.walker import ContactWalker
-from walkerlab.physics.system import State
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.pinned import Pinned, floating_state
+from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_events import Frame
+from walkerlab.hybrid.contact_run import Ground, MethodSettings
+from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import CompassWalker, Config, Contact

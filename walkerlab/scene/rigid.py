@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.physics.rigid.walker import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
 from walkerlab.solvers.registry import method_named
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import inlined
-from walkerlab.physics.system import State, blank, derivative
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.dop853_tableau import nonzero
 from walkerlab.solvers.stepping import (
@@ -33,6 +32,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
+from walkerlab.solvers.system import State, blank, derivative
 from walkerlab.solvers.vectors import combine, load, shifted, store
 
 # Hairer's code has 0.9: a fifth of a walk's steps was rejected, and the same error took 11 % more work.

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 from walkerlab.kernels import inlined
-from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.solvers.radau5_stages import (
     ERROR_OLD,
     FRESH,
@@ -46,6 +45,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
+from walkerlab.solvers.system import State, blank, derivative, jacobian
 from walkerlab.solvers.vectors import combine, load, store
 
 __all__ = ["Radau5", "new_radau5"]

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import inlined
-from walkerlab.physics.system import State, derivative
 from walkerlab.solvers.radau5_tableau import ALPHA, BETA, GAMMA, INV_1, INV_2, INV_3, T_1, T_2, C
 from walkerlab.solvers.shifted_system import factor_shifted, solve_shifted
 from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
+from walkerlab.solvers.system import State, derivative
 from walkerlab.solvers.vectors import combine, load, store
 
 NEWTON_MOST = 7

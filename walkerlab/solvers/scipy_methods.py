@@ -13,7 +13,6 @@ import numba
 import numpy as np
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import State, blank, derivative, jacobian
 from walkerlab.solvers import cvode
 from walkerlab.solvers.stepping import (
     ACCEPTED,
@@ -35,6 +34,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
+from walkerlab.solvers.system import State, blank, derivative, jacobian
 from walkerlab.solvers.vectors import load, store
 
 

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from walkerlab.kernels import kernel
-from walkerlab.physics.system import blank, derivative
+from walkerlab.solvers.system import blank, derivative
 from walkerlab.solvers.vectors import load
 
 RUNAWAY = 1e12  # a number of the state beyond which a run has diverged

@@ -11,7 +11,7 @@ counts       (5,) see the indices below
 from typing import Any
 
 from walkerlab.kernels import by_type, inlined
-from walkerlab.physics.system import State
+from walkerlab.solvers.system import State
 
 # indices into `clock`
 T_OLD, T, H_NEXT = 0, 1, 2

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
+from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
+from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.config.schema import Config
-from walkerlab.scene.references import End, Reference, WalkEndsError, second_end
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.trials import RigidTrial, Trial
-from walkerlab.stages.accuracy_ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
@@ -81,7 +81,7 @@ def scenes(config: Config, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     if config.contact is None:
         return
     # contact code is loaded only for scenes that have contact
-    from walkerlab.scene.contact_trials import contact_trial, near_rigid_trial
+    from walkerlab.benchmarks.contact_trials import contact_trial, near_rigid_trial
 
     length = float(inputs["fixedpoint"].summary["step_length_m"]) if "fixedpoint" in inputs else None
     given = tuple(float(x) for x in state)

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config, Equations
-from walkerlab.gait.comparison import Motion, sampled_at_step_ends
-from walkerlab.gait.paper.errata import errata
-from walkerlab.gait.paper.measured import (
+from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
+from walkerlab.hybrid.recorded_walk import as_state
+from walkerlab.paper.departures import departures
+from walkerlab.paper.errata import errata
+from walkerlab.paper.measured import (
     ContactModel,
     EnergyRecord,
     Measured,
@@ -20,15 +22,13 @@ from walkerlab.gait.paper.measured import (
     over_last_steps,
     rigid_model,
 )
-from walkerlab.gait.paper.result_rows import result_rows
-from walkerlab.gait.paper.start_rows import start_rows
-from walkerlab.gait.paper.study import study_the_paper
-from walkerlab.gait.paper.tables import table_1, table_2, table_3
-from walkerlab.gait.paper.verdict import Row, Verdict
-from walkerlab.gait.recorded_walk import as_state
-from walkerlab.physics.system import State
-from walkerlab.scene.departures import departures
+from walkerlab.paper.result_rows import result_rows
+from walkerlab.paper.start_rows import start_rows
+from walkerlab.paper.study import study_the_paper
+from walkerlab.paper.tables import table_1, table_2, table_3
+from walkerlab.paper.verdict import Row, Verdict
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
 from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
 from walkerlab.stages.progress import Progress

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.gait.comparison import (
+from walkerlab.hybrid.comparison import (
     IMPACT_PHASE,
     LEGS,
     PHASES,
@@ -19,7 +19,7 @@ from walkerlab.gait.comparison import (
     difference_in_time,
     orbit_distances,
 )
-from walkerlab.gait.paper.measured import Errors, LegErrors
+from walkerlab.paper.measured import Errors, LegErrors
 from walkerlab.store.content import Group, Variable
 
 LEG, TIME, STEP, PHASE = "leg", "time", "step", "phase"

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.gait.paper.errata import Erratum
-from walkerlab.gait.paper.verdict import Row
+from walkerlab.paper.errata import Erratum
+from walkerlab.paper.verdict import Row
 from walkerlab.store.content import Group, Variable
 
 ROW = "row"

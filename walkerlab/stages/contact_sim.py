@@ -9,7 +9,10 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.gait.contact_run import (
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.terrain import Checkerboard
+from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
     MethodSettings,
@@ -17,9 +20,6 @@ from walkerlab.gait.contact_run import (
     sampled_feet,
     walk_contact,
 )
-from walkerlab.physics.contact.compass import STANCE_FOOT
-from walkerlab.physics.contact.friction import Coulomb
-from walkerlab.physics.contact.terrain import Checkerboard
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named

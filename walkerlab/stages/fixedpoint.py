@@ -9,8 +9,8 @@ import numpy as np
 
 from walkerlab.config.schema import Config, Equations
 from walkerlab.errors import NoAnswer
-from walkerlab.gait.fixed_point import GaitSearch, find_gaits
-from walkerlab.gait.gait import Gait
+from walkerlab.orbits.fixed_point import GaitSearch, find_gaits
+from walkerlab.orbits.gait import Gait
 from walkerlab.scene.rigid import COORDINATES, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable

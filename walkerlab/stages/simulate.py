@@ -9,11 +9,11 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.gait.recorded_walk import RecordedWalk, Samples, as_state, take_walk
-from walkerlab.gait.rigid_measures import energies, reactions
-from walkerlab.physics.system import State
+from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state, take_walk
+from walkerlab.hybrid.rigid_measures import energies, reactions
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import COORDINATES, RigidScene, rigid_scene
+from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.stability.catalogue import judged
-from walkerlab.stability.cells import cells_of, run_cells
-from walkerlab.stability.known import Known
-from walkerlab.stability.ordinary import CAP, FINE, Choice
-from walkerlab.stability.verdict import CaseResult
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
+from walkerlab.verification.catalogue import judged
+from walkerlab.verification.cells import cells_of, run_cells
+from walkerlab.verification.known import Known
+from walkerlab.verification.ordinary import CAP, FINE, Choice
+from walkerlab.verification.verdict import CaseResult
 
 
 def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:

@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.gait.outcome import Outcome
-from walkerlab.stability.maps import (
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.parts import Parts
+from walkerlab.verification.maps import (
     BUDGET,
     STEP,
     STICTION_VELOCITY,
@@ -20,11 +23,8 @@ from walkerlab.stability.maps import (
     along,
     pieces_of,
 )
-from walkerlab.stability.ordinary import FINE, STEPS
-from walkerlab.stability.processes import in_order
-from walkerlab.stages.progress import Progress
-from walkerlab.store.content import Content, Group, Variable
-from walkerlab.store.parts import Parts
+from walkerlab.verification.ordinary import FINE, STEPS
+from walkerlab.verification.processes import in_order
 
 STIFFNESS_DIM, VELOCITY_DIM, STEP_DIM = "stiffness", "stiction_velocity", "step_size"
 OF_STICTION = ("outcome", "steps", "sharper_outcome", "error", "rhs_evaluations")

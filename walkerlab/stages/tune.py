@@ -10,11 +10,13 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.gait.contact_gait import GaitAnswer
-from walkerlab.gait.contact_run import ContactWalkResult, MethodSettings, walk_contact
-from walkerlab.gait.paper_start import PaperStart, forces_of, paper_start
-from walkerlab.gait.recorded_walk import RecordedWalk, take_walk
-from walkerlab.gait.scaled_starts import (
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.pinned import Pinned
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.orbits.scaled_starts import (
     Adjustment,
     Margin,
     ScaledStarts,
@@ -23,14 +25,12 @@ from walkerlab.gait.scaled_starts import (
     scaled_starts,
     smallest_change,
 )
-from walkerlab.gait.start_map import StartMap, contact_map, rigid_map
-from walkerlab.physics.contact.compass import STANCE_FOOT
-from walkerlab.physics.contact.pinned import Pinned
-from walkerlab.physics.rigid.walker import RigidWalker
-from walkerlab.physics.system import State
+from walkerlab.orbits.start_map import StartMap, contact_map, rigid_map
+from walkerlab.paper.adams_start import PaperStart, forces_of, paper_start
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.gait.comparison import Motion
-from walkerlab.gait.contact_section import ContactGait
-from walkerlab.gait.paper.printed import ANGLE_ERROR
-from walkerlab.gait.recorded_walk import RecordedWalk
-from walkerlab.gait.rigid_limit import (
+from walkerlab.ground.compliant import compass_assembly, contact_walker
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.comparison import Motion
+from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.orbits.contact_section import ContactGait
+from walkerlab.orbits.rigid_limit import (
     ALL,
     ALL_POINT,
     DAMPING,
@@ -27,10 +28,9 @@ from walkerlab.gait.rigid_limit import (
     extrapolated,
     observed_orders,
 )
-from walkerlab.physics.contact.compass import compass_assembly, contact_walker
-from walkerlab.physics.contact.walker import ContactWalker
-from walkerlab.physics.system import State
+from walkerlab.paper.printed import ANGLE_ERROR
 from walkerlab.scene.contact import ContactScene, compass_parts, start_state
+from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import leg_variables

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.gait.contact_run import ContactWalkResult
-from walkerlab.gait.contact_section import ContactGait
-from walkerlab.gait.outcome import Outcome
-from walkerlab.gait.paper.printed import COORDINATES, TABLE_2
-from walkerlab.gait.recorded_walk import RecordedWalk
-from walkerlab.gait.scaled_starts import Adjustment, Margin
-from walkerlab.gait.start_map import StartMap
+from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.orbits.contact_section import ContactGait
+from walkerlab.orbits.scaled_starts import Adjustment, Margin
+from walkerlab.orbits.start_map import StartMap
+from walkerlab.paper.printed import COORDINATES, TABLE_2
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.store.content import Group, Variable
 

@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.report.blocks import Block, Body, Cell, Column, Paragraph, Section, Table, Tone, body, table
 from walkerlab.report.numbers import count, listed, number, whole
 from walkerlab.report.results import Results
-from walkerlab.stability.verdict import BUDGET_USED
+from walkerlab.verification.verdict import BUDGET_USED
 
 VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
 

@@ -1,0 +1,90 @@
+"""Pads in lanes, and the plane that lets scuffing feet through."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from walkerlab.ground.terrain import (
+    AfterMidSwing,
+    Checkerboard,
+    carried_after_lift,
+    carried_in_air,
+    carried_in_cell,
+    cell_at,
+    cell_edges,
+    order_matters,
+    starts_carried,
+    stride_measure,
+)
+
+pitches = st.floats(0.05, 5.0)
+places = st.floats(-100.0, 100.0)
+feet = st.sampled_from([0, 1])
+
+
+def walked_on(pitch):
+    """Lanes as a walk lays them: the first stance foot (1) stands at 0, the other one pitch behind it."""
+    return Checkerboard(pitch, (-pitch, 0.0))
+
+
+@given(pitch=pitches, along=places, foot=feet)
+def test_a_cell_holds_what_lies_between_its_edges(pitch, along, foot):
+    terrain = walked_on(pitch)
+    begins, ends = cell_edges(terrain, foot, cell_at(terrain, foot, along))
+    assert begins - 1e-9 <= along <= ends + 1e-9
+    assert ends - begins == pytest.approx(pitch)
+
+
+@given(pitch=pitches, foot=feet, cell=st.integers(-50, 50))
+def test_cells_follow_each_other_without_gap_or_overlap(pitch, foot, cell):
+    terrain = walked_on(pitch)
+    here, there = cell_edges(terrain, foot, cell), cell_edges(terrain, foot, cell + 1)
+    assert here[1] == pytest.approx(there[0], abs=1e-9)
+    assert cell_at(terrain, foot, 0.5 * (here[0] + here[1])) == cell
+    assert carried_in_cell(terrain, cell) != carried_in_cell(terrain, cell + 1)
+
+
+@given(pitch=pitches, j=st.integers(-20, 20))
+def test_each_legs_pads_lie_centred_on_its_footholds(pitch, j):
+    """The stance leg's on s = 2 j S, the other's on s = (2 j + 1) S; where one has a pad the other has none."""
+    terrain = walked_on(pitch)
+    for foothold, foot in ((2 * j * pitch, 1), ((2 * j + 1) * pitch, 0)):
+        cell = cell_at(terrain, foot, foothold)
+        assert carried_in_cell(terrain, cell)
+        assert not carried_in_cell(terrain, cell_at(terrain, 1 - foot, foothold))
+        assert sum(cell_edges(terrain, foot, cell)) / 2 == pytest.approx(foothold, abs=1e-9)
+
+
+@pytest.mark.parametrize("carried", [False, True])
+@pytest.mark.parametrize("ahead", [False, True])
+def test_a_pad_stays_where_it_is(carried, ahead):
+    terrain = walked_on(0.4)
+    assert carried_after_lift(terrain, carried, ahead) == carried
+    assert carried_in_air(terrain, carried, ahead) == carried
+    assert starts_carried(terrain, False)
+    assert starts_carried(terrain, True)
+    assert not order_matters(terrain)
+    assert stride_measure(terrain) == 0.4
+
+
+@given(along=places, foot=feet)
+def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
+    terrain = AfterMidSwing(0.4)
+    begins, ends = cell_edges(terrain, foot, cell_at(terrain, foot, along))
+    assert begins < along - 1e6 < along + 1e6 < ends
+    assert math.isfinite(begins)
+    assert math.isfinite(ends)
+
+
+def test_on_a_plane_a_foot_is_carried_only_after_it_was_in_the_air_ahead():
+    terrain = AfterMidSwing(0.4)
+    assert order_matters(terrain)
+    assert starts_carried(terrain, True)
+    assert not starts_carried(terrain, False)  # it is about to swing
+    assert not carried_after_lift(terrain, True, False)  # leaves its stance behind: swings through
+    assert carried_after_lift(terrain, True, True)  # bounces at its landing
+    assert not carried_in_air(terrain, False, False)  # scuffs behind
+    assert carried_in_air(terrain, False, True)  # has passed, in the air
+    assert not carried_in_air(terrain, True, False)  # fell back behind

@@ -1,0 +1,240 @@
+"""Gaits against numbers known from elsewhere, and what every search must hold to."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_walk import SIGNALS
+from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, choice, find_gaits
+from walkerlab.orbits.gait import Gait
+from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
+from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, new_shooting, newton
+from walkerlab.solvers.dop853 import new_dop853
+from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.stepping import RHS
+
+PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
+PRINTED = PAPER._replace(c21_sign=AS_PRINTED)
+
+
+def on_slope(degrees, walker=PAPER):
+    return walker._replace(slope=np.deg2rad(degrees))
+
+
+def shooting(walker):
+    method = new_dop853(16, 1e-13, 1e-15, 10**5)
+    return new_shooting(walker, method, finder_for(method, SIGNALS))
+
+
+# from two other integrations of the same equations
+KNOWN = {
+    1.0: ((-0.2044455, 0.1695390, -0.6057394, -0.8617140), 0.7036485, 0.3718088, 0.36256 + 0.46032j, 0.21568),
+    3.0: ((-0.3233886, 0.2186688, -0.3773739, -1.0923836), 0.7343464, 0.5354454, -0.19973 + 0.54448j, 0.13157),
+}
+
+
+@pytest.mark.parametrize("degrees", KNOWN)
+def test_gait_has_its_known_state_period_length_and_multipliers(degrees):
+    state, period, length, pair, single = KNOWN[degrees]
+    gait = find_gaits(on_slope(degrees)).gait
+    assert gait.state == pytest.approx(state, abs=6e-8)
+    assert (gait.period, gait.step_length) == pytest.approx((period, length), abs=6e-8)
+    assert gait.multipliers == pytest.approx((pair, pair.conjugate(), single), abs=6e-6)
+    assert gait.stable
+
+
+def test_gait_at_three_degrees_has_the_published_period():
+    # Goswami, Thuilot, Espiau 1996
+    assert find_gaits(on_slope(3.0)).gait.period == pytest.approx(0.735, abs=1e-3)
+
+
+def test_gait_loses_stability_by_period_doubling_near_the_published_slope():
+    # Goswami, Thuilot, Espiau 1996: 4.37 deg
+    before, after = (find_gaits(on_slope(degrees)).gaits[-1] for degrees in (4.32, 4.42))
+    assert before.stable
+    assert not after.stable
+    assert after.multipliers[0] == pytest.approx(-1.0, abs=0.1)
+
+
+def test_corrected_gait_at_the_papers_slope():
+    gait = find_gaits(PAPER).gait
+    assert gait.state == pytest.approx((-0.204200, 0.169400, -0.605819, -0.861041), abs=6e-7)
+    assert gait.period == pytest.approx(0.703597, abs=6e-7)
+    assert gait.energy == pytest.approx(150.241, abs=6e-4)
+
+
+def test_equations_as_printed_have_the_papers_fixed_point():
+    gait = find_gaits(PRINTED).gait
+    assert gait.state == pytest.approx((-0.202216, 0.167416, -0.600581, -0.846575), abs=6e-7)
+    assert gait.period == pytest.approx(0.706384, abs=6e-7)
+    # (11), to the digits it prints: -0.84 is cut, not rounded
+    assert [round(value, 4) for value in gait.state[:2]] == [-0.2022, 0.1674]
+    assert [np.trunc(100 * value) / 100 for value in gait.state[2:]] == [-0.60, -0.84]
+
+
+def test_energy_as_printed_is_that_of_table_3():
+    gait = find_gaits(PRINTED).gait
+    assert gait.energy == pytest.approx(150.142, abs=6e-4)
+    assert gait.energy_drift == pytest.approx(150.183 - 150.054, abs=1e-3)
+
+
+@pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(10.0), on_slope(1e-4)])
+def test_every_gait_is_solved_to_rounding(walker):
+    search = find_gaits(walker)
+    assert search.gaits
+    for gait in search.gaits:
+        assert gait.residual <= 1e-11
+
+
+def test_both_ways_of_searching_find_the_gait():
+    search = find_gaits(PAPER)
+    assert {LONG_PERIOD, RANDOM_START} <= set(search.gait.found_by)
+    assert search.random_hits[search.chosen] > 0
+
+
+def test_the_short_period_gait_is_found_too_and_is_unstable():
+    search = find_gaits(PAPER)
+    short = next(gait for gait in search.gaits if SHORT_PERIOD in gait.found_by)
+    assert short.period < search.gait.period
+    assert not short.stable
+
+
+def test_the_same_seed_draws_the_same_starts():
+    assert find_gaits(PAPER, seed=3) == find_gaits(PAPER, seed=3)
+
+
+def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
+    search = Search(PAPER, SearchSettings())
+    work = []
+    branch = Branch(search.looking, seeds(search.walker)[0])
+    correct = branch._correct
+
+    def counted(s):
+        found = correct(s)
+        work.append(int(search.looking.method.counts[RHS]))
+        return found
+
+    branch._correct = counted
+    assert branch.follow(search.walker.slope).z is not None
+    assert len(work) <= 8
+    # one step of walking takes about 200 right-hand sides
+    assert sum(work) < 30 * 200
+
+
+@pytest.mark.parametrize("degrees", [0.0, -1.0, -40.0])
+def test_no_gait_where_the_slope_does_not_descend(degrees):
+    search = find_gaits(on_slope(degrees))
+    assert search.gait is None
+    assert "standing still is no gait" in search.reason
+
+
+def test_as_printed_equations_have_no_gait_on_the_level_either():
+    search = find_gaits(on_slope(0.0, PRINTED))
+    assert search.gait is None
+    assert "none of 100 random starting values" in search.reason
+
+
+def test_no_gait_where_the_ground_would_have_to_pull():
+    search = find_gaits(on_slope(20.0))
+    assert search.gait is None
+    assert "pull" in search.reason
+    assert all(gait.objections for gait in search.gaits)
+
+
+def test_at_fifteen_degrees_what_repeats_itself_cannot_be_walked():
+    search = find_gaits(on_slope(15.0))
+    assert search.gait is None
+    assert {gait.found_by[0] for gait in search.gaits} == {SHORT_PERIOD, LONG_PERIOD}
+    assert all(any("grows" in objection for objection in gait.objections) for gait in search.gaits)
+
+
+def test_no_gait_for_an_impossible_walker():
+    search = find_gaits(PAPER._replace(leg_inertia=1e9))
+    assert search.gait is None
+    assert "random starting values" in search.reason
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"foot_to_mass": 1e-9, "hip_mass": 0.0},
+        {"foot_to_mass": 1.0 - 1e-9, "leg_mass": 1e-6, "hip_mass": 1e4},
+        {"foot_to_mass": 0.6, "hip_mass": 0.0, "leg_mass": 1e5},
+        {"foot_to_mass": 1.0 - 1e-9, "leg_inertia": 1e6},
+        {"leg_mass": 1e-6, "hip_mass": 1e6, "leg_inertia": 1e-9},
+    ],
+)
+def test_degenerate_walkers_are_searched_without_a_mishap(changes):
+    for gait in find_gaits(PAPER._replace(**changes)).gaits:
+        assert np.isfinite(gait.state).all()
+        assert gait.residual <= 1e-11
+
+
+def test_a_slope_with_unstable_gaits_only_says_so():
+    search = find_gaits(on_slope(5.0))
+    assert not search.gait.stable
+    assert "no gait is stable" in search.reason
+
+
+def gait_with(radius, pull=0.0):
+    return Gait((0.0, 0.0, -1.0, -1.0), 1.0, 0.4, (radius, 0.0, 0.0), 0.0, 150.0, 0.0, 100.0 - pull, 0.2, 0.0)
+
+
+def test_the_stable_gait_is_chosen_and_one_that_cannot_be_walked_never():
+    assert choice((gait_with(2.0), gait_with(0.5)))[0] == 1
+    assert choice((gait_with(2.0), gait_with(0.5, pull=200.0)))[0] == 0
+    assert choice((gait_with(0.5, pull=200.0),))[0] is None
+    assert choice(())[0] is None
+
+
+@settings(max_examples=10)
+@given(st.floats(0.05, 20.0), st.floats(0.1, 10.0), st.floats(0.5, 50.0), st.floats(0.2, 4.0))
+def test_scaled_walkers_walk_alike(length, mass, gravity, degrees):
+    walker = on_slope(degrees)
+    scaled = walker._replace(
+        leg_length=length,
+        foot_to_mass=0.5 * length,
+        leg_mass=5.0 * mass,
+        hip_mass=10.0 * mass,
+        gravity=gravity,
+    )
+    gait, twin = find_gaits(walker).gait, find_gaits(scaled).gait
+    time = np.sqrt((length / 1.0) / (gravity / 9.81))
+    assert twin.period == pytest.approx(time * gait.period, rel=1e-9)
+    assert twin.step_length == pytest.approx(length * gait.step_length, rel=1e-9)
+    rates = [value / time for value in gait.state[2:]]
+    assert twin.state == pytest.approx((*gait.state[:2], *rates), rel=1e-8)
+    assert twin.multipliers == pytest.approx(gait.multipliers, abs=1e-7)
+    assert twin.energy == pytest.approx(mass * length * gravity / 9.81 * gait.energy, rel=1e-9)
+
+
+@settings(max_examples=10)
+@given(
+    st.floats(0.3, 0.7), st.floats(0.5, 5.0), st.floats(0.0, 0.05), st.floats(0.1, 3.0), st.sampled_from([-1.0, 1.0])
+)
+def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degrees, sign):
+    walker = RigidWalker(1.0, fraction, 5.0, 5.0 * hip, 5.0 * inertia, 9.81, np.deg2rad(degrees), sign)
+    for gait in find_gaits(walker).gaits:
+        map_ = shooting(walker)
+        z = np.array(gait.state[1:])
+        status, period = evaluate(map_, z)
+        assert status == 0
+        assert period == pytest.approx(gait.period, rel=1e-10)
+        assert np.abs(map_.z_next - z).max() < 1e-11 * np.sqrt(9.81)
+
+
+def test_newton_gives_up_where_no_step_is_taken():
+    status, _, residual, evaluations = newton(shooting(PAPER), np.array([0.17, 3.0, 3.0]), 1e-12)
+    assert status != Outcome.WALKED
+    assert residual == NO_RESIDUAL
+    assert evaluations == 1
+
+
+def test_newton_stops_when_only_rounding_is_left():
+    *_, residual, evaluations = newton(shooting(PAPER), np.array([0.168, -0.61, -0.86]), 0.0)
+    assert residual < 1e-14
+    assert evaluations <= 8

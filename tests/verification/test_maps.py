@@ -1,0 +1,100 @@
+"""The maps: cells are what the walks say, a run that was cut off goes on, and figures are drawn of them."""
+
+import numpy as np
+import pytest
+
+from walkerlab.config.canonical import only
+from walkerlab.config.loader import load
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.stages import stability_maps
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+from walkerlab.store.parts import Parts
+from walkerlab.verification.maps import (
+    PAPER_STIFFNESS,
+    VERDICTS,
+    StepColumn,
+    StictionCell,
+    along,
+    on_ground,
+    pieces_of,
+)
+
+CELLS = 2
+
+
+class CutOff(Silent):
+    """Interrupts after so many calls of `advance`."""
+
+    def __init__(self, left):
+        self.left, self.done, self.total = left, 0, 0
+
+    def start(self, label, total=None):
+        self.total = total
+
+    def advance(self, n=1):
+        self.done += n
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+def run(folder, progress=None, jobs=1):
+    config = only(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].reads)
+    parts = Parts(folder / "maps.parts", "key")
+    return stability_maps.run(config, {}, progress or Silent(), parts=parts, jobs=jobs)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("whole"))
+
+
+def test_the_paper_is_a_cell_that_walks():
+    outcome, steps, sharper, error, _ = StictionCell("x", PAPER_STIFFNESS, 0.1).run()
+    assert (outcome, steps, sharper) == (Outcome.WALKED, 4, Outcome.WALKED)
+    assert 0.0 < error < 1e-6
+
+
+def test_the_papers_ground_is_the_papers():
+    contact = on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
+
+
+def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
+    numbers = StepColumn("x", PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3)).run()
+    verdicts = [VERDICTS[int(number)] for number in numbers[::2]]
+    assert verdicts == ["fine", "fine", "diverges"]
+    assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
+    assert numbers[5] == 0.0
+
+
+def test_every_cell_has_a_name_of_its_own():
+    pieces = pieces_of(3)
+    assert len({piece.name for piece in pieces}) == len(pieces)
+    assert sum(piece.cells for piece in pieces) == 2 * 3 * 3
+
+
+def test_both_maps_are_stored(whole):
+    stiction, step = whole.groups["stiction"], whole.groups["step"]
+    assert stiction["outcome"].shape == step["verdict"].shape == (CELLS, CELLS)
+    np.testing.assert_array_equal(step["step_size"], along((1e-6, 1e-2), CELLS))
+    assert stiction["outcome"][1].tolist() == [Outcome.SLID] * 2  # oil
+    assert step["verdict"][1].tolist() == [VERDICTS.index("diverges")] * 2
+    assert whole.summary["cells"] == 8
+    assert sum(whole.summary["outcomes"].values()) == sum(whole.summary["fixed_step"].values()) == 4
+
+
+def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(whole, tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path, CutOff(left=1 + 3))  # what was there, and three pieces
+    kept = Parts(tmp_path / "maps.parts", "key").kept
+    assert sorted(kept) == ["step 0", "step 1", "stiction 0 0"]
+    rest = CutOff(left=99)
+    assert run(tmp_path, rest).digest() == whole.digest()
+    assert rest.left == 99 - (1 + 3)
+    assert rest.done == rest.total == 8
+
+
+def test_two_processes_come_to_the_same(whole, tmp_path):
+    assert run(tmp_path, jobs=2).digest() == whole.digest()

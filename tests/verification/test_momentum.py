@@ -1,0 +1,90 @@
+"""Momentum on compliant ground: it balances, and what is a little wrong does not."""
+
+import numpy as np
+import pytest
+
+from walkerlab.config.stability import Case
+from walkerlab.verification import momentum
+from walkerlab.verification.catalogue import config_of, shipped
+from walkerlab.verification.contact_start import prepared
+from walkerlab.verification.momentum import (
+    MOST_UNKNOWN,
+    impulse,
+    momentum_balance,
+    momentum_findings,
+    split,
+    unsettled,
+    with_middles,
+)
+
+CASES = {case.name: case for case in shipped()}
+
+
+def ready_for(name):
+    case = CASES[name]
+    config = config_of(case)
+    return prepared(config, case), config, case
+
+
+@pytest.mark.parametrize("name", ["paper", "leg-inertia", "foot-40-percent", "friction-0", "dropped-1-cm", "moon"])
+def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
+    ready, config, case = ready_for(name)
+    found = momentum_balance(ready, config, case)
+    assert found.residual <= 1e-7 + found.unsure
+    assert found.unsure < 1e-5
+
+
+@pytest.mark.parametrize(
+    "changed", [{"hip_mass_kg": 10.01}, {"leg_mass_kg": 5.005}, {"foot_to_mass_m": 0.501}, {"leg_inertia_kg_m2": 0.05}]
+)
+def test_a_walker_that_is_a_little_another_one_does_not_balance(changed):
+    ready, config, case = ready_for("paper")
+    other = config.model_copy(update={"walker": config.walker.model_copy(update=changed)})
+    (finding,) = momentum_findings(ready, other, case)
+    assert not finding.ok
+
+
+def test_a_ground_that_pushes_a_little_more_does_not_balance():
+    ready, config, case = ready_for("paper")
+    heavier = config.model_copy(update={"gravity_m_s2": 1.001 * config.gravity_m_s2})
+    (finding,) = momentum_findings(ready, heavier, case)
+    assert not finding.ok
+
+
+def test_a_hinge_pushes_too_so_nothing_is_said():
+    case = Case(name="x", expected=("walked",), reason="r", config={"contact": {"stance": "pinned"}})
+    config = config_of(case)
+    assert momentum_findings(prepared(config, case), config, case) == []
+
+
+def test_where_friction_hangs_on_slips_below_the_tolerance_nothing_is_said():
+    ready, config, case = ready_for("stiction-1e-7")
+    found = momentum_balance(ready, config, case)
+    assert found.unresolved > MOST_UNKNOWN > found.unsure
+    assert momentum_findings(ready, config, case) == []
+
+
+def test_where_the_sums_do_not_settle_nothing_is_said(monkeypatch):
+    monkeypatch.setattr(momentum, "MOST_UNKNOWN", 1e-9)
+    assert momentum_findings(*ready_for("paper")) == []
+
+
+def test_feet_at_a_thousand_kilometres_a_second_are_measured_by_their_own_momentum():
+    case = Case(name="x", expected=("lifted-off",), reason="r", config={"start": [-0.2, 0.16, 1e6, 1e6]})
+    config = config_of(case)
+    (finding,) = momentum_findings(prepared(config, case), config, case)
+    assert finding.ok
+
+
+def test_sums_are_simpsons_and_know_where_they_are_unsure():
+    times = with_middles(np.array([0.0, 1.0, 1.5, 4.0]))
+    cubic = (times**3)[:, None]
+    np.testing.assert_allclose(impulse(times, cubic)[:, 0], np.array([0.0, 1.0, 1.5, 4.0]) ** 4 / 4.0)
+    kink = np.maximum(0.0, times - 1.25)[:, None]
+    assert unsettled(times, kink)[[0, 2]] == pytest.approx([0.0, 0.0])
+    assert unsettled(times, kink)[1] > 0.0
+
+
+def test_intervals_that_want_it_are_cut_into_four():
+    times = with_middles(np.array([0.0, 1.0, 2.0]))
+    assert split(times, np.array([False, True])).tolist() == [0.0, 1.0, 1.25, 1.5, 1.75, 2.0]

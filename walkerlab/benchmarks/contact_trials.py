@@ -1,0 +1,53 @@
+"""Walks on compliant ground to measure methods by: the config's contact, and one near the rigid limit."""
+
+from __future__ import annotations
+
+from walkerlab.benchmarks.trials import ContactTrial
+from walkerlab.config.schema import Config
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_run import Ground
+from walkerlab.mechanics.rigid_compass import step_length
+from walkerlab.scene.contact import ContactScene, contact_scene, start_state
+from walkerlab.scene.rigid import rigid_walker
+
+STIFFER, SLOWER = 100.0, 0.01  # the near-rigid contact: stiffness and damping times, creep velocities times
+
+
+def contact_trial(config: Config, state: tuple[float, ...], length_m: float | None, steps: int) -> ContactTrial:
+    """Steps with the config's own contact."""
+    scene = scene_for(config, state, length_m)
+    return trial_of(scene, scene.walker, state, steps, "contact")
+
+
+def near_rigid_trial(config: Config, state: tuple[float, ...], length_m: float | None, steps: int) -> ContactTrial:
+    """Steps on stiffer ground that creeps less, where integrators have a harder life."""
+    scene = scene_for(config, state, length_m)
+    walker = scene.walker
+    normal = walker.normal._replace(
+        stiffness=STIFFER * walker.normal.stiffness, damping=STIFFER * walker.normal.damping
+    )
+    friction = walker.friction
+    if isinstance(friction, Coulomb):
+        friction = friction._replace(
+            stiction_velocity=SLOWER * friction.stiction_velocity,
+            friction_velocity=SLOWER * friction.friction_velocity,
+        )
+    stiffer = walker._replace(normal=normal, friction=friction)
+    return trial_of(scene, stiffer, state, steps, "contact-near-rigid")
+
+
+def scene_for(config: Config, state: tuple[float, ...], length_m: float | None) -> ContactScene:
+    """The config's scene on pads of the rigid step length, or of the start's own if there is no gait."""
+    rigid = rigid_walker(config, config.equations)
+    length = length_m or abs(step_length(rigid, state[0], state[1]))
+    return contact_scene(config, length, own_pitch_m=length)
+
+
+def trial_of(
+    scene: ContactScene, walker: ContactWalker, state: tuple[float, ...], steps: int, name: str
+) -> ContactTrial:
+    """The trial of a walker in a scene."""
+    ground = Ground(scene.terrain, scene.frame)
+    return ContactTrial(walker, ground, start_state(scene, state), STANCE_FOOT, steps, name)

@@ -1,0 +1,177 @@
+"""One method on one scene, tolerance by tolerance: what is run, how it is timed, and when it is given up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from walkerlab.benchmarks.references import End, Reference, WalkEndsError, first_end
+from walkerlab.benchmarks.trials import Trial, TrialRun
+from walkerlab.solvers.registry import METHODS
+
+BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
+SHORT = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
+LAST = 12_000  # of a library's run that is the last of its ladder: a walk in Python takes a hundred times as long
+WARM_UP = 2_000  # after which everything is compiled and loaded
+REPEATS, REPEAT_TIME_S = 7, 0.3
+OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
+LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One tolerance: what it gave, and the times that it took."""
+
+    tolerance: float
+    result: TrialRun
+    walls_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Climb:
+    """One method on its ladder.
+
+    runs        so far
+    ladder      all tolerances
+    unfinished  whether the next one takes long and is yet to be run
+    """
+
+    trial: Trial
+    method: str
+    ladder: tuple[float, ...]
+    runs: tuple[Run, ...]
+    unfinished: bool
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method at one tolerance."""
+
+    scene: str
+    method: str
+    tolerance: float
+    outcome: str
+    error: float | None  # largest difference of the end state from the reference; None if the end was not reached
+    against: str  # the method of that reference, which is another one
+    within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
+    wall_s: float  # median of the repeats
+    least_wall_s: float
+    repeats_of_wall_s: int  # how many the median is of
+    rhs_evaluations: int
+    accepted: int
+    rejected: int
+
+
+def climb(trial: Trial, method: str) -> Climb:
+    """Run one tolerance after the other until a run takes too much."""
+    own = method in METHODS and METHODS[method].compiled
+    ladder, short, last = (OWN_LADDER, BUDGET, BUDGET) if own else (LIBRARY_LADDER, min(SHORT, BUDGET), LAST)
+    trial.prepare(method, ladder[0], WARM_UP)()
+    runs: list[Run] = []
+    for tolerance in ladder:
+        run = measure(trial, method, tolerance, short)
+        if run.result.outcome == "budget-exhausted" and short < BUDGET:
+            return Climb(trial, method, ladder, tuple(runs), unfinished=True)
+        runs.append(run)
+        if run.result.rhs_evaluations >= last:
+            break
+    return Climb(trial, method, ladder, tuple(runs), unfinished=False)
+
+
+def finished(
+    trials: Sequence[Trial], climbs: Sequence[Climb], jobs: int
+) -> tuple[list[End | WalkEndsError], list[Climb]]:
+    """The first ends of the references, or why there is none, and the climbs with the run that was put off."""
+    # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
+    ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
+    put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in climbs if one.unfinished]
+    done = in_processes([*ends, *put_off], jobs)
+    firsts: list[End | WalkEndsError] = [next(done) for _ in trials][::-1]
+    return firsts, [
+        replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished else one for one in climbs
+    ]
+
+
+def end_or_reason(trial: Trial) -> End | WalkEndsError:
+    """The first end of a trial's reference, or why there is none."""
+    try:
+        return first_end(trial)
+    except WalkEndsError as problem:
+        return problem
+
+
+def long_run(trial: Trial, method: str, tolerance: float) -> Run:
+    """A run that takes long, perhaps in a process of its own that has to warm up."""
+    trial.prepare(method, tolerance, WARM_UP)()
+    return measure(trial, method, tolerance, BUDGET)
+
+
+def in_processes(tasks: Sequence[Callable[[], Any]], jobs: int) -> Iterator[Any]:
+    """Results in the order of the tasks."""
+    if jobs <= 1:
+        yield from map(called, tasks)
+        return
+    # compiled code and threads do not survive a fork
+    with ProcessPoolExecutor(min(jobs, len(tasks) or 1), get_context("spawn")) as pool:
+        yield from pool.map(called, tasks)
+
+
+def called(task: Callable[[], Any]) -> Any:
+    """What a task gives; a function that other processes can be sent."""
+    return task()
+
+
+def measure(trial: Trial, method: str, tolerance: float, budget: int) -> Run:
+    """Run once to warm up, then as often as time allows."""
+    walk = trial.prepare(method, tolerance, budget)
+    first_s, result = timed(walk)
+    walls = [first_s] if first_s > REPEAT_TIME_S else []
+    while len(walls) < REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
+        walls.append(timed(walk)[0])
+    return Run(tolerance, result, tuple(walls))
+
+
+def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
+    """Seconds that a walk takes, and its result."""
+    start = time.perf_counter()
+    result = walk()
+    return time.perf_counter() - start, result
+
+
+def row_of(one: Climb, run: Run, reference: Reference) -> Row:
+    """A run with its error."""
+    end, result = reference.for_method(one.method), run.result
+    error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
+    return Row(
+        one.trial.name,
+        one.method,
+        run.tolerance,
+        result.outcome,
+        error,
+        end.method,
+        error is not None and error <= reference.agreement,
+        median(run.walls_s),
+        min(run.walls_s),
+        len(run.walls_s),
+        result.rhs_evaluations,
+        result.accepted,
+        result.rejected,
+    )
+
+
+def left_of(one: Climb) -> list[dict[str, Any]]:
+    """The tolerances that were not run, and why."""
+    last = one.runs[-1]
+    why = f"{last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g} already"
+    return [
+        {"scene": one.trial.name, "method": one.method, "tolerance": rtol, "why": why}
+        for rtol in one.ladder[len(one.runs) :]
+    ]

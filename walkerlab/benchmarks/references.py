@@ -1,0 +1,97 @@
+"""The truth that methods are measured by, and how well it is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks import taylor_reference
+from walkerlab.benchmarks.trials import RigidTrial, Trial
+
+Floats = NDArray[np.float64]
+
+ENDLESS = 100_000_000  # right-hand sides
+TIGHTEST = {"dop853": 1e-14, "radau5": 1e-11}
+TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a walk ends, by which method."""
+
+    method: str
+    state: Floats
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The end of a walk by two different methods: their difference is what the end is known to."""
+
+    first: End
+    second: End
+
+    @property
+    def method(self) -> str:
+        """The method of the end that others are measured by."""
+        return self.first.method
+
+    @property
+    def state(self) -> Floats:
+        """That end."""
+        return self.first.state
+
+    @property
+    def second_method(self) -> str:
+        """The other method."""
+        return self.second.method
+
+    @property
+    def agreement(self) -> float:
+        """Largest difference of the two."""
+        return float(np.max(np.abs(self.first.state - self.second.state)))
+
+    def for_method(self, method: str) -> End:
+        """The end to measure a method by: never its own."""
+        return self.second if method == self.first.method else self.first
+
+
+class WalkEndsError(Exception):
+    """The walk does not reach its last step, so that there is no end state to compare."""
+
+
+def reference_for(trial: Trial) -> Reference:
+    """The reference of a trial; WalkEndsError if the walk does not reach its end."""
+    by_second = second_end(trial)
+    return Reference(first_end(trial), by_second)
+
+
+def first_end(trial: Trial) -> End:
+    """The end that all methods but one are measured by: Taylor series where they are installed and the scene is rigid.
+
+    Else the explicit method, which shares nothing with those that are good at contact, and takes a million steps there.
+
+    Raises WalkEndsError if the walk does not reach its end.
+    """
+    if isinstance(trial, RigidTrial) and taylor_reference.is_installed():
+        return End(taylor_reference.NAME, taylor_reference.walk_by_taylor(trial.walker, trial.start, trial.steps))
+    return tightest(trial, "dop853")
+
+
+def second_end(trial: Trial) -> End:
+    """The end by another method: quick, so that it also tells whether the walk has one.
+
+    Raises WalkEndsError if it has not.
+    """
+    by_taylor = isinstance(trial, RigidTrial) and taylor_reference.is_installed()
+    return tightest(trial, "dop853" if by_taylor else "radau5")
+
+
+def tightest(trial: Trial, method: str) -> End:
+    """The end by one of our methods at its tightest tolerance."""
+    tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST
+    result = trial.prepare(method, tolerances[method], ENDLESS)()
+    if not result.state.size:
+        raise WalkEndsError(f"the walk ends early ({result.outcome}), so that there is no end state to compare")
+    return End(method, result.state)

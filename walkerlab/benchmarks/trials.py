@@ -1,0 +1,134 @@
+"""Walks that methods are measured by: the same start, the same number of steps, one end state to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks.user_script import walk_as_a_script
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_observer import Unobserved
+from walkerlab.hybrid.rigid_walk import SIGNALS as RIGID_SIGNALS
+from walkerlab.hybrid.rigid_walk import walk
+from walkerlab.kernels import uncompiled
+from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.solvers.registry import METHODS, Method, finder_for
+from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
+
+if TYPE_CHECKING:
+    from walkerlab.ground.walker import ContactWalker
+    from walkerlab.hybrid.contact_run import Ground
+
+Floats = NDArray[np.float64]
+USER_SCRIPT = "scipy-dop853-numpy"
+ATOL_PER_RTOL = 1e-2
+
+
+@dataclass(frozen=True)
+class TrialRun:
+    """What one run gave and cost."""
+
+    outcome: str
+    state: Floats  # at the end, empty if it was not reached
+    rhs_evaluations: int
+    accepted: int
+    rejected: int
+
+
+class Trial(Protocol):
+    """A walk to measure by."""
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The methods that can walk it."""
+
+    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
+        """A function that does the walk with a method, ready to be timed."""
+
+
+@dataclass(frozen=True)
+class RigidTrial:
+    """Steps of the rigid model; the end state is that after the last impact."""
+
+    walker: RigidWalker
+    start: tuple[float, ...]
+    steps: int
+    name: str = "rigid"
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Every method, and what a user would write."""
+        return (*METHODS, USER_SCRIPT)
+
+    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
+        """A function that does the walk with a method, ready to be timed."""
+        atol = rtol * ATOL_PER_RTOL
+        if method == USER_SCRIPT:
+            return lambda: self._as_a_script(rtol, atol, budget)
+        return self._prepared(METHODS[method], rtol, atol, budget)
+
+    def _prepared(self, entry: Method, rtol: float, atol: float, budget: int) -> Callable[[], TrialRun]:
+        """The walk with memory that its runs share, as a program that walks often would have it."""
+        method = entry.new(4, rtol, atol, budget)
+        finder = finder_for(method, RIGID_SIGNALS)
+        strikes, before, after = np.zeros(self.steps), np.zeros((self.steps, 4)), np.zeros((self.steps, 4))
+        stride = walk if entry.compiled else uncompiled(walk)
+
+        def run() -> TrialRun:
+            clear_counts(method)
+            method.clock[H_NEXT] = 0.0
+            status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after)
+            return finished(Outcome(status), after[-1], method.counts)
+
+        return run
+
+    def _as_a_script(self, rtol: float, atol: float, budget: int) -> TrialRun:
+        state, evaluations = walk_as_a_script(self.walker, self.start, self.steps, rtol, atol, budget)
+        outcome = Outcome.BUDGET_EXHAUSTED if state is None else Outcome.WALKED
+        return TrialRun(outcome.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
+
+
+@dataclass(frozen=True)
+class ContactTrial:
+    """Steps on compliant ground; the end state is that at the last touch."""
+
+    walker: ContactWalker
+    ground: Ground
+    start: tuple[float, ...]
+    stance: int
+    steps: int
+    name: str
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Every method of the registry."""
+        return tuple(METHODS)
+
+    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
+        """A function that does the walk with a method, ready to be timed."""
+        from walkerlab.hybrid.contact_run import MethodSettings
+
+        settings = MethodSettings(METHODS[method], rtol, rtol * ATOL_PER_RTOL, budget)
+        return lambda: self._walk(settings)
+
+    def _walk(self, settings: Any) -> TrialRun:
+        from walkerlab.hybrid.contact_run import walk_contact
+
+        result = walk_contact(
+            self.walker, self.ground, None, self.stance, self.start, settings, self.steps, None, booked=False
+        )
+        return finished(result.outcome, np.array(result.end_state), result.work)
+
+
+def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
+    """The run of a walk that ended; one that did not walk all its steps has no end state."""
+    end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
+    return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

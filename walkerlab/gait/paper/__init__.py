@@ -1,1 +1,0 @@
-"""The paper held against what is measured: its printed numbers, their verdicts, and its errata."""

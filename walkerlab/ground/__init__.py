@@ -1,0 +1,1 @@
+"""Ground contact as ADAMS computes it: normal force, friction, terrain, and the walker on it."""

@@ -1,0 +1,87 @@
+"""The compass walker described by its parts, and the walker on compliant ground assembled from any such description."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.pinned import Pinned
+from walkerlab.ground.walker import ContactWalker, Foot
+from walkerlab.mechanics.assembly import Anchor, levers, tree_about, tree_about_centre
+from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Particle, Revolute
+
+SWING_FOOT, STANCE_FOOT = 0, 1  # of the first step; body k carries foot k
+
+
+@dataclass(frozen=True)
+class CompassParts:
+    """Measures of a compass walker, SI."""
+
+    leg_length_m: float
+    foot_to_mass_m: float
+    leg_mass_kg: float
+    hip_mass_kg: float
+    leg_inertia_kg_m2: float
+    foot_radius_m: float
+
+
+def compass_assembly(parts: CompassParts) -> Assembly:
+    """Two legs hinged at a hip that is a point mass; each leg's frame has its origin at the hip and points up the leg.
+
+    A ball foot's centre is L - r from the hip, so that an upright leg reaches L.
+    """
+    mass_at = (0.0, parts.foot_to_mass_m - parts.leg_length_m)
+    foot_at = (0.0, parts.foot_radius_m - parts.leg_length_m)
+    hip = (0.0, 0.0)
+    legs = ("leg 1", "leg 2")
+    return Assembly(
+        bodies=tuple(Body(leg, parts.leg_mass_kg, mass_at, parts.leg_inertia_kg_m2) for leg in legs),
+        joints=(Revolute("hip", "leg 2", hip, "leg 1", hip),),
+        particles=(Particle("hip", parts.hip_mass_kg, "leg 2", hip),),
+        feet=tuple(BallFoot(f"foot of {leg}", leg, foot_at, parts.foot_radius_m) for leg in legs),
+    )
+
+
+def contact_walker(
+    assembly: Assembly, normal: NormalLaw, friction: Coulomb | Frictionless, gravity: float, slope: float
+) -> ContactWalker:
+    """The assembly on compliant ground; gravity in m/s^2, slope in rad."""
+    tree, foot_levers = tree_about_centre(assembly)
+    bodies = len(assembly.bodies)
+    feet = tuple(
+        Foot(
+            lever_x=tuple(float(x) for x in d[:, 0]),
+            lever_y=tuple(float(x) for x in d[:, 1]),
+            rolling=tuple(foot.radius_m if body == assembly.index(foot.body) else 0.0 for body in range(bodies)),
+            radius=foot.radius_m,
+        )
+        for foot, d in zip(assembly.feet, foot_levers, strict=True)
+    )
+    if len(feet) != 2:
+        raise ValueError(f"a walker has two feet; this assembly has {len(feet)}")
+    return ContactWalker(
+        tree=tree,
+        feet=(feet[0], feet[1]),
+        normal=normal,
+        friction=friction,
+        gravity_along=gravity * math.sin(slope),
+        gravity_down=gravity * math.cos(slope),
+        slope=slope,
+        blank=(0.0,) * (4 + 2 * bodies),
+    )
+
+
+def pinned_walker(assembly: Assembly, walker: ContactWalker, foot: int, along: float) -> Pinned:
+    """The walker hinged to the ground at the centre of a foot's ball, `along` the slope (m)."""
+    ball = assembly.feet[foot]
+    tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
+    return Pinned(walker, tree, foot, along, (0.0,) * (2 * len(assembly.bodies)))
+
+
+def centre_to(assembly: Assembly, body: str, at_m: tuple[float, float]) -> Any:
+    """Levers (bodies, 2), in m, from the centre of mass to a point of a body."""
+    foot = assembly.feet[0]
+    anchor = Anchor(foot.body, foot.centre_m)
+    _, foot_levers = tree_about_centre(assembly)
+    return foot_levers[0] + levers(assembly, anchor, Anchor(body, at_m))

@@ -1,0 +1,106 @@
+"""The walker whose first stance foot is hinged to the ground: two angles, no floating base, no stance contact.
+
+The paper's temporary revolute joint. The hinge is at the centre of the ball foot, which so keeps just touching the
+ground while the leg turns over it.
+"""
+
+from typing import Any, NamedTuple
+
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.kernels import inlined
+from walkerlab.mechanics.tree import (
+    Tree,
+    divide_by_mass,
+    mass_matrix,
+    sines_cosines,
+    tree_gradients,
+    with_centrifugal,
+)
+from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.solvers.system import State, blank, derivative, jacobian
+
+
+class Pinned(NamedTuple):
+    """The hinged walker; state (theta_1 .. theta_n, their velocities)."""
+
+    walker: ContactWalker
+    tree: Tree  # about the hinge
+    foot: int  # which foot is hinged
+    along: float  # m, where
+    blank: State
+
+
+@blank.case(Pinned)
+def pinned_blank(system: Pinned) -> State:
+    """The angles and their velocities."""
+    return system.blank
+
+
+@inlined
+def gravity_torques(system: Pinned, s: Vector, c: Vector) -> Vector:
+    """Torque of gravity on each body (N m): its first moment about the hinge in the field."""
+    tree, walker = system.tree, system.walker
+    torques = tree.arm_x
+    for k in range(len(s)):
+        forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
+        upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
+        torques = put(torques, k, -walker.gravity_along * upward - walker.gravity_down * forward)
+    return torques
+
+
+@derivative.case(Pinned)
+def pinned_derivative(system: Pinned, t: float, y: State) -> State:
+    """The tree's equations about the hinge."""
+    tree = system.tree
+    n = len(tree.arm_x)
+    s, c = sines_cosines(tree, y, 0, system.walker.slope)
+    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    alpha = solve_symmetric(mass_matrix(tree, s, c), torques)
+    rate = system.blank
+    for k in range(n):
+        rate = put(rate, k, y[n + k])
+        rate = put(rate, n + k, alpha[k])
+    return rate
+
+
+@jacobian.case(Pinned)
+def pinned_jacobian(system: Pinned, t: float, y: State, J: Any) -> None:
+    """Derivatives of the tree's equations about the hinge."""
+    tree, walker = system.tree, system.walker
+    n = len(tree.arm_x)
+    s, c = sines_cosines(tree, y, 0, walker.slope)
+    for i in range(2 * n):
+        for j in range(2 * n):
+            J[i, j] = 1.0 if j == i + n else 0.0
+    for k in range(n):
+        forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
+        upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
+        J[n + k, k] = walker.gravity_down * upward - walker.gravity_along * forward
+    M = mass_matrix(tree, s, c)
+    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    tree_gradients(tree, s, c, y, 0, solve_symmetric(M, torques), J)
+    divide_by_mass(tree, M, J)
+
+
+@inlined
+def floating_state(system: Pinned, y: State) -> State:
+    """The same motion as a state of the free walker: the hinge tells where the centre of mass is."""
+    walker = system.walker
+    foot = walker.feet[system.foot]
+    n = len(system.tree.arm_x)
+    s, c = sines_cosines(system.tree, y, 0, walker.slope)
+    along, height, speed, climb = system.along, foot.radius, 0.0, 0.0
+    full = walker.blank
+    for k in range(n):
+        forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
+        upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
+        along -= forward
+        height -= upward
+        speed += y[n + k] * upward
+        climb -= y[n + k] * forward
+        full = put(full, 2 + k, y[k])
+        full = put(full, 4 + n + k, y[n + k])
+    full = put(full, 0, along)
+    full = put(full, 1, height)
+    full = put(full, 2 + n, speed)
+    return put(full, 3 + n, climb)

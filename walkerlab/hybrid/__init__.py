@@ -1,0 +1,1 @@
+"""Walking: motion between events, what the events change, and how a walk ends."""

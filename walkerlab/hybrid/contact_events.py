@@ -1,0 +1,225 @@
+"""The signals whose zeros are the events of a walk on compliant ground, sampled along a step.
+
+Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). The others are joins of
+the force law, where its derivatives jump: a step that ends there keeps the method's order.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.motion import OnGround
+from walkerlab.ground.normal_force import grip
+from walkerlab.ground.pinned import Pinned, floating_state
+from walkerlab.ground.terrain import cell_edges, stride_measure
+from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
+from walkerlab.kernels import by_type, inlined
+from walkerlab.mechanics.tree import sines_cosines
+from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.system import State
+
+# signals of each foot
+HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
+STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
+ALONG = 9  # no event: where the foot is
+PER_FOOT = 10
+# signals of the walker
+PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
+SIGNALS = 2 * PER_FOOT + 3
+FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot from its foothold
+FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
+
+
+class Frame(NamedTuple):
+    """Measures of the walker that events are judged by."""
+
+    leg_length: float  # m
+    pendulum_time: float  # s, sqrt(L/g)
+    hip_x: tuple[float, ...]  # m, lever of the hip from the centre of mass, body by body
+    hip_y: tuple[float, ...]
+    locate_joins: bool  # end steps at the joins of the force law
+
+
+@by_type
+def walker_state(system: Any, y: State) -> State:
+    """The state of the free walker."""
+
+
+@walker_state.case(OnGround)
+def free_state(system: OnGround, y: State) -> State:
+    """It is the state."""
+    return y
+
+
+@walker_state.case(Pinned)
+def hinged_state(system: Pinned, y: State) -> State:
+    """The hinge gives the rest."""
+    return floating_state(system, y)
+
+
+@by_type
+def feels_ground(system: Any, carried: bool, height: float) -> bool:
+    """Whether a foot's force law is at work."""
+
+
+@feels_ground.case(OnGround)
+def free_feels(system: OnGround, carried: bool, height: float) -> bool:
+    """A carried foot inside the ground does."""
+    return carried and height < 0.0
+
+
+@feels_ground.case(Pinned)
+def hinged_feels(system: Pinned, carried: bool, height: float) -> bool:
+    """The hinge carries the walker."""
+    return False
+
+
+@inlined
+def feet_motion(walker: ContactWalker, y: State) -> tuple[FootMotion, FootMotion]:
+    """Both feet of the free walker's state."""
+    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
+    return foot_motion(walker, walker.feet[0], s, c, y), foot_motion(walker, walker.feet[1], s, c, y)
+
+
+@inlined
+def hip_height(walker: ContactWalker, frame: Frame, y: State) -> float:
+    """Height of the hip over the slope (m)."""
+    height = y[1]
+    for k in range(len(frame.hip_x)):
+        angle = y[2 + k] + walker.slope
+        height += math.sin(angle) * frame.hip_x[k] + math.cos(angle) * frame.hip_y[k]
+    return height
+
+
+@inlined
+def sample_signals(
+    system: Any,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    cells: Any,
+    stance: int,
+    foothold: float,
+    state: State,
+    node: int,
+    finder: CrossingFinder,
+) -> None:
+    """Values of all signals at one node of a step, where the system's state is `state`."""
+    y = walker_state(system, state)
+    feet = feet_motion(walker, y)
+    sample_foot(walker, feet[0], cell_edges(terrain, 0, cells[0]), 0, node, finder)
+    sample_foot(walker, feet[1], cell_edges(terrain, 1, cells[1]), PER_FOOT, node, finder)
+    finder.values[PASSING, node] = feet[1].along - feet[0].along
+    finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
+    away = finder.values[stance * PER_FOOT + ALONG, node] - foothold
+    finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+
+
+@inlined
+def farthest_slide(terrain: Any) -> float:
+    """How far from its foothold a loaded stance foot may get (m)."""
+    return FARTHEST_SLIDE * stride_measure(terrain)
+
+
+@inlined
+def sample_foot(
+    walker: ContactWalker, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
+) -> None:
+    """One foot's signals at node j."""
+    values = finder.values
+    values[first + HEIGHT, j] = motion.height
+    values[first + ALONG, j] = motion.along
+    values[first + LEFT_EDGE, j] = motion.along - edges[0]
+    values[first + RIGHT_EDGE, j] = edges[1] - motion.along
+    values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
+    values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
+    sample_slip(walker.friction, motion.slip, first, j, finder)
+
+
+@by_type
+def sample_slip(law: Any, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
+    """A foot's friction signals at node j."""
+
+
+@sample_slip.case(Coulomb)
+def sample_coulomb_slip(law: Coulomb, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
+    """The velocities at which the friction's pieces join."""
+    values = finder.values
+    values[first + STICKS_FORWARD, j] = slip - law.stiction_velocity
+    values[first + STICKS_BACKWARD, j] = slip + law.stiction_velocity
+    values[first + SLIDES_FORWARD, j] = slip - law.friction_velocity
+    values[first + SLIDES_BACKWARD, j] = slip + law.friction_velocity
+
+
+@sample_slip.case(Frictionless)
+def sample_no_slip(law: Frictionless, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
+    """Nothing joins."""
+
+
+@by_type
+def joins(law: Any) -> int:
+    """How many signals a foot has that matter with this friction law."""
+
+
+@joins.case(Coulomb)
+def coulomb_joins(law: Coulomb) -> int:
+    """All."""
+    return ALONG
+
+
+@joins.case(Frictionless)
+def frictionless_joins(law: Frictionless) -> int:
+    """Those without slip."""
+    return STICKS_FORWARD
+
+
+@inlined
+def earliest_crossing(
+    system: Any,
+    walker: ContactWalker,
+    frame: Frame,
+    watch_order: bool,
+    carried: Any,
+    stance: int,
+    at_zero: Any,
+    finder: CrossingFinder,
+) -> tuple[float, int]:
+    """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none.
+
+    watch_order  whether it matters that the feet pass each other
+    carried      (2,) whether there is ground under each foot
+    stance       the stance foot, which may slide
+    at_zero      (signals,) which signals the last event left at zero
+    """
+    best, signal = NO_CROSSING, -1
+    for foot in range(2):
+        first = foot * PER_FOOT
+        # a foot that an event left on the surface is inside or outside by rounding there
+        lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
+        for j in range(1, finder.nodes.size):
+            lowest = min(lowest, finder.values[first + HEIGHT, j])
+        inside = feels_ground(system, carried[foot] != 0, lowest)
+        last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
+        for index in range(first, first + last):
+            edge = index == first + LEFT_EDGE or index == first + RIGHT_EDGE
+            at = first_crossing(finder, index, FALLING if edge else 0, 0.0, at_zero[index] != 0)
+            if at < best:
+                best, signal = at, index
+        if inside and foot == stance:
+            at = first_crossing(finder, SLIDE, FALLING, 0.0, at_zero[SLIDE] != 0)
+            if at < best:
+                best, signal = at, SLIDE
+    if watch_order:
+        at = first_crossing(finder, PASSING, 0, 0.0, at_zero[PASSING] != 0)
+        if at < best:
+            best, signal = at, PASSING
+    at = first_crossing(finder, FALL, FALLING, 0.0, at_zero[FALL] != 0)
+    if at < best:
+        best, signal = at, FALL
+    return best, signal
+
+
+@inlined
+def is_join(signal: int) -> bool:
+    """Whether an event is a mere join of the force law."""
+    return signal < 2 * PER_FOOT and signal % PER_FOOT >= RELEASE

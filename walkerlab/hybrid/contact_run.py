@@ -1,0 +1,324 @@
+"""A whole walk on compliant ground: hinged first step if wanted, then free, with everything observed on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.ground.energy import book_energy, kinetic_energy, potential_energy
+from walkerlab.ground.motion import OnGround
+from walkerlab.ground.pinned import Pinned, floating_state
+from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
+from walkerlab.ground.walker import ContactWalker, foot_force
+from walkerlab.hybrid.contact_events import (
+    FALLEN_HIP,
+    HEIGHT,
+    PER_FOOT,
+    SIGNALS,
+    Frame,
+    feet_motion,
+    hip_height,
+)
+from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
+from walkerlab.hybrid.contact_tangent import new_tangent
+from walkerlab.hybrid.contact_walk import walk_part
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.kernels import kernel, uncompiled
+from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.registry import Method, finder_for
+from walkerlab.solvers.stepping import T
+from walkerlab.solvers.system import State
+from walkerlab.solvers.vectors import load
+
+Floats = NDArray[np.float64]
+
+
+NEVER = -1
+USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+
+
+@dataclass(frozen=True)
+class MethodSettings:
+    """Which method integrates, and how exactly."""
+
+    method: Method
+    rtol: float
+    atol: float
+    budget: int  # right-hand sides
+
+    def new(self, n: int) -> Any:
+        """The method with memory for n equations."""
+        return self.method.new(n, self.rtol, self.atol, self.budget)
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Where and at what cost a walk stopped."""
+
+    time_s: float
+    state: State
+    work: NDArray[np.int64]
+
+
+class Ground(NamedTuple):
+    """What a walk happens on and is judged by."""
+
+    terrain: Any  # Checkerboard or AfterMidSwing
+    frame: Frame
+
+
+@kernel
+def walk_free(
+    walker: ContactWalker,
+    ground: Ground,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    t: float,
+    y: State,
+    stop_passing_after: int,
+) -> int:
+    """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends.
+
+    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
+    """
+    system = OnGround(walker, (True, True))
+    return walk_part(
+        system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after
+    )
+
+
+@kernel
+def walk_hinged(
+    pinned: Pinned,
+    ground: Ground,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    y: State,
+) -> int:
+    """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
+    return walk_part(
+        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, ledger, 0.0, y, NEVER
+    )
+
+
+@kernel
+def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies: Any) -> None:
+    """Kinetic, potential and book energy (J) of every sampled state into energies (samples, 3)."""
+    for i in range(states.shape[0]):
+        y = load(states, i, walker.blank)
+        energies[i, 0] = kinetic_energy(walker, y)
+        energies[i, 1] = potential_energy(walker, y)
+        energies[i, 2] = book_energy(walker, (carried[i, 0] != 0, carried[i, 1] != 0), y)
+
+
+@kernel
+def sampled_feet(walker: ContactWalker, states: Any, carried: Any, feet: Any) -> None:
+    """Position along, height (m), normal force, friction (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
+    for i in range(states.shape[0]):
+        y = load(states, i, walker.blank)
+        motions = feet_motion(walker, y)
+        for foot in range(2):
+            motion = motions[foot]
+            feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = motion.along, motion.height, motion.slip
+            feet[i, foot, 2], feet[i, foot, 3] = 0.0, 0.0
+            if carried[i, foot] != 0 and motion.height < 0.0:
+                force = foot_force(walker, motion)
+                feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
+
+
+@dataclass(frozen=True)
+class ContactSamples:
+    """A walk at evenly spaced times."""
+
+    time_s: Floats  # (samples,)
+    states: Floats  # (samples, 8)
+    carried: NDArray[np.int8]  # (samples, 2)
+    stance: NDArray[np.int64]  # (samples,)
+    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges
+
+
+@dataclass(frozen=True)
+class ContactWalkResult:
+    """A walk on compliant ground, its fate and its cost."""
+
+    outcome: Outcome
+    touch_time_s: Floats  # (steps,)
+    touch_along_m: Floats  # (steps,)
+    slip_m: Floats  # (steps,)
+    end_time_s: float
+    end_state: State
+    max_penetration_m: float
+    energy_balance_residual_J: float
+    dissipated_J: Floats  # (3,)
+    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    samples: ContactSamples | None
+
+    @property
+    def periods_s(self) -> Floats:
+        """Time of each step from touch to touch."""
+        return np.diff(self.touch_time_s, prepend=0.0)
+
+    @property
+    def lengths_m(self) -> Floats:
+        """Distance along the slope of each step from touch to touch; the first from the first foothold."""
+        return np.diff(self.touch_along_m, prepend=0.0)
+
+
+def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: State) -> Ledger:
+    """The ledger of a walk of `steps` steps that starts from y with both feet on the ground."""
+    feet = feet_motion(walker, y)
+    cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
+    carried = np.zeros(2, np.int8)
+    for foot in range(2):
+        on_pad = carried_in_cell(terrain, int(cells[foot]))
+        carried[foot] = on_pad and starts_carried(terrain, foot == stance)
+    at_zero = np.zeros(SIGNALS, np.int8)
+    at_zero[[HEIGHT, PER_FOOT + HEIGHT]] = 1
+    foothold = np.array([motion.along for motion in feet])
+    touch_time, touch_along, slip = (np.zeros(steps) for _ in range(3))
+    return Ledger(
+        touch_time,
+        touch_along,
+        slip,
+        carried,
+        cells,
+        cells.copy(),
+        foothold,
+        at_zero,
+        np.zeros(2),
+        np.array([stance, 0]),
+    )
+
+
+def new_observer(
+    walker: ContactWalker,
+    ledger: Ledger,
+    y: State,
+    interval_s: float = 1.0,
+    samples: int = 0,
+    booked: bool = False,
+    directions: int = 0,
+) -> ContactObserver:
+    """An observer of a walk from state y.
+
+    interval_s, samples  time between samples, and how many there is room for
+    booked               whether to keep the energy's books
+    directions           how many directions of the start to carry along as the tangent
+    """
+    extremes = np.zeros(3)
+    extremes[START_ENERGY] = book_energy(walker, (bool(ledger.carried[0]), bool(ledger.carried[1])), y)
+    return ContactObserver(
+        booked,
+        interval_s * np.arange(samples),
+        np.zeros((samples, len(walker.blank))),
+        np.zeros((samples, 2), np.int8),
+        np.zeros(samples, np.int64),
+        np.zeros((samples, BOOKS)),
+        np.zeros(1, np.int64),
+        np.zeros(BOOKS),
+        extremes,
+        new_tangent(len(walker.blank), directions),
+    )
+
+
+def walk_contact(
+    walker: ContactWalker,
+    ground: Ground,
+    pinned: Pinned | None,
+    stance: int,
+    start: State,
+    methods: MethodSettings,
+    steps: int,
+    interval_s: float | None,
+    booked: bool = True,
+) -> ContactWalkResult:
+    """Walk up to `steps` steps.
+
+    pinned      the hinged first step, or None
+    stance      the foot that carries the first step
+    start       state of the free walker (8); its angles and angular velocities start the hinged one
+    methods     how to integrate
+    interval_s  time between samples, or None for none
+    booked      whether to keep the energy's books
+
+    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
+    """
+    frame = ground.frame
+    if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
+        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
+        here = Stopped(0.0, start, np.zeros(4, np.int64))
+        return gather(Outcome.REJECTED, here, ledger, new_observer(walker, ledger, start), walker)
+    room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
+    while True:
+        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
+        observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked)
+        outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
+        if room == 0 or observer.recorded[0] < room:
+            return gather(outcome, stopped, ledger, observer, walker)
+        room *= 2
+
+
+def run_parts(
+    walker: ContactWalker,
+    ground: Ground,
+    pinned: Pinned | None,
+    start: State,
+    methods: MethodSettings,
+    observer: ContactObserver,
+    ledger: Ledger,
+) -> tuple[Outcome, Stopped]:
+    """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped."""
+    t, y = 0.0, start
+    spent = np.zeros(4, np.int64)
+    if pinned is not None:
+        method = methods.new(len(pinned.blank))
+        angles = len(pinned.tree.arm_x)
+        hinged = (*start[2 : 2 + angles], *start[4 + angles :])
+        hinged_walk = walk_hinged if methods.method.compiled else uncompiled(walk_hinged)
+        outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
+        t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
+        spent += method.counts[:4]
+        if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
+            return outcome, Stopped(t, y, spent)
+    method = methods.new(len(walker.blank))
+    ledger.times[AIRBORNE_SINCE] = t
+    free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
+    outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
+    return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+
+
+def gather(
+    outcome: Outcome, stopped: Stopped, ledger: Ledger, observer: ContactObserver, walker: ContactWalker
+) -> ContactWalkResult:
+    """The result of a walk from what was written on the way."""
+    done, seen = int(ledger.feet[STEPS]), int(observer.recorded[0])
+    samples = None
+    if observer.times.size:
+        samples = ContactSamples(
+            observer.times[:seen],
+            observer.states[:seen],
+            observer.carried[:seen],
+            observer.stance[:seen],
+            observer.sampled_books[:seen],
+        )
+    return ContactWalkResult(
+        outcome,
+        ledger.touch_time[:done],
+        ledger.touch_along[:done],
+        ledger.slip[:done],
+        stopped.time_s,
+        stopped.state,
+        float(observer.extremes[MAX_PENETRATION]),
+        float(observer.extremes[RESIDUAL]),
+        observer.books.copy(),
+        stopped.work,
+        samples,
+    )

@@ -1,0 +1,81 @@
+"""Search the last step of any method for its first event."""
+
+from typing import Any, NamedTuple
+
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_signals
+from walkerlab.kernels import by_type, inlined, kernel
+from walkerlab.solvers.dop853 import Dop853
+from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.radau5 import Radau5
+from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.stepping import interpolate
+from walkerlab.solvers.system import State, blank
+from walkerlab.solvers.vectors import load
+
+
+class Scene(NamedTuple):
+    """What does not change while a walk goes on."""
+
+    walker: ContactWalker
+    terrain: Any  # Checkerboard or AfterMidSwing
+    frame: Frame
+    watch_order: bool  # whether it matters that the feet pass each other
+
+
+class Feet(NamedTuple):
+    """What the search must know of the feet."""
+
+    carried: Any  # (2,) whether there is ground under each
+    cells: Any  # (2,) which cell of its lane each is over
+    at_zero: Any  # (signals,) which signals the last event left at zero
+    foothold: Any  # (2,) m, where each touched
+    order: Any  # (2,) the stance foot, and how many steps it is
+
+
+@inlined
+def sample(system: Any, scene: Scene, feet: Feet, state: State, node: int, finder: CrossingFinder) -> None:
+    """All signals at one node of the step."""
+    stance = feet.order[0]
+    foothold = feet.foothold[stance]
+    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, foothold, state, node, finder)
+
+
+@inlined
+def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
+    """The first event of the sampled step."""
+    return earliest_crossing(
+        system, scene.walker, scene.frame, scene.watch_order, feet.carried, feet.order[0], feet.at_zero, finder
+    )
+
+
+@by_type
+def scan(method: Any, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
+    """Fraction of a method's last step at which the first event lies, and which signal's; its dense output is ready.
+
+    The signals stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
+    """
+
+
+@scan.case(Dop853)
+@scan.case(Radau5)
+def scan_compiled(method: Any, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
+    """Compiled with the walk."""
+    for node in range(finder.nodes.size):
+        sample(system, scene, feet, interpolate(method, system, finder.nodes[node]), node, finder)
+    return search(system, scene, feet, finder)
+
+
+@kernel
+def scan_states(system: Any, scene: Scene, feet: Feet, states: Any, finder: CrossingFinder) -> tuple[float, int]:
+    """The same for a step whose states at the nodes are the rows of `states`."""
+    for node in range(finder.nodes.size):
+        sample(system, scene, feet, load(states, node, blank(system)), node, finder)
+    return search(system, scene, feet, finder)
+
+
+@scan.case(ScipyMethod)
+def scan_scipy(method: ScipyMethod, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
+    """A walk in Python hands the step's states to compiled code at once."""
+    fraction, signal = scan_states(system, scene, feet, method.states_at(finder.nodes), finder)
+    return fraction, signal

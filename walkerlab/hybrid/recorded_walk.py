@@ -1,0 +1,241 @@
+"""A walk of the rigid model with all that is asked of it: heel strikes, samples, and how far its assumptions held.
+
+Long walks are taken a few dozen steps at a time, so that memory is needed for results only.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_observer import (
+    DURATION,
+    ENERGY_DRIFT,
+    INTEGRAL,
+    LATEST,
+    MAX_FRICTION_RATIO,
+    MAX_SCUFF_DEPTH,
+    MIN_NORMAL_FORCE,
+    Observer,
+    new_observer,
+    observe_start,
+)
+from walkerlab.hybrid.rigid_walk import LONGEST_SWING, SIGNALS, hip_above_fall, walk
+from walkerlab.kernels import uncompiled
+from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
+from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
+from walkerlab.solvers.system import State
+
+STEPS_AT_ONCE = 64
+BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
+SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
+CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
+
+Array = NDArray[np.float64]
+NO_STATES = np.zeros((0, 4))
+
+
+class Work(NamedTuple):
+    """What a walk cost."""
+
+    rhs_evaluations: int
+    accepted: int
+    rejected: int
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A walk in time: a regular grid, and both sides of every heel strike."""
+
+    time: Array  # (samples,) s, strictly rising; the state before a heel strike is one rounding earlier than after
+    state: Array  # (samples, 4) rad, rad/s, swing leg first
+    step: NDArray[np.int64]  # (samples,) from 0
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWalk:
+    """How a walk of the rigid model went, SI units."""
+
+    outcome: Outcome
+    start: State
+    heel_strikes: Array  # (steps,) s
+    before: Array  # (steps, 4) states just before the heel strikes
+    after: Array  # (steps, 4) just after, roles changed
+    periods: Array  # (steps,) s
+    lengths: Array  # (steps,) m
+    min_normal_force: float  # N, of the ground on the stance foot
+    max_friction_ratio: float  # tangential over normal force, where the ground pushes
+    max_scuff_depth: float  # m, of the swing foot below the slope
+    energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
+    mean_energy: float  # J, time mean, from the stance foot
+    samples: Samples | None
+    work: Work
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+        return int(self.heel_strikes.size)
+
+    @property
+    def final_state(self) -> State:
+        """State after the last heel strike; the start if there was none."""
+        return as_state(self.after[-1]) if self.steps else self.start
+
+
+def as_state(values: Any) -> State:
+    """Four numbers as compiled code takes a state."""
+    return (float(values[0]), float(values[1]), float(values[2]), float(values[3]))
+
+
+def take_walk(
+    walker: RigidWalker,
+    method: Any,
+    start: State,
+    steps: int,
+    sampled: bool = False,
+    advance: Callable[[int], None] | None = None,
+    budget: int | None = None,
+) -> RecordedWalk:
+    """Walk `steps` steps from `start`, or until the walk ends.
+
+    method   an integrator for four equations
+    sampled  whether states in time are wanted
+    advance  told how many more steps were taken
+    budget   right-hand sides of the whole walk; none: what any step needs, for each
+
+    A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
+    """
+    recorder = Recorder(walker, method, start, sampled, budget)
+    if hip_above_fall(walker, start) < 0.0:
+        return recorder.finished(Outcome.REJECTED)
+    status = Outcome.WALKED
+    while recorder.steps < steps and status == Outcome.WALKED:
+        taken = recorder.steps
+        status = recorder.walk_on(min(STEPS_AT_ONCE, steps - taken))
+        if advance is not None:
+            advance(recorder.steps - taken)
+    return recorder.finished(status)
+
+
+class Recorder:
+    """Walks on from where it is, and keeps what was seen."""
+
+    def __init__(
+        self, walker: RigidWalker, method: Any, start: State, sampled: bool, budget: int | None = None
+    ) -> None:
+        """Stand at `start`, at time 0."""
+        self.walker, self.method, self.sampled, self.budget = walker, method, sampled, budget
+        self.start = self.state = start
+        self.time, self.steps, self.grid_index = 0.0, 0, 0
+        self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
+        self.finder = finder_for(method, SIGNALS)
+        # a library's method is integrated with in Python
+        self.walk: Callable[..., tuple[int, int]] = uncompiled(walk) if isinstance(method, ScipyMethod) else walk
+        first = new_observer(np.zeros(0))
+        observe_start(first, walker, start)
+        self.energy_at_start = float(first.energy[LATEST])
+        self.extremes = first.extremes
+        self.energy_integral, self.duration = 0.0, 0.0
+        self.counts = np.zeros_like(method.counts)
+        self.strikes: list[Array] = []
+        self.before: list[Array] = []
+        self.after: list[Array] = []
+        self.pieces: list[Samples] = []
+
+    def walk_on(self, steps: int) -> Outcome:
+        """Take up to `steps` more steps."""
+        strikes, before, after = np.zeros(steps), np.zeros((steps, 4)), np.zeros((steps, 4))
+        observer = new_observer(self._grid(steps))
+        clear_counts(self.method)
+        self.method.counts[BUDGET] = self._left_for(steps)
+        status, taken = self.walk(self.walker, self.method, self.finder, observer, self.state, strikes, before, after)
+        self.counts += self.method.counts
+        self._keep(observer)
+        strikes, before, after = strikes[:taken] + self.time, before[:taken], after[:taken]
+        if self.sampled:
+            self.pieces.append(self._samples(observer, strikes, before, after))
+        self.strikes.append(strikes)
+        self.before.append(before)
+        self.after.append(after)
+        self.steps += taken
+        if taken:
+            self.state, self.time = as_state(after[-1]), float(strikes[-1])
+        return Outcome(status)
+
+    def _left_for(self, steps: int) -> int:
+        """Right-hand sides that the next steps may evaluate."""
+        enough = steps * BUDGET_OF_A_STEP
+        return enough if self.budget is None else min(enough, self.budget - int(self.counts[RHS]))
+
+    def _grid(self, steps: int) -> Array:
+        """Times of the samples that the next steps may reach, from the start of the first of them."""
+        if not self.sampled:
+            return np.zeros(0)
+        most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+        return self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
+
+    def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array) -> Samples:
+        """The grid's samples with both sides of the heel strikes put between them."""
+        found = int(observer.recorded[0])
+        grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
+        self.grid_index += found
+        events = np.append(strikes, self.time) if self.steps else strikes
+        kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
+        swing = self.steps + np.arange(strikes.size)
+        time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
+        state = np.concatenate((observer.states[:found][kept], before, after))
+        step = np.concatenate((self.steps + observer.steps[:found][kept], swing, swing + 1))
+        order = np.argsort(time)
+        return Samples(time[order], state[order], step[order])
+
+    def _keep(self, observer: Observer) -> None:
+        seen, worst = observer.extremes, self.extremes
+        worst[MIN_NORMAL_FORCE] = min(worst[MIN_NORMAL_FORCE], seen[MIN_NORMAL_FORCE])
+        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT):
+            worst[index] = max(worst[index], seen[index])
+        self.energy_integral += float(observer.energy[INTEGRAL])
+        self.duration += float(observer.energy[DURATION])
+
+    def finished(self, outcome: Outcome) -> RecordedWalk:
+        """All that was seen."""
+        if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
+            outcome = Outcome.LIFTED_OFF
+        strikes, before = np.concatenate((np.zeros(0), *self.strikes)), np.concatenate((NO_STATES, *self.before))
+        return RecordedWalk(
+            outcome=outcome,
+            start=self.start,
+            heel_strikes=strikes,
+            before=before,
+            after=np.concatenate((NO_STATES, *self.after)),
+            periods=np.diff(strikes, prepend=0.0),
+            lengths=np.array([step_length(self.walker, y[1], y[0]) for y in before]),
+            min_normal_force=float(self.extremes[MIN_NORMAL_FORCE]),
+            max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
+            max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
+            energy_drift=float(self.extremes[ENERGY_DRIFT]),
+            mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
+            samples=joined(self.pieces) if self.sampled else None,
+            work=Work(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
+        )
+
+
+def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
+    """Which of `times` are further than `distance` from each of the rising `events`."""
+    if events.size == 0:
+        return np.ones(times.size, np.bool_)
+    behind = np.searchsorted(events, times).clip(max=events.size - 1)
+    before = (behind - 1).clip(min=0)
+    return np.asarray(np.minimum(np.abs(times - events[behind]), np.abs(times - events[before])) > distance)
+
+
+def joined(pieces: list[Samples]) -> Samples:
+    """One record of several that follow each other."""
+    time = np.concatenate((np.zeros(0), *(piece.time for piece in pieces)))
+    state = np.concatenate((NO_STATES, *(piece.state for piece in pieces)))
+    return Samples(time, state, np.concatenate((np.zeros(0, np.int64), *(piece.step for piece in pieces))))

@@ -1,0 +1,121 @@
+"""The rigid compass walker's parameters, matrices, energies and ground reaction (Appendix A of the paper).
+
+State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
+positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
+"""
+
+import math
+from typing import NamedTuple
+
+from walkerlab.kernels import inlined
+from walkerlab.mechanics.fused import fused
+from walkerlab.mechanics.trigonometry import sine_cosine
+
+CORRECTED = -1.0
+AS_PRINTED = 1.0
+
+
+class RigidWalker(NamedTuple):
+    """A compass walker on a slope, SI units; textbook letters in brackets."""
+
+    leg_length: float  # [L] m
+    foot_to_mass: float  # [a] m
+    leg_mass: float  # [m] kg
+    hip_mass: float  # [M_H] kg
+    leg_inertia: float  # [J] kg m^2, about the leg's own centre of mass
+    gravity: float  # [g] m/s^2
+    slope: float  # [phi] rad, positive downhill in +x
+    c21_sign: float  # sign of C_21: CORRECTED, or AS_PRINTED in (A.5)
+
+
+class Swing(NamedTuple):
+    """The constants that (A.4) to (A.8) are made of."""
+
+    d11: float  # kg m^2, (A.9)
+    d22: float  # kg m^2, (A.14)
+    mLb: float  # kg m^2, factor of (A.10)
+    mb: float  # kg m, factor of (A.11)
+    K: float  # kg m, factor of (A.15)
+    mass: float  # kg, (A.19)
+
+
+@inlined
+def swing_constants(walker: RigidWalker) -> Swing:
+    """The constant factors of the swing equations of `walker`."""
+    L, a, m, M_H, J = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass, walker.leg_inertia
+    b = L - a
+    return Swing(
+        m * b * b + J,
+        M_H * L * L + m * (L * L + a * a) + J,
+        m * L * b,
+        m * b,
+        (L + a) * m + L * M_H,
+        M_H + 2.0 * m,
+    )
+
+
+@inlined
+def accelerations(
+    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
+) -> tuple[float, float]:
+    """Angular accelerations (rad/s^2) of swing and stance leg: D^-1 (-C dq - G), (A.4) to (A.6) and (A.58)."""
+    c = swing_constants(walker)
+    s1, c1 = sine_cosine(theta_1)
+    s2, c2 = sine_cosine(theta_2)
+    sin_d = fused(s2, c1, -c2 * s1)
+    cos_d = fused(c2, c1, s2 * s1)
+    d12 = -c.mLb * cos_d
+    r1 = fused(-c.mLb * omega_2 * omega_2, sin_d, -walker.gravity * c.mb * s1)
+    r2 = fused(-walker.c21_sign * c.mLb * omega_1 * omega_1, sin_d, walker.gravity * c.K * s2)
+    scale = 1.0 / fused(-d12, d12, c.d11 * c.d22)
+    return fused(c.d22, r1, -d12 * r2) * scale, fused(c.d11, r2, -d12 * r1) * scale
+
+
+@inlined
+def kinetic_energy(walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float) -> float:
+    """Kinetic energy (J): half of dq' D dq."""
+    c = swing_constants(walker)
+    d12 = -c.mLb * math.cos(theta_2 - theta_1)
+    return 0.5 * (c.d11 * omega_1 * omega_1 + c.d22 * omega_2 * omega_2) + d12 * omega_1 * omega_2
+
+
+@inlined
+def potential_energy(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
+    """Potential energy (J) from the current stance foot."""
+    c = swing_constants(walker)
+    return walker.gravity * (c.K * math.cos(theta_2) - c.mb * math.cos(theta_1))
+
+
+@inlined
+def ground_reaction(
+    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
+) -> tuple[float, float]:
+    """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it.
+
+    Rows 3 and 4 of (6) with the foot held still: (A.11) to (A.16), (A.33) to (A.38).
+    """
+    c = swing_constants(walker)
+    s1, c1 = sine_cosine(theta_1)
+    s2, c2 = sine_cosine(theta_2)
+    alpha_1, alpha_2 = accelerations(walker, theta_1, theta_2, omega_1, omega_2)
+    w1, w2 = omega_1 * omega_1, omega_2 * omega_2
+    x = c.mb * (c1 * alpha_1 - s1 * w1) - c.K * (c2 * alpha_2 - s2 * w2)
+    y = c.mb * (s1 * alpha_1 + c1 * w1) - c.K * (s2 * alpha_2 + c2 * w2) + walker.gravity * c.mass
+    s_phi, c_phi = math.sin(walker.slope), math.cos(walker.slope)
+    return c_phi * x - s_phi * y, s_phi * x + c_phi * y
+
+
+@inlined
+def swing_foot_height(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
+    """Height of the swing foot above the slope (m), negative while it scuffs.
+
+    L (cos(theta_2 + phi) - cos(theta_1 + phi)) as a product, which keeps its digits near zero.
+    """
+    half_sum = 0.5 * (theta_1 + theta_2) + walker.slope
+    return 2.0 * walker.leg_length * math.sin(half_sum) * math.sin(0.5 * (theta_1 - theta_2))
+
+
+@inlined
+def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
+    """Distance between the feet along the slope (m) with both on it: 2 L sin((theta_2 - theta_1)/2)."""
+    return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))

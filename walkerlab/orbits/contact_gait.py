@@ -1,0 +1,171 @@
+"""The contact model's own gait, found from a rigid start: walk to the section, then Newton.
+
+Where a walk from the start leads nowhere, the gait is followed from nearly rigid ground, which the rigid gait nearly
+walks on: the force laws are led to the wanted ones in steps as large as Newton's method allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.terrain import stride_measure
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_events import PASSING, SIGNALS
+from walkerlab.hybrid.contact_rules import STANCE, STEPS
+from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
+from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.system import State
+
+Floats = NDArray[np.float64]
+
+WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
+NEWTON_STEPS = 10  # steps walked in one search by Newton's method
+BUDGET_OF_A_STEP = 40_000  # right-hand sides
+# nearly rigid ground, by which factor its laws differ from the wanted ones
+STIFFER, STICKIER = 100.0, 30.0
+FIRST_STRIDE, SHORTEST_STRIDE, MOST_STRIDES = 0.25, 0.02, 24  # of the way from nearly rigid to the wanted ground
+
+
+@dataclass(frozen=True)
+class GaitAnswer:
+    """The contact model's gait, or why there is none."""
+
+    gait: ContactGait | None
+    reason: str  # how it was found, or why not
+    advice: str = ""
+
+
+def find_gait_from(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:
+    """The contact gait near a start with both feet on the ground (state of the free walker, 8 numbers).
+
+    Never raises for want of a gait: the answer says why there is none and what to try.
+    """
+    hopeless = why_there_is_none(walker)
+    if hopeless:
+        return GaitAnswer(None, *hopeless)
+    methods = replace(methods, budget=BUDGET_OF_A_STEP)
+    said = "the start does not even let the feet pass each other"
+    for steps, z in section_points(walker, ground, methods, start):
+        gait = gait_near(walker, ground, methods, z, stride_measure(ground.terrain))
+        if isinstance(gait, ContactGait):
+            return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
+        ended = "it did not converge" if gait is Outcome.WALKED else f"a step ended as {gait.label}"
+        said = f"Newton's method found none after {steps} steps from the start: {ended}"
+    followed = follow_from_rigid(walker, ground, methods, start)
+    if followed.gait is not None:
+        return followed
+    return GaitAnswer(None, f"{said}; {followed.reason}", followed.advice)
+
+
+def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
+    """Why no gait can exist on this ground, by the balance of momentum and of energy alone, and what to change."""
+    if walker.slope <= 0.0:
+        return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
+    friction = walker.friction
+    if isinstance(friction, Frictionless):
+        return (
+            "without friction nothing holds the walker back: it gathers speed along the slope",
+            "Give the feet friction: contact.friction: coulomb.",
+        )
+    if friction.static < math.tan(walker.slope):
+        return (
+            f"static friction {friction.static:.3g} is below the slope's {math.tan(walker.slope):.3g}: "
+            "on average the ground cannot hold the walker's weight along the slope",
+            "Raise contact.static_friction, or choose a gentler slope.",
+        )
+    return None
+
+
+def section_points(
+    walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State
+) -> Iterator[tuple[int, Floats]]:
+    """Points of the section that walks from the start pass through, and after how many steps each."""
+    for steps in WARM_UP:
+        ledger = new_ledger(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
+        observer = new_observer(walker, ledger, start)
+        method = replace(methods, budget=(steps + 1) * methods.budget).new(len(walker.blank))
+        finder = finder_for(method, SIGNALS)
+        outcome = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
+        if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:
+            yield steps, coordinates_of(method.y, int(ledger.feet[STANCE]))
+        elif ledger.feet[STEPS] > steps:
+            return
+
+
+def gait_near(
+    walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float
+) -> ContactGait | Outcome:
+    """Newton's method from section coordinates z (6,): the gait, or how the last step that it tried ended."""
+    try:
+        found = find_contact_gait(walker, ground, methods, z, pitch_m, most_steps=NEWTON_STEPS)
+    except np.linalg.LinAlgError:
+        return Outcome.REJECTED
+    if not isinstance(found, ContactGait):
+        return found.outcome
+    return found if found.step.length_m > 0.0 and found.step.period_s > 0.0 else Outcome.REJECTED
+
+
+def softened(walker: ContactWalker, rigidity: float) -> ContactWalker:
+    """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid.
+
+    The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
+    """
+    stiffer, stickier = STIFFER**rigidity, STICKIER**rigidity
+    normal, friction = walker.normal, walker.friction
+    if isinstance(friction, Coulomb):
+        friction = friction._replace(
+            stiction_velocity=friction.stiction_velocity / stickier,
+            friction_velocity=friction.friction_velocity / stickier,
+        )
+    harder = normal._replace(
+        stiffness=normal.stiffness * stiffer,
+        damping=normal.damping * math.sqrt(stiffer),
+        full_damping_penetration=normal.full_damping_penetration * stiffer ** (-1.0 / normal.exponent),
+    )
+    return walker._replace(normal=harder, friction=friction)
+
+
+def follow_from_rigid(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:
+    """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
+    pitch, last = stride_measure(ground.terrain), None
+    for _steps, z in section_points(softened(walker, 1.0), ground, methods, start):
+        found = gait_near(softened(walker, 1.0), ground, methods, z, pitch)
+        if isinstance(found, ContactGait):
+            last = found
+            break
+    if last is None:
+        return GaitAnswer(
+            None,
+            "nearly rigid ground has no gait either",
+            "Damp or stiffen the contact, choose a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
+        )
+    rigidity, stride, before = 1.0, FIRST_STRIDE, None
+    for _ in range(MOST_STRIDES):
+        ahead = max(0.0, rigidity - stride)
+        guess = last.z
+        if before is not None:
+            guess = last.z + (last.z - before[1]) * (ahead - rigidity) / (rigidity - before[0])
+        found = gait_near(softened(walker, ahead), ground, methods, guess, last.step.length_m)
+        if isinstance(found, ContactGait):
+            before, last, rigidity, stride = (rigidity, last.z), found, ahead, 1.5 * stride
+            if rigidity == 0.0:
+                return GaitAnswer(last, "followed from nearly rigid ground")
+        else:
+            stride *= 0.5
+            if stride < SHORTEST_STRIDE:
+                break
+    return GaitAnswer(
+        None,
+        f"followed from nearly rigid ground the gait is lost where that is {STIFFER**rigidity:.3g} times as stiff "
+        f"and creep {STICKIER**rigidity:.3g} times as slow as wanted",
+        "Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
+    )

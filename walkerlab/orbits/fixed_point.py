@@ -1,0 +1,191 @@
+"""The periodic gaits of a rigid walker: sought in two ways, solved to rounding, judged and compared.
+
+Followed: the two gaits of the small-slope theory are followed to the walker's slope. Drawn: the step map is solved from
+random starting values, the paper's way (section 3.3). All of it happens with the similar walker of unit size.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import root
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_walk import SIGNALS
+from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
+from walkerlab.mechanics.rigid_swing import VARIATION_BLANK
+from walkerlab.orbits.gait import Gait, measured
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.small_slope import Vector, seeds
+from walkerlab.orbits.step_map import evaluate, new_shooting, newton
+from walkerlab.solvers.dop853 import new_dop853
+from walkerlab.solvers.registry import finder_for
+
+RANDOM_START = "random start"
+SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
+SAME = 1e-5  # relative distance of states below which two searches found one gait
+# ranges of random starting values: angle between the legs (rad), both angular velocities (sqrt(g/L))
+LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """How hard to look.
+
+    random_starts  starting values to draw
+    rtol, atol     tolerances while looking; gaits are then solved with the `solved_` ones, down to that residual
+    residual       of an acceptable gait, which may be rounding on a steep slope
+    budget         right-hand sides for one call of the solver
+    """
+
+    random_starts: int = 100
+    rtol: float = 1e-8
+    atol: float = 1e-11
+    solved_rtol: float = 1e-13
+    solved_atol: float = 1e-16
+    solved_residual: float = 1e-14
+    residual: float = 1e-11
+    budget: int = 20_000
+
+
+@dataclass(frozen=True)
+class GaitSearch:
+    """What was found.
+
+    gaits          every period-1 gait, shortest period first
+    chosen         index of the gait to walk; None if there is none that can be walked
+    reason         why this one, or why none
+    random_hits    for each gait, how many random starts led to it
+    random_starts  how many were drawn
+    lost           what became of the gaits of the small-slope theory that do not reach this slope
+    """
+
+    gaits: tuple[Gait, ...]
+    chosen: int | None
+    reason: str
+    random_hits: tuple[int, ...] = ()
+    random_starts: int = 0
+    lost: tuple[str, ...] = ()
+
+    @property
+    def gait(self) -> Gait | None:
+        """The chosen gait."""
+        return None if self.chosen is None else self.gaits[self.chosen]
+
+
+def find_gaits(walker: RigidWalker, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
+    """Every period-1 gait of `walker` that the searches find.
+
+    seed  of the random starting values
+    """
+    if walker.slope <= 0.0 and walker.c21_sign == CORRECTED:
+        return GaitSearch((), None, NO_DESCENT)
+    search = Search(walker, settings)
+    search.follow_seeds()
+    search.draw(np.random.default_rng(seed))
+    return search.result()
+
+
+NO_DESCENT = (
+    "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
+    "standing still is no gait"
+)
+
+
+class NoStep(Exception):  # noqa: N818 (the end of one search, not an error)
+    """Starting values from which no step is taken."""
+
+
+@dataclass
+class Found:
+    """A gait with what led to it."""
+
+    z: Vector
+    gait: Gait
+    by: list[str]
+
+
+class Search:
+    """A search in progress."""
+
+    def __init__(self, walker: RigidWalker, settings: SearchSettings) -> None:
+        """Nothing is found yet."""
+        self.walker, self.units = unit_walker(walker)
+        self.settings = settings
+        self.found: list[Found] = []
+        self.lost: list[str] = []
+        n, budget = len(VARIATION_BLANK), settings.budget
+        self.method = new_dop853(4, settings.solved_rtol, settings.solved_atol, budget)
+        self.finder = finder_for(self.method, SIGNALS)
+        self.looking = new_shooting(self.walker, new_dop853(n, settings.rtol, settings.atol, budget), self.finder)
+        solved = new_dop853(n, settings.solved_rtol, settings.solved_atol, budget)
+        self.solving = new_shooting(self.walker, solved, self.finder)
+
+    def follow_seeds(self) -> None:
+        """Follow the gaits of the small-slope theory to the walker's slope."""
+        if self.walker.slope <= 0.0:
+            return
+        for seed in seeds(self.walker):
+            reached = Branch(self.looking, seed).follow(self.walker.slope)
+            if reached.z is None:
+                self.lost.append(f"the gait from the {seed.name} is lost at a slope of {reached.slope:.3g} rad")
+            elif not self.keep(reached.z, seed.name):
+                self.lost.append(f"the gait from the {seed.name} cannot be solved to rounding")
+
+    def draw(self, generator: np.random.Generator) -> None:
+        """Solve the step map from random starting values."""
+        for _ in range(self.settings.random_starts):
+            angle, omega_1, omega_2 = generator.uniform(LEAST_START, MOST_START)
+            start = np.array([0.5 * angle - self.walker.slope, omega_1, omega_2])
+            try:
+                solution = root(self.mismatch, start, jac=True, options={"maxfev": 60})
+            except NoStep:
+                continue
+            if solution.success:
+                self.keep(solution.x, RANDOM_START)
+
+    def mismatch(self, z: Vector) -> tuple[Vector, Vector]:
+        """P(z) - z and its derivative."""
+        status, _ = evaluate(self.looking, z)
+        if status != Outcome.WALKED:
+            raise NoStep
+        return self.looking.z_next - z, self.looking.DP - np.eye(3)
+
+    def keep(self, z: Vector, by: str) -> bool:
+        """Solve for the gait near z to rounding and take it among those found; False if there is none."""
+        z = np.array(z)
+        status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
+        if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
+            return False
+        for found in self.found:
+            if np.abs(found.z - z).max() < SAME * np.abs(z).max():
+                found.by.append(by)
+                return True
+        gait = measured(self.walker, self.units, self.method, z, self.solving.DP)
+        if gait is None or gait.residual > self.settings.residual:
+            return False
+        self.found.append(Found(z, gait, [by]))
+        return True
+
+    def result(self) -> GaitSearch:
+        """The gaits in order, and which one to walk."""
+        found = sorted(self.found, key=lambda each: each.gait.period)
+        gaits = tuple(replace(each.gait, found_by=tuple(dict.fromkeys(each.by))) for each in found)
+        hits = tuple(each.by.count(RANDOM_START) for each in found)
+        chosen, reason = choice(gaits)
+        if not gaits:
+            drawn = self.settings.random_starts
+            reason = "; ".join([*self.lost, f"none of {drawn} random starting values led to a gait"])
+        return GaitSearch(gaits, chosen, reason, hits, self.settings.random_starts, tuple(self.lost))
+
+
+def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
+    """Which gait to walk: of those that the ground can carry the one that forgets disturbances soonest; and why."""
+    walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
+    if not walkable:
+        objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
+        return None, "what repeats itself there cannot be walked: " + "; ".join(objections)
+    best = min(walkable, key=lambda index: gaits[index].spectral_radius)
+    if gaits[best].stable:
+        return best, "it is stable"
+    return best, "no gait is stable at this slope; of those that the ground can carry this one is the least unstable"

@@ -1,0 +1,83 @@
+"""A periodic gait of a rigid walker, and what is to be known of it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.orbits.similarity import Units
+from walkerlab.orbits.small_slope import Vector
+from walkerlab.orbits.step_map import on_section
+from walkerlab.solvers.system import State
+
+FASTEST_GROWTH = 10.0  # spectral radius beyond which rounding alone ends a walk within a few strides
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A fixed point of the step map, SI units."""
+
+    state: State  # just after the heel strike
+    period: float  # s
+    step_length: float  # m
+    multipliers: tuple[complex, complex, complex]  # eigenvalues of the step map's derivative, largest first
+    residual: float  # rad, largest component of P(x) - x, velocities times sqrt(L/g); from a step walked by itself
+    energy: float  # J, time mean over the step, from the stance foot
+    energy_drift: float  # J, between least and most of it
+    min_normal_force: float  # N
+    max_friction_ratio: float
+    max_scuff_depth: float  # m
+    found_by: tuple[str, ...] = ()  # the searches that led here
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest magnitude of a multiplier."""
+        return abs(self.multipliers[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return self.spectral_radius < 1.0
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """Why nobody walks this gait: what no ground can give, or a disturbance that at once takes over; else empty."""
+        found = []
+        if self.min_normal_force < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.state[2] + self.state[3] > 0.0:
+            found.append("the foot behind would have to leave through the ground")
+        if self.spectral_radius > FASTEST_GROWTH:
+            found.append(
+                f"a disturbance grows {self.spectral_radius:.3g}-fold every step, so that no walker stays on it"
+            )
+        return tuple(found)
+
+
+def measured(walker: RigidWalker, units: Units, method: Any, z: Vector, DP: Vector) -> Gait | None:
+    """The gait at section coordinates z (3,), after walking one step of it; None if that step does not end.
+
+    walker  the unit walker, whose units are `units`
+    method  an integrator for four equations
+    DP      (3, 3) derivative of the step map there
+    """
+    start = on_section(walker, [float(number) for number in z])
+    step = take_walk(walker, method, start, 1)
+    if step.steps == 0:
+        return None
+    values = sorted((complex(value) for value in np.linalg.eigvals(DP)), key=lambda value: (-abs(value), -value.imag))
+    rate = 1.0 / units.time
+    return Gait(
+        state=(start[0], start[1], start[2] * rate, start[3] * rate),
+        period=float(step.periods[0]) * units.time,
+        step_length=float(step.lengths[0]) * units.length,
+        multipliers=(values[0], values[1], values[2]),
+        residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
+        energy=step.mean_energy * units.energy,
+        energy_drift=step.energy_drift * units.energy,
+        min_normal_force=step.min_normal_force * units.force,
+        max_friction_ratio=step.max_friction_ratio,
+        max_scuff_depth=step.max_scuff_depth * units.length,
+    )

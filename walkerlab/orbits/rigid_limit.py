@@ -1,0 +1,253 @@
+"""What separates the contact model from the rigid one: its contact led towards the rigid limit, knob by knob.
+
+Stiffness k, damping c and stiction velocity v_s are the knobs. With k the penetration d_max of full damping shrinks as
+the static penetration does, and with v_s the friction velocity v_d.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.comparison import (
+    IMPACT_PHASE,
+    PHASES,
+    Motion,
+    difference_in_phase,
+    difference_in_time,
+    sampled_at_step_ends,
+)
+from walkerlab.hybrid.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
+from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
+from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import State
+
+METHOD, BUDGET = "radau5", 50_000_000
+GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
+WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10  # of the walks that are timed, and of those that show their numerical error
+ABSOLUTE = 0.01  # absolute tolerance in relative ones
+REPEATS = 3
+
+
+class Setting(NamedTuple):
+    """A contact: by which factors its numbers differ from the config's."""
+
+    series: str
+    rigidity: float  # how far the series has gone towards the limit
+    stiffness: float
+    damping: float
+    stiction: float
+
+
+ALL, ALL_POINT = "all", "all, point foot"
+STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "damping", "stiffness and damping"
+HALF_DECADES = math.sqrt(10.0)
+
+
+def series_of(name: str) -> list[Setting]:
+    """The settings of a series, from the config's contact towards the limit."""
+    steps = {ALL: 9, ALL_POINT: 9, STICTION: 15, STIFFNESS: 6, DAMPING: 6, NORMAL: 9}[name]
+    ratio = 2.0 if name == STICTION else HALF_DECADES
+    found = []
+    for step in range(steps):
+        factor = ratio**step
+        stiffness = factor if name in (ALL, ALL_POINT, STIFFNESS, NORMAL) else 1.0
+        damping = factor if name == DAMPING else math.sqrt(factor) if name in (ALL, ALL_POINT, NORMAL) else 1.0
+        stiction = 1.0 / factor if name in (ALL, ALL_POINT, STICTION) else 1.0
+        found.append(Setting(name, factor, stiffness, damping, stiction))
+    return found
+
+
+def with_contact_of(walker: ContactWalker, setting: Setting) -> ContactWalker:
+    """The walker on another ground."""
+    normal, friction = walker.normal, walker.friction
+    normal = normal._replace(
+        stiffness=normal.stiffness * setting.stiffness,
+        damping=normal.damping * setting.damping,
+        full_damping_penetration=normal.full_damping_penetration * setting.stiffness ** (-1.0 / normal.exponent),
+    )
+    if isinstance(friction, Coulomb):
+        friction = friction._replace(
+            stiction_velocity=friction.stiction_velocity * setting.stiction,
+            friction_velocity=friction.friction_velocity * setting.stiction,
+        )
+    return walker._replace(normal=normal, friction=friction)
+
+
+@dataclass(frozen=True)
+class Distance:
+    """How far a setting's walk is from the rigid one's, and how well that is known.
+
+    numerical_period  s, change of the period when the tolerance is ten times tighter
+    angle, velocity   largest difference in phase over the walk, between impacts; raw at the same time
+    numerical_time    s, change of the last touch's time with the tolerance a hundred times tighter
+    wall_s            s, processor time of the walk, the least of several
+    """
+
+    setting: Setting
+    period: float
+    length: float
+    slip: float
+    period_error: float
+    length_error: float
+    numerical_period: float
+    angle: float | None = None
+    velocity: float | None = None
+    raw_angle: float | None = None
+    raw_velocity: float | None = None
+    numerical_time: float | None = None
+    evaluations: int = 0
+    wall_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class RigidGait:
+    """What the distances are measured from."""
+
+    period: float
+    length: float
+    motion: Motion  # of the walk from the rigid start
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A scene and its rigid counterpart."""
+
+    ground: Ground
+    rigid: RigidGait
+    steps: int
+    sampling: float  # s
+
+    def series(
+        self, name: str, walker: ContactWalker, gait: ContactGait, start: Callable[[ContactWalker], State] | None = None
+    ) -> list[Distance]:
+        """The distances along a series, each gait searched from the one before; ends where a gait is lost.
+
+        start  the walk's start, if whole walks are to be compared too
+        """
+        found: list[Distance] = []
+        for setting in series_of(name):
+            changed = with_contact_of(walker, setting)
+            near = self.gait(changed, gait, GAIT_TOLERANCE)
+            if near is None:
+                break
+            gait = near
+            check = self.gait(changed, gait, CHECK_TOLERANCE)
+            distance = self.distance(setting, gait, check)
+            found.append(distance if start is None else self.walked(distance, changed, start(changed)))
+        return found
+
+    def gait(self, walker: ContactWalker, near: ContactGait, tolerance: float) -> ContactGait | None:
+        """The gait on this ground near another one's; None if it is not found."""
+        methods = settings(tolerance)
+        try:
+            found = find_contact_gait(walker, self.ground, methods, near.z, near.step.length_m, most_steps=30)
+        except np.linalg.LinAlgError:
+            return None
+        return found if isinstance(found, ContactGait) else None
+
+    def distance(self, setting: Setting, gait: ContactGait, check: ContactGait | None) -> Distance:
+        """Of the gaits alone."""
+        step = gait.step
+        return Distance(
+            setting,
+            step.period_s,
+            step.length_m,
+            step.slip_m,
+            step.period_s - self.rigid.period,
+            step.length_m - self.rigid.length,
+            abs(check.step.period_s - step.period_s) if check is not None else abs(step.period_s - self.rigid.period),
+        )
+
+    def walked(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
+        """With the whole walk from the rigid start beside."""
+        walk = self.walk(walker, start, WALK_TOLERANCE, self.sampling)
+        check = self.walk(walker, start, WALK_CHECK, None)
+        wall_s = min(self.timed(walker, start) for _ in range(REPEATS))
+        steps = walk.touch_time_s.size
+        if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
+            return distance
+        y = walk.samples.states
+        motion = sampled_at_step_ends(Motion(walk.samples.time_s, y[:, 2:4], y[:, 6:8], walk.touch_time_s))
+        phases = np.linspace(0.0, 1.0, PHASES)
+        aligned = difference_in_phase(motion, self.rigid.motion, phases[phases >= IMPACT_PHASE])
+        _, raw = difference_in_time(motion, self.rigid.motion)
+        return Distance(
+            distance.setting,
+            distance.period,
+            distance.length,
+            distance.slip,
+            distance.period_error,
+            distance.length_error,
+            distance.numerical_period,
+            angle=float(aligned.largest_angle.max()),
+            velocity=float(aligned.largest_velocity.max()),
+            raw_angle=float(raw.largest_angle.max()),
+            raw_velocity=float(raw.largest_velocity.max()),
+            numerical_time=float(abs(walk.touch_time_s[-1] - check.touch_time_s[-1])),
+            evaluations=int(walk.work[0]),
+            wall_s=wall_s,
+        )
+
+    def walk(self, walker: ContactWalker, start: State, tolerance: float, sampling: float | None) -> ContactWalkResult:
+        """The walk from the rigid start."""
+        return walk_contact(walker, self.ground, None, STANCE_FOOT, start, settings(tolerance), self.steps, sampling)
+
+    def timed(self, walker: ContactWalker, start: State) -> float:
+        """Processor time of the walk (s), which other programs do not lengthen."""
+        begun = time.process_time()
+        self.walk(walker, start, WALK_TOLERANCE, None)
+        return time.process_time() - begun
+
+
+def settings(tolerance: float) -> MethodSettings:
+    """The method at a relative tolerance."""
+    return MethodSettings(method_named(METHOD), tolerance, ABSOLUTE * tolerance, BUDGET)
+
+
+def observed_orders(distances: list[Distance]) -> NDArray[np.float64]:
+    """Order with which the period converges along a series, from each three settings in a row."""
+    if len(distances) < 3:
+        return np.zeros(0)
+    periods = np.array([one.period for one in distances])
+    ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
+    changes = np.abs(np.diff(periods))
+    changes = np.maximum(changes, np.finfo(float).tiny)
+    return np.log(changes[:-1] / changes[1:]) / math.log(ratio)
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """The limit of a series' periods, and how far the last two estimates differ (s)."""
+
+    period: float
+    uncertainty: float
+
+
+def extrapolated(distances: list[Distance]) -> Extrapolation | None:
+    """The limit by Aitken's method on the last settings; None if they do not converge."""
+    periods = np.array([one.period for one in distances])
+    if periods.size < 4:
+        return None
+    estimates = [aitken(*periods[-4 + i : -1 + i if i == 0 else None]) for i in range(2)]
+    if any(estimate is None for estimate in estimates):
+        return None
+    before, last = (float(estimate) for estimate in estimates if estimate is not None)
+    return Extrapolation(last, abs(last - before))
+
+
+def aitken(first: float, second: float, third: float) -> float | None:
+    """Aitken's extrapolation of three numbers; None if their changes do not shrink."""
+    one, two = second - first, third - second
+    if one == 0.0 or not abs(two) < abs(one):
+        return None
+    return third + two * two / (one - two)

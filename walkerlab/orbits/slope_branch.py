@@ -1,0 +1,93 @@
+"""Following a gait from a vanishing slope to the slope that is asked for."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.small_slope import Seed, Vector
+from walkerlab.orbits.step_map import Shooting, newton
+
+WIDEST_STRIDE, NARROWEST_STRIDE = 1.6, 1.001  # from one slope to the next, as ratio of cube roots
+REMEMBERED = 3  # points that the next one is extrapolated from
+JUMP = 0.02  # a gait further than this from where it was expected is another gait
+SLACK = 1e-6  # residual that is good enough on the way, relative
+
+
+class Reached(NamedTuple):
+    """How far a gait could be followed."""
+
+    slope: float  # rad
+    z: Vector | None  # (3,) at the slope asked for; None if the gait was lost before
+
+
+class Branch:
+    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
+
+    In s^2 both gaits of the small-slope theory are smooth, and polynomials through the last points foretell the next.
+    """
+
+    def __init__(self, shooting: Shooting, seed: Seed) -> None:
+        """Start from a seed; `shooting` is for the seed's walker."""
+        self.shooting = shooting
+        self.seed = seed
+        self.points = [(0.0, np.array([*seed.limit, seed.period]))]
+
+    def follow(self, slope: float) -> Reached:
+        """The gait at `slope` > 0 (rad), in steps that adapt to how well it is foretold."""
+        target, reached, ratio = float(np.cbrt(slope)), 0.0, WIDEST_STRIDE
+        s = min(target, float(np.cbrt(self.seed.slope)))
+        while True:
+            if self._correct(s):
+                if s == target:
+                    return Reached(slope, self._state(s, self.points[-1][1]))
+                reached = s
+                ratio = min(WIDEST_STRIDE, ratio**1.5)
+            else:
+                ratio = ratio**0.5
+                if reached == 0.0 or ratio < NARROWEST_STRIDE:
+                    return Reached(reached**3, None)
+            s = min(target, ratio * reached)
+
+    def _correct(self, s: float) -> bool:
+        """Take the gait at s among the points, if Newton's method finds it near where it is expected."""
+        expected = self._expected(s)
+        z = self._state(s, expected)
+        shooting = self.shooting._replace(walker=self.shooting.walker._replace(slope=s**3))
+        status, period, residual, _ = newton(shooting, z, SLACK * s)
+        if status != Outcome.WALKED or residual > 100.0 * SLACK * s:
+            return False
+        found = scaled(s, z, period)
+        moved = np.abs(found - expected)
+        if moved[:3].max() > JUMP * np.abs(found[:3]).max() or moved[3] > JUMP * period:
+            return False
+        self.points = [*self.points[1 - REMEMBERED :], (s * s, found)]
+        return True
+
+    def _expected(self, s: float) -> Vector:
+        """The polynomial through the points at s; the seed itself while there is nothing but the limit."""
+        if len(self.points) == 1:
+            s_seed = float(np.cbrt(self.seed.slope))
+            return interpolated([*self.points, (s_seed**2, scaled(s_seed, self.seed.z, self.seed.period))], s * s)
+        return interpolated(self.points, s * s)
+
+    @staticmethod
+    def _state(s: float, y: Vector) -> Vector:
+        return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
+
+
+def scaled(s: float, z: Vector, period: float) -> Vector:
+    """The point (y, T) of a gait at s."""
+    return np.array([(z[0] + s**3) / s, z[1] / s, z[2] / s, period])
+
+
+def interpolated(points: list[tuple[float, Vector]], x: float) -> Vector:
+    """Value at x of the polynomial through `points` (Lagrange)."""
+    total = np.zeros_like(points[0][1])
+    for i, (x_i, y_i) in enumerate(points):
+        weight = 1.0
+        for j, (x_j, _) in enumerate(points):
+            if j != i:
+                weight *= (x - x_j) / (x_i - x_j)
+        total += weight * y_i
+    return total

@@ -1,0 +1,182 @@
+"""The two gaits of a compass walker in the limit of a vanishing slope: where searches for gaits start from.
+
+At small angles the swing phase is linear, D(0) ddq = diag(-m b g, K g) q, with one oscillating and one growing mode,
+and the heel strike's map is constant. Two kinds of period-1 motion remain as the slope phi goes to zero.
+
+Long period: the step is symmetric about mid-swing, and both legs turn alike at heel strike, which then changes nothing
+at leading order. What it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, is what the step
+descends, M g L alpha phi; with omega proportional to alpha that makes phi = kappa alpha^3.
+
+Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi.
+
+Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
+Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+
+from walkerlab.mechanics.heel_strike import impact_matrices
+from walkerlab.mechanics.rigid_compass import RigidWalker, swing_constants
+
+Vector = NDArray[np.float64]
+
+LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
+SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
+LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
+SHORT_AMPLITUDE = 0.002
+MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
+# on a slope of one radian: the state of (z, 1), z itself, and theta_1 + theta_2
+STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+COORDINATES = np.eye(3, 4)
+FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
+
+
+class Seed(NamedTuple):
+    """An approximate gait at a small slope."""
+
+    name: str
+    slope: float  # rad
+    z: Vector  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
+    period: float  # s, in the limit
+    limit: Vector  # (3,) z / slope^(1/3) in the limit
+
+
+class Modes(NamedTuple):
+    """The linear swing phase: ddq = V diag(-swing^2, fall^2) V^-1 q."""
+
+    swing: float  # rad/s, of the oscillating mode
+    fall: float  # 1/s, of the growing mode
+    V: Vector  # (2, 2), a mode a column, oscillating first
+
+
+def linear_modes(walker: RigidWalker) -> Modes | None:
+    """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
+    c = swing_constants(walker)
+    D = np.array([[c.d11, -c.mLb], [-c.mLb, c.d22]])
+    stiffness = walker.gravity * np.diag([-c.mb, c.K])
+    try:
+        rates, V = eigh(stiffness, D)
+    except np.linalg.LinAlgError:
+        return None
+    return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
+
+
+def seeds(walker: RigidWalker) -> tuple[Seed, ...]:
+    """The small-slope gaits that `walker` has; its own slope plays no part."""
+    modes = linear_modes(walker)
+    long = None if modes is None else long_period_seed(walker, modes)
+    if modes is None or long is None:
+        return ()
+    short = short_period_seed(walker, modes, long.period)
+    return (long,) if short is None else (long, short)
+
+
+def long_period_seed(walker: RigidWalker, modes: Modes) -> Seed | None:
+    """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
+    half = symmetric_half_period(modes)
+    if half is None or modes.fall * half > MOST_GROWTH:
+        return None
+    at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
+    rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])
+    total = modes.V[0] + modes.V[1]
+    # both feet on the slope at the end: the weights of the modes, scaled to a unit angle between the legs
+    weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
+    weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
+    omega = float((modes.V @ (weights * rates_at_end)).mean())
+    kappa = 0.5 * walker.leg_length * omega**2 / walker.gravity
+    slope = kappa * LONG_AMPLITUDE**3
+    z = LONG_AMPLITUDE * np.array([0.5, omega, omega]) - np.array([slope, 0.0, 0.0])
+    return Seed(LONG_PERIOD, slope, z, 2.0 * half, np.array([0.5, omega, omega]) / np.cbrt(kappa))
+
+
+def symmetric_half_period(modes: Modes) -> float | None:
+    """The first time h > 0 after mid-swing, theta = 0, at which theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2 (s)."""
+    total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
+
+    def mismatch(h: Vector) -> Vector:
+        """Determinant of the two conditions on the modes' weights, over h cosh(fall h)."""
+        swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
+        falling = total[1] * np.tanh(modes.fall * h) / modes.fall * apart[0] * np.cos(modes.swing * h)
+        return np.asarray((swinging - falling) / h)
+
+    return first_root(mismatch, 2.0 * math.pi / modes.swing)
+
+
+def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed | None:
+    """The gait that is proportional to the slope, of less than `longest` (s); None if there is none."""
+    try:
+        step = LinearStep(walker, modes)
+        period = first_root(step.mismatch, longest)
+        z = None if period is None else step.periodic_state(period)
+    except np.linalg.LinAlgError:  # masses that all sit in one place leave a heel strike undetermined
+        return None
+    if period is None or z is None or z[0] <= -1.0:
+        return None
+    slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
+    return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
+
+
+class LinearStep:
+    """One step of the linearised walker on a slope of one radian, for many durations at once."""
+
+    def __init__(self, walker: RigidWalker, modes: Modes) -> None:
+        """Prepare the heel strike's map at vanishing angles, with the change of roles."""
+        self.modes = modes
+        self.inverse = np.linalg.inv(modes.V)
+        A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, 1.0)
+        after = np.linalg.solve([[A_11, A_12], [A_12, A_22]], [[B_11, B_12], [0.0, B_22]])
+        self.strike = np.zeros((3, 4))
+        self.strike[0, 0] = 1.0
+        self.strike[1:, 2:] = after[::-1]
+
+    def flows(self, t: Vector) -> Vector:
+        """Matrices (..., 4, 4) that take a state to the one t (s) later."""
+        swing, fall = self.modes.swing, self.modes.fall
+        sine, cosine = np.sin(swing * t), np.cos(swing * t)
+        growing, grown = np.sinh(fall * t), np.cosh(fall * t)
+        flow = np.empty((*t.shape, 4, 4))
+        flow[..., :2, :2] = flow[..., 2:, 2:] = self._of_modes(cosine, grown)
+        flow[..., :2, 2:] = self._of_modes(sine / swing, growing / fall)
+        flow[..., 2:, :2] = self._of_modes(-swing * sine, fall * growing)
+        return flow
+
+    def _of_modes(self, oscillating: Vector, growing: Vector) -> Vector:
+        weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
+        return np.asarray(self.modes.V * weights @ self.inverse, np.float64)
+
+    def conditions(self, t: Vector) -> Vector:
+        """Matrices (..., 4, 4) on (z, 1): three rows say that t (s) later z is back, one that both feet are down."""
+        flow = self.flows(t)
+        bordered = np.empty_like(flow)
+        bordered[..., :3, :] = COORDINATES - self.strike @ flow @ STATE_OF
+        bordered[..., 3, :] = FEET_DOWN @ flow @ STATE_OF
+        bordered[..., 3, 3] += 2.0
+        return bordered
+
+    def mismatch(self, t: Vector) -> Vector:
+        """Determinant of the conditions, over t: zero where they have a solution."""
+        return np.asarray(np.linalg.det(self.conditions(t)) / t)
+
+    def periodic_state(self, t: float) -> Vector:
+        """The z (3,) that a step of t (s) brings back."""
+        rows = self.conditions(np.array(t))[:3]
+        return np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
+
+
+def first_root(f: Callable[[Vector], Vector], longest: float) -> float | None:
+    """The smallest root of f in (0, longest), bracketed by samples; None if f keeps its sign."""
+    # the end itself is left out: there the short gait's conditions degenerate into the long one's
+    samples = longest * np.arange(1, SCAN) / SCAN
+    values = f(samples)
+    turns = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    if turns.size == 0:
+        return None
+    low, high = samples[turns[0]], samples[turns[0] + 1]
+    return float(brentq(lambda t: float(f(np.array([t]))[0]), low, high, xtol=1e-14 * high))

@@ -1,0 +1,69 @@
+"""Arithmetic on the paper's printed numbers alone: no model, no config."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1, StartRow
+
+MM: Final = 1000.0  # mm in a m
+ADAMS_EXPONENT: Final = 2.2  # default of ADAMS/View, not given in the paper
+
+
+@dataclass(frozen=True)
+class PercentOf:
+    """The difference of the two columns of Table 2, in percent of either."""
+
+    of_matlab: float
+    of_adams: float
+
+    def nearest(self, printed: float) -> float:
+        """The magnitude that comes nearer to the printed percentage."""
+        return min(abs(self.of_matlab), abs(self.of_adams), key=lambda found: abs(found - abs(printed)))
+
+
+def percent_of(row: StartRow) -> PercentOf:
+    """How much larger in magnitude the ADAMS value of a row of Table 2 is."""
+    matlab, adams = abs(row.matlab.value), abs(row.adams.value)
+    return PercentOf(100.0 * (adams - matlab) / matlab, 100.0 * (adams - matlab) / adams)
+
+
+def printed_speed(cycle: float) -> float:
+    """The printed step length over a cycle's time (s), as section 5 has it (m/s)."""
+    return STEP_LENGTH.value / cycle
+
+
+def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
+    """Difference of the two speeds (%) that follow from cycles of these times (s)."""
+    matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
+    return 100.0 * abs(adams - matlab) / matlab
+
+
+@dataclass(frozen=True)
+class RestingFoot:
+    """A walker that stands on one foot."""
+
+    depth: float  # m
+    damping_ratio: float
+
+
+def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
+    """Depth, and damping ratio c / (2 sqrt(dF/dd m)) there, of a foot on ground with F = k d^e + c d' (SI units)."""
+    depth = (weight / stiffness) ** (1.0 / exponent)
+    slope = stiffness * exponent * depth ** (exponent - 1.0)
+    return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))
+
+
+def readings_of_fig_4b() -> str:
+    """How the paper's walker stands on its contact, in words, with either reading of the numbers without units."""
+    _, leg, hip, gravity = (entry.value for entry in TABLE_1)
+    mass = hip + 2.0 * leg
+    stiffness, damping = STIFFNESS.value, DAMPING.value
+    in_adams = resting_foot(mass * gravity, mass, stiffness * MM**ADAMS_EXPONENT, ADAMS_EXPONENT, damping * MM)
+    in_si = resting_foot(mass * gravity, mass, stiffness, 1.0, damping)
+    return (
+        f"in N, mm, s the walker stands {in_adams.depth * MM:.3f} mm deep with damping ratio "
+        f"{in_adams.damping_ratio:.2f}; in SI (linear spring) {in_si.depth * MM:.2f} mm with {in_si.damping_ratio:.3f}"
+    )

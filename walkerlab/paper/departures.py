@@ -1,0 +1,79 @@
+"""In what a config's scene is not the one of the paper: then its numbers neither confirm nor refute the paper's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any, Final
+
+from walkerlab.config.schema import CompassWalker, Config, Contact
+from walkerlab.paper.measured import Departures
+from walkerlab.paper.printed import X_P, slope_of
+
+SAME: Final = 1e-9
+"""Relative difference up to which two numbers are one, written in different units."""
+PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
+LAWS: Final = ("friction", "terrain", "pad_pitch")
+"""Keys of the contact block besides its force laws. A pinned first stance is the paper's too (section 4)."""
+
+
+def departures(config: Config, start_moved: bool) -> Departures:
+    """What differs from the paper's scene, in words.
+
+    start_moved  the walk did not start from the rigid model's fixed point
+    """
+    of_rigid = tuple(of_the_rigid_model(config))
+    moved = ("the start is not the rigid model's fixed point",) if start_moved else ()
+    of_contact = () if config.contact is None else tuple(of_the_contact(config.walker, config.contact))
+    return Departures(of_rigid, (*of_rigid, *of_contact, *moved))
+
+
+def of_the_rigid_model(config: Config) -> Iterator[str]:
+    """Walker, gravity and slope; the slope is known to the digits of x_p."""
+    yield from different(CompassWalker(), config.walker, leave_out=PHYSICAL_MODEL_ONLY)
+    gravity = Config.model_fields["gravity_m_s2"].default
+    if not same(config.gravity_m_s2, gravity):
+        yield said("gravity_m_s2", config.gravity_m_s2, gravity)
+    slope, rounding = slope_of(*X_P[:2])
+    if abs(config.slope_rad - slope) > rounding:
+        yield said("slope_rad", config.slope_rad, slope)
+
+
+def of_the_contact(walker: CompassWalker, contact: Contact) -> Iterator[str]:
+    """Foot, force laws and terrain."""
+    paper = CompassWalker()
+    for name in PHYSICAL_MODEL_ONLY:
+        if not same(getattr(walker, name), getattr(paper, name)):
+            yield said(name, getattr(walker, name), getattr(paper, name))
+    laws, paper_laws = contact.in_si(), Contact().in_si()
+    for field in fields(laws):
+        if not same(getattr(laws, field.name), getattr(paper_laws, field.name)):
+            yield said(field.name, getattr(laws, field.name), getattr(paper_laws, field.name))
+    for name in LAWS:
+        if getattr(contact, name) != getattr(Contact(), name):
+            yield said(f"contact.{name}", getattr(contact, name), getattr(Contact(), name))
+
+
+def different(paper: CompassWalker, used: CompassWalker, leave_out: tuple[str, ...]) -> Iterator[str]:
+    """Keys of the walker with another value."""
+    for name in CompassWalker.model_fields:
+        if name not in leave_out and not same(getattr(used, name), getattr(paper, name)):
+            yield said(name, getattr(used, name), getattr(paper, name))
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values are the same, numbers up to their rounding."""
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=SAME)
+    return bool(one == other)
+
+
+def said(name: str, used: Any, paper: Any) -> str:
+    """A difference in words."""
+    return f"{name} {shown(used)} instead of {shown(paper)}"
+
+
+def shown(value: Any) -> str:
+    """A value in words."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

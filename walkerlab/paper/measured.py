@@ -1,0 +1,207 @@
+"""What the printed numbers are held against: the rigid model with either set of equations, and the contact model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from walkerlab.hybrid.comparison import Array
+from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.rigid_measures import energies
+from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
+from walkerlab.solvers.dop853 import Dop853, new_dop853
+from walkerlab.solvers.system import State
+
+EQUATIONS = 4
+RTOL, ATOL = 1e-12, 1e-14
+ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
+CYCLES = 5  # that the paper walks
+ENERGY_STEPS = 5  # over which the paper averages the energy
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """The quantities of Table 3, SI units; None where the walk or its record is too short for one.
+
+    t_left   period of the first step of the last completed stride
+    t_right  period of its second step
+    t_cycle  their sum
+    v_com    length of the stride along the slope over t_cycle
+    E_avg    time mean of kinetic and potential energy, from the current stance foot, over five steps or more
+    """
+
+    t_left: float | None
+    t_right: float | None
+    t_cycle: float | None
+    v_com: float | None
+    E_avg: float | None
+
+
+def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -> Characteristics:
+    """The quantities of Table 3 from the periods (s) and lengths (m) of a walk's steps."""
+    strides = len(periods) // 2
+    if strides == 0:
+        first = float(periods[0]) if len(periods) else None
+        return Characteristics(first, None, None, None, mean_energy)
+    left, right = 2 * strides - 2, 2 * strides - 1
+    cycle = float(periods[left] + periods[right])
+    speed = float(lengths[left] + lengths[right]) / cycle
+    return Characteristics(float(periods[left]), float(periods[right]), cycle, speed, mean_energy)
+
+
+@dataclass(frozen=True)
+class EnergyRecord:
+    """Time mean and extremes (J) of an energy."""
+
+    mean: float
+    least: float
+    most: float
+
+
+def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
+    """A sampled energy over the last five completed steps, or as many as there are; None if there are none."""
+    if step_ends.size == 0:
+        return None
+    start = step_ends[-1 - ENERGY_STEPS] if step_ends.size > ENERGY_STEPS else time[0]
+    end = min(step_ends[-1], time[-1])
+    inside = (time > start) & (time < end)
+    at = np.concatenate(([start], time[inside], [end]))
+    record = np.interp(at, time, energy)
+    mean = np.sum(0.5 * (record[1:] + record[:-1]) * np.diff(at)) / (end - start)
+    return EnergyRecord(float(mean), float(record.min()), float(record.max()))
+
+
+@dataclass(frozen=True)
+class RigidModel:
+    """The gait of one set of equations, and a walk on it.
+
+    state          the fixed point, rad and rad/s
+    steps          that were walked, of ten
+    step_length    m, between the feet at that state
+    energy_least   J, least and largest energy during the walk
+    energy_drift   J, largest spread within a swing
+    """
+
+    state: State
+    steps: int
+    step_length: float
+    table_3: Characteristics
+    energy_least: float
+    energy_most: float
+    energy_drift: float
+
+
+def tight_method() -> Dop853:
+    """An integrator whose error is far below any printed digit."""
+    return new_dop853(EQUATIONS, RTOL, ATOL, ENDLESS)
+
+
+def five_cycles(walker: RigidWalker, start: State) -> RecordedWalk:
+    """Ten steps of the rigid model with samples in time."""
+    return take_walk(walker, tight_method(), start, 2 * CYCLES, sampled=True)
+
+
+def energy_record(walker: RigidWalker, walk: RecordedWalk) -> Array:
+    """Energy (samples,) in J along a sampled walk, from the current stance foot."""
+    if walk.samples is None:
+        raise ValueError("the walk was not sampled")
+    return np.asarray(energies(walker, walk.samples.state).sum(axis=1))
+
+
+def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
+    """Walk five cycles from a gait's fixed point, and measure."""
+    walk = five_cycles(walker, state)
+    energy = energy_record(walker, walk)
+    return RigidModel(
+        state=state,
+        steps=walk.steps,
+        step_length=step_length(walker, state[0], state[1]),
+        table_3=characteristics(walk.periods, walk.lengths, walk.mean_energy),
+        energy_least=float(energy.min()),
+        energy_most=float(energy.max()),
+        energy_drift=walk.energy_drift,
+    )
+
+
+@dataclass(frozen=True)
+class ContactModel:
+    """A walk of the contact model, and the numbers of its force laws as the config has them.
+
+    start         rad and rad/s, the rigid state it was started from; None if states were not stored
+    step_length   m, mean over the last completed stride; None without one
+    energy_least  J, least and largest energy over the last five steps; None if energies were not stored
+    stiffness     and damping in the config's own units, named in `units`
+    foot_radius   m
+    """
+
+    outcome: str
+    steps: int
+    start: State | None
+    table_3: Characteristics
+    step_length: float | None
+    energy_least: float | None
+    energy_most: float | None
+    stiffness: float
+    damping: float
+    units: str
+    static_friction: float
+    dynamic_friction: float
+    static_penetration: float
+    damping_ratio: float
+    foot_radius: float
+
+
+@dataclass(frozen=True)
+class LegErrors:
+    """Largest difference of each leg's angle (rad) and angular velocity (rad/s)."""
+
+    angle: tuple[float, ...]
+    velocity: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Largest differences between the contact model and the rigid one; None where there is nothing to compare.
+
+    Each is a pair, one for each leg. `between_impacts` leaves out the first instants of every step, in which a
+    compliant impact is still under way; `settled` besides takes the last completed stride only.
+    """
+
+    raw: LegErrors | None = None
+    aligned: LegErrors | None = None
+    between_impacts: LegErrors | None = None
+    settled: LegErrors | None = None
+    orbit: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Departures:
+    """In what a scene is not the paper's, in words; empty if it is."""
+
+    rigid: tuple[str, ...]  # of the rigid model
+    contact: tuple[str, ...]  # of the contact model, those of the rigid model included
+
+
+@dataclass(frozen=True)
+class Measured:
+    """All that was measured of a config's scene."""
+
+    walker: RigidWalker
+    equations: str
+    models: Mapping[str, RigidModel]  # by set of equations; a set without a gait is absent
+    spectral_radii: Mapping[str, float]  # of the same gaits: largest magnitude of a multiplier
+    contact: ContactModel
+    errors: Errors
+    departures: Departures
+
+    @property
+    def as_printed(self) -> RigidModel | None:
+        """The model with (A.5) as printed, if it has a gait."""
+        return self.models.get("as-printed")
+
+    @property
+    def corrected(self) -> RigidModel | None:
+        """The model with the right sign, if it has a gait."""
+        return self.models.get("corrected")

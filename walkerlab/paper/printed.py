@@ -1,0 +1,162 @@
+"""What the paper prints, as it prints it: every number with where it stands, and the walker that it is about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Final
+
+from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+
+COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number of the paper.
+
+    where    equation, table, figure or section
+    text     as printed, so that its last digit is known
+    """
+
+    where: str
+    quantity: str
+    unit: str
+    text: str
+
+    @property
+    def value(self) -> float:
+        """The number itself, in the unit it is printed in."""
+        return float(number(self.text))
+
+    @property
+    def last_digit(self) -> float:
+        """Worth of its last digit."""
+        exponent = number(self.text).as_tuple().exponent
+        return 10.0 ** int(exponent)
+
+
+WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
+
+
+def number(text: str) -> Decimal:
+    """The number in a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
+    plain = text.replace("less than", "").strip("<+% ")
+    return Decimal(WORDS.get(plain, plain.replace("10^", "1e")))
+
+
+X_P: Final = tuple(
+    Printed("eq. 11", f"x_p, {name}", unit, text)
+    for name, unit, text in zip(COORDINATES, COORDINATE_UNITS, ("-0.2022", "0.1674", "-0.60", "-0.84"), strict=True)
+)
+
+TABLE_1: Final = (
+    Printed("Table 1", "length of legs, L", "m", "1"),
+    Printed("Table 1", "mass of legs, m", "kg", "5"),
+    Printed("Table 1", "mass of hip, MH", "kg", "10"),
+    Printed("Table 1", "gravity, g", "m/s^2", "9.81"),
+)
+
+
+@dataclass(frozen=True)
+class StartRow:
+    """A row of Table 2."""
+
+    matlab: Printed
+    adams: Printed
+    percent: Printed
+
+
+def start_row(name: str, unit: str, matlab: str, adams: str, percent: str) -> StartRow:
+    """A row of Table 2 from its three texts."""
+    return StartRow(
+        Printed("Table 2", f"{name}, MATLAB", unit, matlab),
+        Printed("Table 2", f"{name}, MSC ADAMS", unit, adams),
+        Printed("Table 2", f"{name}, difference rate", "%", percent),
+    )
+
+
+TABLE_2: Final = (
+    start_row("theta_1", "rad", "-0.2022", "-0.2021", "+0.1%"),
+    start_row("theta_2", "rad", "0.1674", "0.1670", "+0.15%"),
+    start_row("dtheta_1", "rad/s", "-0.60", "-1.02", "+41%"),
+    start_row("dtheta_2", "rad/s", "-0.84", "-3.20", "+74%"),
+)
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """A row of Table 3."""
+
+    name: str
+    matlab: Printed
+    adams: Printed
+
+
+def result_row(name: str, quantity: str, unit: str, matlab: str, adams: str) -> ResultRow:
+    """A row of Table 3 from its two texts."""
+    return ResultRow(
+        name,
+        Printed("Table 3", f"{quantity}, MATLAB", unit, matlab),
+        Printed("Table 3", f"{quantity}, MSC ADAMS", unit, adams),
+    )
+
+
+T_LEFT: Final = result_row("t_left", "left step period, t_left", "s", "0.60", "0.59")
+T_RIGHT: Final = result_row("t_right", "right step period, t_right", "s", "0.79", "0.77")
+T_CYCLE: Final = result_row("t_cycle", "one cycle period, t_cycle", "s", "1.39", "1.38")
+V_COM: Final = result_row("v_com", "average velocity, v_com", "m/s", "0.0246", "0.0248")
+E_AVG: Final = result_row("E_avg", "average mechanical energy, E_avg", "J", "150.13", "150.14")
+TABLE_3: Final = (T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG)
+
+EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P of a stable gait", "1", "less than one")
+LEG_INERTIA: Final = Printed("section 4, Fig. 4a", "inertia of the links", "kg m^2", "zero")
+FOOT_RADIUS: Final = Printed("section 4, Fig. 3", "radius of the foot points", "mm", "1")
+STIFFNESS: Final = Printed("section 4, Fig. 4b", "stiffness of the contact", "not given", "10^5")
+DAMPING: Final = Printed("section 4, Fig. 4b", "damping of the contact", "not given", "90")
+STATIC_FRICTION: Final = Printed("section 4, Fig. 4b", "static friction", "1", "0.9")
+DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1", "0.7")
+LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
+RAISED: Final = (
+    Printed("section 4", "increase of the initial velocity of link 1", "%", "41%"),
+    Printed("section 4", "increase of the initial velocity of link 2", "%", "74%"),
+)
+STRIDES: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
+ANGLE_ERROR: Final = Printed("section 5, Fig. 8a", "largest error of the angles", "rad", "10^-4")
+VELOCITY_ERROR: Final = Printed("section 5, Fig. 8b", "largest error of the angular velocities", "rad/s", "10^-4")
+STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
+VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
+
+EQUATION_NUMBERS: Final = (*range(1, 42), *range(55, 59))
+"""Numbers of the equations of Appendix A."""
+
+
+def fixed_point_as_printed() -> tuple[float, float, float, float]:
+    """x_p of eq. 11."""
+    theta_1, theta_2, omega_1, omega_2 = (entry.value for entry in X_P)
+    return theta_1, theta_2, omega_1, omega_2
+
+
+def adams_start_as_printed() -> tuple[float, float, float, float]:
+    """The start of the ADAMS model, Table 2."""
+    theta_1, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
+    return theta_1, theta_2, omega_1, omega_2
+
+
+def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
+    """The slope (rad) on which both feet of a printed state stand, and how far rounding leaves it open."""
+    return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.last_digit + theta_2.last_digit)
+
+
+def walker_of_the_paper(c21_sign: float) -> RigidWalker:
+    """The walker of Table 1, its masses in the middle of the legs, on the slope of x_p.
+
+    c21_sign  CORRECTED or AS_PRINTED
+    """
+    length, mass, hip, gravity = (entry.value for entry in TABLE_1)
+    return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
+
+
+SIGNS: Final = {"as-printed": AS_PRINTED, "corrected": CORRECTED}
+"""What each set of equations has for the sign of C_21 in (A.5)."""

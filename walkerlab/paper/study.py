@@ -1,0 +1,232 @@
+"""Measurements on the paper's own walker and slope, whatever the config: what its errata are shown with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from walkerlab.hybrid.comparison import Array
+from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.hybrid.rigid_measures import energies, reactions
+from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.paper.measured import (
+    Characteristics,
+    RigidModel,
+    characteristics,
+    five_cycles,
+    rigid_model,
+    tight_method,
+)
+from walkerlab.paper.misprints import (
+    MISPRINTED,
+    fixed_point,
+    foothold_speed_after_impact,
+    height_over_slope,
+    inertia_at_impact,
+)
+from walkerlab.paper.printed import (
+    E_AVG,
+    SIGNS,
+    TABLE_2,
+    X_P,
+    adams_start_as_printed,
+    fixed_point_as_printed,
+    slope_of,
+    walker_of_the_paper,
+)
+from walkerlab.solvers.system import State
+
+SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
+FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
+
+
+@dataclass(frozen=True)
+class AdamsStart:
+    """What the rigid model says of the start that Table 2 gives the ADAMS model.
+
+    slope         rad, on which both its feet stand, and how far the printed digits leave it open
+    energy        J, kinetic and potential
+    normal_force  N, of the ground at the start
+    pull_from     s, from when on the ground would have to pull; None if it never has to
+    heel_strikes  that come
+    end           how and when the walk ends, s
+    """
+
+    slope: float
+    slope_rounding: float
+    energy: float
+    weight: float
+    normal_force: float
+    pull_from: float | None
+    heel_strikes: int
+    end: str
+    end_time: float
+
+    @property
+    def starts_a_gait(self) -> bool:
+        """Whether a foot that can only push carries the rigid model to a heel strike."""
+        return self.heel_strikes > 0 and self.pull_from is None
+
+    @property
+    def angles_in_words(self) -> str:
+        """On which slope its feet stand."""
+        degrees = math.degrees(self.slope)
+        return f"feet on a slope of {self.slope:.5f} +- {self.slope_rounding:.5f} rad ({degrees:.4f} degrees)"
+
+    @property
+    def velocities_in_words(self) -> str:
+        """What becomes of it."""
+        pull = "never has to pull" if self.pull_from is None else f"would have to pull from {self.pull_from:.3f} s on"
+        strikes = "before any heel strike" if self.heel_strikes == 0 else "after a heel strike"
+        return (
+            f"{self.energy:.1f} J against {E_AVG.adams.text} J in Table 3; the ground carries {self.normal_force:.1f} "
+            f"of {self.weight:.1f} N at once and {pull}; the walk ends ({self.end}) at {self.end_time:.2f} s, {strikes}"
+        )
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What (A.55) as printed does, at the heel strike of the fixed point of the equations as printed.
+
+    height         m, that it puts the swing foot of x_p over the slope
+    foothold_speed m/s, of the new stance foot after the impact
+    fixed_point    with both misprints; None if there is none nearby
+    """
+
+    height: float
+    foothold_speed: float
+    fixed_point: State | None
+
+
+@dataclass(frozen=True)
+class Ordering:
+    """Kinetic energy (J) of one state: from the masses' velocities, and from D_e with either order of coordinates."""
+
+    of_masses: float
+    angles_first: float
+    foot_first: float
+
+
+@dataclass(frozen=True)
+class PaperStudy:
+    """All of it.
+
+    as_printed, corrected  the gaits that x_p settles to
+    from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
+    fastest                rad/s, largest angular velocity of the gait as printed
+    largest_jump           rad/s, largest change of an angular velocity at its heel strike
+    """
+
+    slope: float
+    slope_rounding: float
+    as_printed: RigidModel
+    corrected: RigidModel
+    from_x_p: Characteristics
+    fastest: float
+    largest_jump: float
+    impact: Impact
+    ordering: Ordering
+    adams: AdamsStart
+
+
+def study_the_paper() -> PaperStudy:
+    """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
+    printed, right = walker_of_the_paper(AS_PRINTED), walker_of_the_paper(CORRECTED)
+    gaits = {name: settled(walker_of_the_paper(sign)) for name, sign in SIGNS.items()}
+    one_step = take_walk(printed, tight_method(), gaits["as-printed"], 1, sampled=True)
+    cycles = five_cycles(printed, fixed_point_as_printed())
+    slope, rounding = slope_of(*X_P[:2])
+    return PaperStudy(
+        slope=slope,
+        slope_rounding=rounding,
+        as_printed=rigid_model(printed, gaits["as-printed"]),
+        corrected=rigid_model(right, gaits["corrected"]),
+        from_x_p=characteristics(cycles.periods, cycles.lengths, cycles.mean_energy),
+        fastest=fastest_leg(one_step),
+        largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
+        impact=misprinted_impact(printed, one_step),
+        ordering=order_of_coordinates(right),
+        adams=adams_start(),
+    )
+
+
+def settled(walker: RigidWalker) -> State:
+    """The stable gait that walking from x_p leads to."""
+    walk = take_walk(walker, tight_method(), fixed_point_as_printed(), SETTLING_STEPS)
+    if walk.steps < SETTLING_STEPS:
+        raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
+    return walk.final_state
+
+
+def fastest_leg(walk: RecordedWalk) -> float:
+    """Largest angular velocity (rad/s) of a sampled walk."""
+    assert walk.samples is not None
+    return float(np.abs(walk.samples.state[:, 2:]).max())
+
+
+def misprinted_impact(walker: RigidWalker, one_step: RecordedWalk) -> Impact:
+    """What (A.55) as printed does to the gait whose step is given."""
+    theta_1, theta_2 = fixed_point_as_printed()[:2]
+    return Impact(
+        height=height_over_slope(walker, theta_1, theta_2, MISPRINTED),
+        foothold_speed=foothold_speed_after_impact(walker, as_state(one_step.before[0]), MISPRINTED),
+        fixed_point=fixed_point(walker, one_step.start, MISPRINTED),
+    )
+
+
+def order_of_coordinates(walker: RigidWalker) -> Ordering:
+    """Kinetic energies at x_p with a moving foot."""
+    theta_1, theta_2, omega_1, omega_2 = fixed_point_as_printed()
+    D = inertia_at_impact(walker, theta_1, theta_2)
+    angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
+    foot_first = np.array([*FOOT_VELOCITY, omega_1, omega_2])
+    L, a = walker.leg_length, walker.foot_to_mass
+    foot = np.array(FOOT_VELOCITY)
+    along_stance = -omega_2 * np.array([math.cos(theta_2), math.sin(theta_2)])
+    along_swing = omega_1 * np.array([math.cos(theta_1), math.sin(theta_1)])
+    hip = foot + L * along_stance
+    moving = [
+        (walker.leg_mass, foot + a * along_stance),
+        (walker.hip_mass, hip),
+        (walker.leg_mass, hip + (L - a) * along_swing),
+    ]
+    return Ordering(
+        of_masses=float(sum(0.5 * mass * velocity @ velocity for mass, velocity in moving)),
+        angles_first=float(0.5 * angles_first @ D @ angles_first),
+        foot_first=float(0.5 * foot_first @ D @ foot_first),
+    )
+
+
+def adams_start() -> AdamsStart:
+    """Walk the corrected rigid model from the ADAMS start, on the slope on which that stands."""
+    slope, rounding = slope_of(TABLE_2[0].adams, TABLE_2[1].adams)
+    walker = walker_of_the_paper(CORRECTED)._replace(slope=slope)
+    walk = take_walk(walker, tight_method(), adams_start_as_printed(), 1, sampled=True)
+    assert walk.samples is not None
+    normal = reactions(walker, walk.samples.state)[:, 1]
+    start = np.array([adams_start_as_printed()])
+    return AdamsStart(
+        slope=slope,
+        slope_rounding=rounding,
+        energy=float(energies(walker, start).sum()),
+        weight=(walker.hip_mass + 2.0 * walker.leg_mass) * walker.gravity,
+        normal_force=float(reactions(walker, start)[0, 1]),
+        pull_from=first_below_zero(walk.samples.time, normal),
+        heel_strikes=walk.steps,
+        end=walk.outcome.label,
+        end_time=float(walk.samples.time[-1]),
+    )
+
+
+def first_below_zero(time: Array, signal: Array) -> float | None:
+    """When a sampled signal first falls below zero, by interpolation; None if it does not."""
+    below = np.flatnonzero(signal < 0.0)
+    if below.size == 0:
+        return None
+    after = int(below[0])
+    if after == 0:
+        return float(time[0])
+    fraction = signal[after - 1] / (signal[after - 1] - signal[after])
+    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))

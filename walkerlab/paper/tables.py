@@ -1,0 +1,72 @@
+"""The paper's three tables beside what was measured."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from walkerlab.paper.arithmetic import MM, percent_of
+from walkerlab.paper.measured import Measured
+from walkerlab.paper.printed import COORDINATES, FOOT_RADIUS, LEG_INERTIA, TABLE_1, TABLE_2, TABLE_3
+from walkerlab.paper.study import PaperStudy
+
+Table = dict[str, dict[str, Any]]
+"""Rows by name, each with its columns; None where a model has no such value."""
+
+LEFT_TO_THE_TEXT: Final = ("section 2: 'in the middle of the legs'", "not stated: from the angles of x_p")
+
+
+def table_1(measured: Measured, study: PaperStudy) -> Table:
+    """The parameters: as printed (`paper`), where, and as used."""
+    walker = measured.walker
+    length, mass, hip, gravity = TABLE_1
+    middle, slope = LEFT_TO_THE_TEXT
+    rows = (
+        ("L", "length of the legs", "m", length.value, walker.leg_length, length.where),
+        ("m", "mass of a leg", "kg", mass.value, walker.leg_mass, mass.where),
+        ("MH", "mass of the hip", "kg", hip.value, walker.hip_mass, hip.where),
+        ("g", "gravity", "m/s^2", gravity.value, walker.gravity, gravity.where),
+        ("a", "foot to mass of the leg", "m", 0.5 * length.value, walker.foot_to_mass, middle),
+        ("J", "inertia of a leg", "kg m^2", LEG_INERTIA.value, walker.leg_inertia, LEG_INERTIA.where),
+        ("r", "radius of the foot", "m", FOOT_RADIUS.value / MM, measured.contact.foot_radius, FOOT_RADIUS.where),
+        ("phi", "slope", "rad", study.slope, walker.slope, slope),
+    )
+    return {
+        symbol: {"quantity": quantity, "unit": unit, "paper": paper, "used": used, "where": where}
+        for symbol, quantity, unit, paper, used, where in rows
+    }
+
+
+def table_2(measured: Measured) -> Table:
+    """The initial values, and the percentages on both bases."""
+    table = {}
+    for coordinate, row in enumerate(TABLE_2):
+        percent, start = percent_of(row), measured.contact.start
+        states = {name: model.state[coordinate] for name, model in measured.models.items()}
+        table[COORDINATES[coordinate]] = {
+            "unit": row.matlab.unit,
+            "paper_matlab": row.matlab.value,
+            "paper_adams": row.adams.value,
+            "as_printed": states.get("as-printed"),
+            "corrected": states.get("corrected"),
+            "contact": None if start is None else start[coordinate],
+            "paper_percent": row.percent.value,
+            "percent_of_matlab": percent.of_matlab,
+            "percent_of_adams": percent.of_adams,
+        }
+    return table
+
+
+def table_3(measured: Measured) -> Table:
+    """The characteristics of both models."""
+    table = {}
+    for row in TABLE_3:
+        found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        table[row.name] = {
+            "unit": row.matlab.unit,
+            "paper_matlab": row.matlab.value,
+            "paper_adams": row.adams.value,
+            "as_printed": found.get("as-printed"),
+            "corrected": found.get("corrected"),
+            "contact": getattr(measured.contact.table_3, row.name),
+        }
+    return table

@@ -1,1 +1,0 @@
-"""The walkers and the ground under them, as scalar compilable functions."""

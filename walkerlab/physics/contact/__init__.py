@@ -1,1 +1,0 @@
-"""Ground contact as ADAMS computes it: normal force, friction, terrain."""

@@ -1,0 +1,1 @@
+"""Extreme cases, problems with known answers, and the measures they are judged by."""

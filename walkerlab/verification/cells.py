@@ -1,0 +1,59 @@
+"""The independent pieces that the stage is made of, run here or in several processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from walkerlab.config.stability import Case
+from walkerlab.verification.catalogue import config_of
+from walkerlab.verification.contact_case import judge_contact
+from walkerlab.verification.known import PROBLEMS, Known
+from walkerlab.verification.ordinary import Choice, choices
+from walkerlab.verification.processes import in_order
+from walkerlab.verification.rigid_case import judge_rigid
+from walkerlab.verification.verdict import CaseResult
+
+
+@dataclass(frozen=True)
+class CaseCell:
+    """A case to be judged, and tried with ordinary methods."""
+
+    case: Case
+
+    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
+        """The verdict, then the ordinary methods."""
+        config = config_of(self.case)
+        judge = judge_rigid if self.case.model == "rigid" else judge_contact
+        return (judge(self.case, config), *choices(self.case, config))
+
+
+@dataclass(frozen=True)
+class KnownCell:
+    """A known problem, by its place in the list."""
+
+    index: int
+
+    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
+        """Its answer."""
+        return (PROBLEMS[self.index].answered(),)
+
+
+Cell = CaseCell | KnownCell
+Found = tuple[CaseResult | Known | Choice, ...]
+
+
+def cells_of(cases: Sequence[Case]) -> list[Cell]:
+    """Everything there is to run: known problems first, since they are the longest."""
+    return [*(KnownCell(index) for index in range(len(PROBLEMS))), *(CaseCell(case) for case in cases)]
+
+
+def run_cells(cells: Sequence[Cell], jobs: int) -> Iterator[Found]:
+    """The pieces' results in their order, whoever ran them."""
+    return in_order(cells, jobs, first_of_each_model(cells))
+
+
+def first_of_each_model(cells: Sequence[Cell]) -> list[int]:
+    """Places of the first case of each model."""
+    models = [cell.case.model if isinstance(cell, CaseCell) else "" for cell in cells]
+    return [models.index(model) for model in ("contact", "rigid") if model in models]

@@ -1,0 +1,209 @@
+"""Problems whose answers are known, run through the contact code; each reference takes a route without that code."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.verification import references
+from walkerlab.verification.particle_scene import (
+    ALONG_RATE,
+    ANGLE,
+    ANGLE_RATE,
+    HEIGHT,
+    HEIGHT_RATE,
+    OUT_OF_REACH,
+    first_foot,
+    next_landing,
+    rig,
+    run_until,
+    state,
+)
+
+GRAVITY: Final = 9.81
+CENTRE: Final = (0.0, 0.0)
+PAPER_LAW: Final = NormalLaw(1.0e5 * 1000.0**2.2, 2.2, 9.0e4, 1.0e-4)
+PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
+
+
+@dataclass(frozen=True)
+class Known:
+    """A quantity beside its reference.
+
+    error  of the value, relative to the reference
+    limit  up to which it is right; by `why`
+    """
+
+    name: str
+    quantity: str
+    value: float
+    reference: float
+    source: str
+    limit: float
+    why: str
+    wall_s: float
+
+    @property
+    def error(self) -> float:
+        """Relative to the reference."""
+        return abs(self.value - self.reference) / abs(self.reference)
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is right."""
+        return bool(math.isfinite(self.error) and self.error <= self.limit)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One known problem: `value` runs it through the contact code, `reference` answers it otherwise."""
+
+    name: str
+    quantity: str
+    value: Callable[[], float]
+    reference: Callable[[], float]
+    source: str
+    limit: float
+    why: str
+
+    def answered(self) -> Known:
+        """Both numbers; a run that gives none has an error that fails."""
+        started = time.perf_counter()
+        reference = self.reference()
+        try:
+            value = self.value()
+        except ArithmeticError:
+            value = math.copysign(1e300, reference)
+        wall_s = time.perf_counter() - started
+        return Known(self.name, self.quantity, value, reference, self.source, self.limit, self.why, wall_s)
+
+
+SPRING: Final = NormalLaw(1.0e6, 1.0, 0.0, 1.0e-4)
+LIGHT_LAW: Final = PAPER_LAW._replace(damping=9.0e2)
+THICK_LAW: Final = PAPER_LAW._replace(damping=9.0e3)
+DROP, BOUNCES = 0.1, 5
+BLOCK_MASS = 20.0
+
+
+def bouncing_ball_period() -> float:
+    """Mean time from landing to landing over five bounces on a linear spring without damping (s)."""
+    ball = rig(1.0, 0.1, (CENTRE, OUT_OF_REACH), SPRING, PAPER_FRICTION, GRAVITY)
+    first = math.sqrt(2.0 * DROP / GRAVITY)
+    period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
+    run = run_until(ball, state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
+    y = run.states[-1]
+    landing = float(run.times[-1]) + next_landing(float(y[HEIGHT]), float(y[HEIGHT_RATE]), GRAVITY)
+    return (landing - first) / BOUNCES
+
+
+def restitution(law: NormalLaw, speed: float) -> float:
+    """Speed after over speed before a ball of the walker's mass meets ground at `speed` (m/s)."""
+    ball = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), law, PAPER_FRICTION, GRAVITY)
+    height = 1e-3
+    start = state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
+    flying = [y for y in run_until(ball, start, 0.02).states if y[HEIGHT] > 0.0 and y[HEIGHT_RATE] > 0.0]
+    if not flying:
+        return 0.0
+    y = flying[0]
+    return math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[HEIGHT]) / speed
+
+
+def block_speed(slope: float, start_speed: float) -> float:
+    """Speed (m/s) of a block on a slope a second after it had `start_speed`."""
+    depth = (BLOCK_MASS * GRAVITY * math.cos(slope) / PAPER_LAW.stiffness) ** (1.0 / PAPER_LAW.exponent)
+    block = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), PAPER_LAW, PAPER_FRICTION, GRAVITY, slope)
+    return float(run_until(block, state((0.0, -depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
+
+
+SPOKES, WHEEL_SLOPE, HUB_INERTIA = 8, 0.08, 1e-3
+STIFF: Final = NormalLaw(1.0e9, 1.0, 3.0e5, 1.0e-7)
+STICKY: Final = Coulomb(2.0, 2.0, 1.0e-4, 1.0e-3)
+ROUNDS = 14
+
+
+def rimless_wheel_speed() -> float:
+    """Angular speed (rad/s) with a spoke normal to the slope, of a wheel that has come to roll steadily.
+
+    Two spokes at a time: from one spoke upright to the next; then the wheel is the same again, a spoke further on.
+    """
+    turn = 2.0 * math.pi / SPOKES
+    ahead = (math.sin(turn), -math.cos(turn))
+    wheel = rig(1.0, HUB_INERTIA, ((0.0, -1.0), ahead), STIFF, STICKY, GRAVITY, WHEEL_SLOPE)
+    speed = 0.9 * references.wheel_upright_speed(SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA)
+    for _ in range(ROUNDS):
+        height = 1.0 - GRAVITY * math.cos(WHEEL_SLOPE) / STIFF.stiffness
+        start = state((0.0, height), (speed, 0.0), -WHEEL_SLOPE, -speed)
+        run = run_until(wheel, start, turn / speed, 1e-8, 1e-11)
+        turned = -(run.states[:, ANGLE] + WHEEL_SLOPE)
+        speed = float(np.interp(turn, turned, -run.states[:, ANGLE_RATE]))
+    return speed
+
+
+ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
+
+
+def painleve_growth_rate() -> float:
+    """Rate (1/s) at which the end of a sliding rod digs itself in, from evenly spaced penetrations.
+
+    Of d = a + b cosh(s t) the differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
+    """
+    end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
+    ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
+    rod = rig(1.0, 1.0 / 3.0, (end, OUT_OF_REACH), ground, friction, GRAVITY)
+    rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
+    run = run_until(rod, state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
+    picked = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
+    picked = picked[0] + (picked[1] - picked[0]) * np.arange(4)
+    picked = picked[picked < run.times.size]
+    tau = float(run.times[picked[1]] - run.times[picked[0]])
+    first, middle, last = np.diff([-first_foot(rod, run.states[index]).height for index in picked])
+    return math.acosh(0.5 * (last + first) / middle) / tau
+
+
+PROBLEMS: Final = (
+    Problem(
+        "bouncing ball", "time from landing to landing, s", bouncing_ball_period,
+        partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
+        "closed form: free flight and half a turn of the spring", 1e-7, "the tolerance asked for, over five bounces",
+    ),
+    Problem(
+        "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
+        partial(restitution, LIGHT_LAW, 0.5),
+        partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
+        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+    ),
+    Problem(
+        "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
+        partial(restitution, THICK_LAW, 0.5),
+        partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
+        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+    ),
+    Problem(
+        "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
+        partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
+        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance asked for",
+    ),
+    Problem(
+        "block on an incline too steep", "speed at 0.8 rad a second after 2 m/s, m/s", partial(block_speed, 0.8, 2.0),
+        lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
+        "closed form: g (sin - mu cos)", 1e-7, "the tolerance asked for",
+    ),
+    Problem(
+        "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s", rimless_wheel_speed,
+        partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
+        "McGeer 1990: closed form for rigid spokes", 1e-3, "the spokes' ground gives way and creeps a little",
+    ),
+    Problem(
+        "Painleve's rod", "rate at which its end digs itself in at friction 4, 1/s", painleve_growth_rate,
+        partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
+        "closed form, linearised", 1e-3, "the rod turns a little while it digs",
+    ),
+)  # fmt: skip

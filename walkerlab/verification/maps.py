@@ -1,0 +1,143 @@
+"""Whole planes of parameters: where our default method and where a game engine's fixed step can be trusted.
+
+The paper's walk over stiffness and stiction velocity, and over stiffness and the step of semi-implicit Euler; all else
+is the paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
+from walkerlab.solvers.registry import method_named
+from walkerlab.verification.catalogue import config_of
+from walkerlab.verification.contact_case import TENFOLD, walked, walked_with
+from walkerlab.verification.contact_start import Prepared, prepared
+from walkerlab.verification.ordinary import REFERENCE, STEPS, fixed, natural_units
+from walkerlab.verification.scaling import pendulum_time
+from walkerlab.verification.verdict import finite
+
+PAPER_STIFFNESS: Final = 1.0e5 * 1000.0**2.2  # N/m^e
+STIFFNESS: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
+STICTION_VELOCITY: Final = (1e-7, 10.0)  # m/s
+PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
+STEP: Final = (1e-6, 1e-2)  # s
+WALK_STEPS: Final = 4
+BUDGET, SHARPER_BUDGET, REFERENCE_BUDGET = 400_000, 1_200_000, 3_000_000  # right-hand sides
+MOST_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
+VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
+
+Numbers = list[float]
+
+
+def along(ends: tuple[float, float], cells: int) -> NDArray[np.float64]:
+    """Evenly spaced powers."""
+    return np.geomspace(*ends, cells)
+
+
+def on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
+    """The paper's walk on ground of another stiffness (N/m^e), and with another stiction velocity (m/s) if given."""
+    contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
+    if stiction_velocity is not None:
+        contact |= {"stiction_velocity": stiction_velocity, "friction_velocity": PER_STICTION * stiction_velocity}
+    case = Case(
+        name="map", expected=("walked",), reason="a cell", steps=steps, budget=budget, config={"contact": contact}
+    )
+    return case, config_of(case)
+
+
+@dataclass(frozen=True)
+class StictionCell:
+    """The paper's walk with one stiffness and stiction velocity, by the default method.
+
+    run  outcome, steps, outcome at a tenfold tolerance, error between both, right-hand sides
+    """
+
+    name: str
+    stiffness: float
+    stiction_velocity: float
+    cells: int = 1
+
+    def run(self) -> Numbers:
+        """Walk it twice."""
+        case, config = on_ground(self.stiffness, self.stiction_velocity, WALK_STEPS, BUDGET)
+        ready = prepared(config, case)
+        assert ready is not None, "the paper's slope has a gait"
+        walk = walked(ready, config, case, 1.0, sampled=False)
+        again = walk
+        if walk.outcome.answered:
+            sharper = case.model_copy(update={"budget": SHARPER_BUDGET})
+            again = walked(ready, config, sharper, TENFOLD, sampled=False)
+        return [
+            float(walk.outcome),
+            float(walk.touch_time_s.size),
+            float(again.outcome),
+            apart(walk, again, config),
+            float(walk.work[0]),
+        ]
+
+
+def apart(one: ContactWalkResult, other: ContactWalkResult, config: Config) -> float:
+    """How far two walks' touches and ends are apart, in legs, radians and pendulum times; 0 if not to be compared."""
+    if one.outcome is not other.outcome or one.touch_time_s.size != other.touch_time_s.size:
+        return 0.0
+    times = np.abs(one.touch_time_s - other.touch_time_s) / pendulum_time(config)
+    ends = np.abs(np.array(one.end_state) - np.array(other.end_state)) / natural_units(config)
+    return finite(float(np.max(np.concatenate([times, ends]))))
+
+
+@dataclass(frozen=True)
+class StepColumn:
+    """Two steps of the paper's walk with one stiffness, by semi-implicit Euler with each step.
+
+    run  verdict and error of each step
+    """
+
+    name: str
+    stiffness: float
+    steps_s: tuple[float, ...]
+
+    @property
+    def cells(self) -> int:
+        """Of the map."""
+        return len(self.steps_s)
+
+    def run(self) -> Numbers:
+        """Walk it sharply, then with each step."""
+        case, config = on_ground(self.stiffness, None, STEPS, REFERENCE_BUDGET)
+        ready = prepared(config, case)
+        assert ready is not None, "the paper's slope has a gait"
+        name, rtol, atol = REFERENCE
+        walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)
+        if not walk.outcome.answered:
+            return [float(VERDICTS.index("no reference")), 0.0] * self.cells
+        return [number for h in self.steps_s for number in step_cell(h, ready, walk, natural_units(config))]
+
+
+def step_cell(h: float, ready: Prepared, walk: ContactWalkResult, units: NDArray[np.float64]) -> tuple[float, float]:
+    """Verdict and error of one step; the error is 0 where there is none to speak of."""
+    choice = fixed("map", h, ready, walk.end_time_s, np.array(walk.end_state), units, MOST_EVALUATIONS)
+    return float(VERDICTS.index(choice.verdict)), choice.error or 0.0
+
+
+MapPiece = StictionCell | StepColumn
+
+
+def pieces_of(cells: int) -> list[MapPiece]:
+    """Everything there is to compute for maps of `cells` cells along each axis."""
+    stiffness = along(STIFFNESS, cells)
+    steps = tuple(float(h) for h in along(STEP, cells))
+    return [
+        *(StepColumn(f"step {i}", float(k), steps) for i, k in enumerate(stiffness)),
+        *(
+            StictionCell(f"stiction {i} {j}", float(k), float(v))
+            for i, v in enumerate(along(STICTION_VELOCITY, cells))
+            for j, k in enumerate(stiffness)
+        ),
+    ]

@@ -1,0 +1,110 @@
+"""Balls, blocks, rods and wheels on the ground of the contact model: any two bodies, driven by the walkers' own code.
+
+A walker has two bodies and two feet; so has everything here, with a second body or foot that takes no part. The rules
+by which walks end are put out of reach, and the run ends at a given time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.ground.compliant import contact_walker
+from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.terrain import Checkerboard
+from walkerlab.ground.walker import ContactWalker, FootMotion
+from walkerlab.hybrid.contact_events import SIGNALS, Frame, feet_motion
+from walkerlab.hybrid.contact_rules import LAST_TOUCH
+from walkerlab.hybrid.contact_run import NEVER, Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
+from walkerlab.solvers.registry import finder_for, method_named
+from walkerlab.solvers.system import State
+
+Array = NDArray[np.float64]
+ENDLESS = 1e7  # m, an area without edges, and a hip that cannot fall
+OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
+BUDGET = 2_000_000  # right-hand sides
+SAMPLES = 4000
+ALONG, HEIGHT, ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 0, 1, 2, 4, 5, 6  # of the first body, in the state
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Something on the ground."""
+
+    walker: ContactWalker
+    ground: Ground
+
+
+@dataclass(frozen=True)
+class Run:
+    """What it did."""
+
+    times: Array  # (samples,) s
+    states: Array  # (samples, 8)
+    end: State
+    dissipated: Array  # (3,) J
+    work: NDArray[np.int64]
+
+
+def rig(
+    mass: float, inertia: float, feet: tuple[Position, Position], normal: NormalLaw, friction: Coulomb,
+    gravity: float, slope: float = 0.0,
+) -> Rig:  # fmt: skip
+    """One body whose centre of mass is its frame's origin, with point feet fixed to it.
+
+    The second body is hinged at that centre, has the same inertia, no mass, and nothing to do.
+    """
+    origin = (0.0, 0.0)
+    assembly = Assembly(
+        bodies=(Body("body", mass, origin, inertia), Body("idle", 0.0, origin, inertia)),
+        joints=(Revolute("hinge", "body", origin, "idle", origin),),
+        feet=(BallFoot("first", "body", feet[0], 0.0), BallFoot("second", "body", feet[1], 0.0)),
+    )
+    walker = contact_walker(assembly, normal, friction, gravity, slope)
+    frame = Frame(-ENDLESS, 1.0, (0.0, 0.0), (0.0, 0.0), True)
+    return Rig(walker, Ground(Checkerboard(ENDLESS, (0.0, 0.0)), frame))
+
+
+def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
+    """A state of the rig: where its centre of mass is along and over the slope, and how it moves and turns."""
+    return (*at, angle, 0.0, *velocity, rate, 0.0)
+
+
+def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12) -> Run:
+    """Let it move for a time; samples evenly spaced. Raises ArithmeticError if the budget does not suffice."""
+    frame = of.ground.frame._replace(pendulum_time=2.0 * duration_s / LONGEST_FLIGHT)
+    ground = Ground(of.ground.terrain, frame)
+    ledger = new_ledger(of.walker, ground.terrain, 1, 1, start)
+    ledger.at_zero[:] = 0
+    ledger.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
+    observer = new_observer(of.walker, ledger, start, duration_s / SAMPLES, SAMPLES, booked=True)
+    method = MethodSettings(method_named("radau5"), rtol, atol, BUDGET).new(len(of.walker.blank))
+    finder = finder_for(method, SIGNALS)
+    outcome = Outcome(walk_free(of.walker, ground, method, finder, observer, ledger, 0.0, start, NEVER))
+    if outcome is not Outcome.NO_HEEL_STRIKE:
+        raise ArithmeticError(f"ended as {outcome.label} at {method.clock[1]:.4g} s of {duration_s:.4g} s")
+    seen = int(observer.recorded[0])
+    return Run(
+        observer.times[:seen].copy(),
+        observer.states[:seen].copy(),
+        tuple(method.y.tolist()),
+        observer.books.copy(),
+        method.counts[:4].copy(),
+    )
+
+
+def first_foot(of: Rig, y: Array) -> FootMotion:
+    """Where the first foot is."""
+    return feet_motion(of.walker, tuple(float(x) for x in y))[0]
+
+
+def next_landing(height: float, climb: float, gravity: float) -> float:
+    """Time (s) until something in free flight comes down to height zero."""
+    return (climb + math.sqrt(climb * climb + 2.0 * gravity * height)) / gravity

@@ -1,0 +1,221 @@
+"""One case of the rigid model: walked, again with a tenfold tolerance and by another method, and as its twin."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.scene.rigid import SWING_EQUATIONS, rigid_walker
+from walkerlab.solvers.registry import Method, method_named
+from walkerlab.solvers.system import State
+from walkerlab.verification.contact_case import TENFOLD, outcome_differs, without_start
+from walkerlab.verification.scaling import pendulum_time, scaled, to_twin
+from walkerlab.verification.second_method import Second, promised, second_walk
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, finite
+
+Array = NDArray[np.float64]
+ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A walker and the state that it starts from."""
+
+    walker: RigidWalker
+    start: State
+    energy: float  # J, m g L and the kinetic energy of the start
+
+
+def prepared(config: Config) -> Prepared | None:
+    """Walker and start of a config; None if it starts from a gait that there is not."""
+    walker = rigid_walker(config, config.equations)
+    if isinstance(config.start, str):
+        gait = find_gaits(walker, config.seed).gait
+        if gait is None:
+            return None
+        start: State = as_state(gait.state)
+    else:
+        start = config.start
+    mass = walker.hip_mass + 2.0 * walker.leg_mass
+    speed = walker.leg_length * max(abs(start[2]), abs(start[3]))
+    return Prepared(walker, start, mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
+
+
+def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> RecordedWalk:
+    """Walk a case with the tolerances of its config times `sharper`."""
+    settings = config.solver.rigid
+    return walked_with(method_named(settings.method), settings.rtol * sharper, settings.atol * sharper, ready, case)
+
+
+def walked_with(method: Method, rtol: float, atol: float, ready: Prepared, case: Case) -> RecordedWalk:
+    """Walk a case by a method, within the case's budget."""
+    solver = method.new(SWING_EQUATIONS, rtol, atol, case.budget)
+    return take_walk(ready.walker, solver, ready.start, case.steps, budget=case.budget)
+
+
+def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[RecordedWalk]:
+    """Walk a case by another method than its config's, at the same tolerance."""
+    settings = config.solver.rigid
+
+    def walk(method: Method, budget: int) -> RecordedWalk:
+        within = case.model_copy(update={"budget": budget})
+        return walked_with(method, settings.rtol, settings.atol, ready, within)
+
+    return second_walk(settings.method, case.budget, walk)
+
+
+def judge_rigid(case: Case, config: Config) -> CaseResult:
+    """Run a case of the rigid model and judge it."""
+    ready = prepared(config)
+    if ready is None:
+        return without_start(case)
+    started = time.perf_counter()
+    walk = walked(ready, config, case, 1.0)
+    wall_s = time.perf_counter() - started
+    findings = of_one_walk(walk, ready, case)
+    remarks: list[str] = []
+    second: Second[RecordedWalk] = Second("", None, f"the walk itself ended {walk.outcome.label}")
+    short = case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
+    if walk.outcome.answered:
+        second = walked_otherwise(ready, config, short)
+        for what, again, unit in compared_walks(ready, config, short, second):
+            findings.append(time_difference(what, walk, pendulum_time(config), again, unit, case, config))
+            if short.steps == case.steps:
+                remarks += outcome_differs(what, case, walk.outcome, again.outcome)
+    return CaseResult(
+        name=case.name,
+        family=case.family,
+        model=case.model,
+        reason=case.reason,
+        expected=case.expected,
+        outcome=walk.outcome.label,
+        steps=walk.steps,
+        residual_J=finite(walk.energy_drift),
+        rhs_evaluations=walk.work.rhs_evaluations,
+        wall_s=wall_s,
+        findings=tuple(findings),
+        remarks=tuple(remarks),
+        second_method=second.method,
+        second_tried=second.tried,
+    )
+
+
+def compared_walks(
+    ready: Prepared, config: Config, case: Case, second: Second[RecordedWalk]
+) -> list[tuple[str, RecordedWalk, float]]:
+    """The walks that must do the same: what they are, and their pendulum times (s)."""
+    compared = [("tenfold tolerance", walked(ready, config, case, TENFOLD), pendulum_time(config))]
+    if second.walk is not None:
+        compared.append((second.method, second.walk, pendulum_time(config)))
+    if case.twin:
+        other = scaled(config, to_twin(config))
+        twin_ready = prepared(other)
+        if twin_ready is not None:
+            compared.append(("twin", walked(twin_ready, other, case, 1.0), pendulum_time(other)))
+    return compared
+
+
+def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding]:
+    """Measures that need no second walk."""
+    numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
+    found = [
+        Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
+        Finding("energy drift within a swing over energy", finite(walk.energy_drift / ready.energy), case.balance),
+        Finding(BUDGET_USED, walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+    ]
+    if walk.steps:
+        walker, before, after = ready.walker, walk.before, walk.after
+        ahead = before[:, 0] + before[:, 1] + 2.0 * walker.slope
+        found += [
+            Finding(
+                "distance of the feet from the slope at heel strike", float(np.max(np.abs(ahead))), ROUNDING, "rad"
+            ),
+            Finding("momentum changed by a heel strike", momentum_change(walker, before, after), ROUNDING),
+            Finding("energy won at a heel strike", energy_won(walker, before, after, ready), ROUNDING),
+        ]
+    return found
+
+
+def momentum_change(walker: RigidWalker, before: Array, after: Array) -> float:
+    """Largest change of the two angular momenta that a heel strike keeps, as a share of their size.
+
+    The whole walker's about the new foothold, and the new swing leg's about the hip; both from positions and
+    velocities of the masses, not from the impact's matrices.
+    """
+    change, size = 0.0, 1e-300
+    for old, new in zip(before, after, strict=True):
+        # legs in the order (comes down, lifts); after the strike the roles have changed
+        first, second = momenta(walker, (old[0], old[1], old[2], old[3]), stands=1)
+        third, fourth = momenta(walker, (new[1], new[0], new[3], new[2]), stands=0)
+        change = max(change, abs(third - first), abs(fourth - second))
+        size = max(size, abs(first), abs(second), abs(third), abs(fourth))
+    return finite(change / size)
+
+
+def momenta(walker: RigidWalker, legs: tuple[float, float, float, float], stands: int) -> tuple[float, float]:
+    """Angular momentum of the walker about the foot of leg 0, and of leg 1 about the hip (kg m^2/s).
+
+    legs    angles and angular velocities of leg 0, which comes down, and leg 1, which lifts
+    stands  the leg whose foot is at rest
+    """
+    length, a = walker.leg_length, walker.foot_to_mass
+    angles, rates = np.array(legs[:2]), np.array(legs[2:])
+    upward = np.array([-np.sin(angles), np.cos(angles)])  # of each leg, from foot to hip
+    turned = np.array([-upward[1], upward[0]])
+    hip_velocity = length * rates[stands] * turned[:, stands]
+    about_foot, about_hip = 0.0, 0.0
+    masses: list[tuple[float, Any, Any]] = [(walker.hip_mass, np.zeros(2), hip_velocity)]
+    for leg in range(2):
+        arm = -(length - a) * upward[:, leg]
+        velocity = hip_velocity - (length - a) * rates[leg] * turned[:, leg]
+        masses.append((walker.leg_mass, arm, velocity))
+        about_foot += walker.leg_inertia * rates[leg]
+        if leg == 1:
+            spin = walker.leg_inertia * rates[leg]
+            about_hip = walker.leg_mass * float(arm[0] * velocity[1] - arm[1] * velocity[0]) + spin
+    foot = -length * upward[:, 0]
+    for mass, position, velocity in masses:
+        arm = position - foot
+        about_foot += mass * float(arm[0] * velocity[1] - arm[1] * velocity[0])
+    return float(about_foot), float(about_hip)
+
+
+def energy_won(walker: RigidWalker, before: Array, after: Array, ready: Prepared) -> float:
+    """Largest gain of kinetic energy at a heel strike, as a share of the energy."""
+    gain = 0.0
+    for old, new in zip(before, after, strict=True):
+        gain = max(gain, kinetic(walker, new) - kinetic(walker, old))
+    return finite(gain / ready.energy)
+
+
+def kinetic(walker: RigidWalker, state: Array) -> float:
+    """Kinetic energy (J) from the velocities of the masses; leg 1 of the state stands."""
+    length, a = walker.leg_length, walker.foot_to_mass
+    angles, rates = state[:2], state[2:]
+    turned = np.array([-np.cos(angles), -np.sin(angles)])
+    hip = length * rates[1] * turned[:, 1]
+    total = 0.5 * walker.hip_mass * float(hip @ hip)
+    for leg in range(2):
+        velocity = hip - (length - a) * rates[leg] * turned[:, leg]
+        total += 0.5 * walker.leg_mass * float(velocity @ velocity) + 0.5 * walker.leg_inertia * float(rates[leg] ** 2)
+    return total
+
+
+def time_difference(
+    what: str, one: RecordedWalk, unit: float, other: RecordedWalk, other_unit: float, case: Case, config: Config
+) -> Finding:
+    """How far two walks' heel strikes are apart, each in its own pendulum time."""
+    strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit
+    steps = min(strikes.size, others.size, case.compared_steps)
+    apart = float(np.max(np.abs(strikes[:steps] - others[:steps]))) if steps else 0.0
+    limit = promised(case, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
+    return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)
