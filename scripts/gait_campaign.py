@@ -4,8 +4,8 @@
     python scripts/gait_campaign.py --walkers 40 --seed 3
 
 The hip weighs at most as much as a leg, whose mass lies within a quarter of its length from the foot: the walkers whose
-gaits are hardest to follow from a vanishing slope. Each gait must be found by name, differ from the other, and return to
-its state after one step of SciPy's DOP853. Prints what went wrong; exits 1 if anything did.
+gaits are hardest to follow from a vanishing slope. Each gait must be found by name, differ from the other, and repeat
+itself in one step of SciPy's DOP853. Prints what went wrong; exits 1 if anything did.
 """
 
 from __future__ import annotations

@@ -154,8 +154,8 @@ def test_however_unstable_a_gait_is_it_can_be_walked():
     assert rejected.objections == ("the foot behind would have to leave through the ground",)
 
 
-# hip of mass 1, next to nothing in the feet, g = L = 1, slope 0.009 (Garcia et al. 1998), recomputed by two other routes:
-# (stance angle from the normal, its velocity, period, largest multiplier)
+# hip of mass 1, next to nothing in the feet, g = L = 1, slope 0.009 (Garcia et al. 1998), recomputed by two other
+# routes: (stance angle from the normal, its velocity, period, largest multiplier)
 SIMPLEST = {
     LONG_PERIOD: (0.200310900544, -0.199832473005, 3.882464, -0.1900998 + 0.5575988j),
     SHORT_PERIOD: (0.193937369810, -0.203866927442, 3.096106, 4.003864),
