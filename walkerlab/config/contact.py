@@ -95,7 +95,7 @@ class Contact(Block):
         ),
     ] = 1000.0
     terrain: Annotated[
-        Literal["checkerboard", "after-mid-swing"],
+        Literal["checkerboard", "after-mid-swing", "plane"],
         key(
             "",
             "checkerboard: a lane of raised pads per leg; "
