@@ -51,13 +51,13 @@ def carried_in_cell(terrain: Any, cell: int) -> bool:
 
 
 @by_type
-def carried_after_lift(terrain: Any, carried: bool, ahead: bool) -> bool:
-    """Whether the ground still carries a foot that has just lifted."""
+def carried_in_air(terrain: Any, carried: bool, stands: bool, ahead: bool) -> bool:
+    """Whether ground would carry a foot that is above it.
 
-
-@by_type
-def carried_in_air(terrain: Any, carried: bool, ahead: bool) -> bool:
-    """Whether the ground carries a foot that is above it and ahead of the other foot, or not."""
+    carried  whether it would have until now
+    stands   whether it is the stance foot
+    ahead    whether it is ahead of the other foot
+    """
 
 
 @by_type
@@ -96,15 +96,9 @@ def checkerboard_carries(terrain: Checkerboard, cell: int) -> bool:
     return cell % 2 == 0
 
 
-@carried_after_lift.case(Checkerboard)
-def checkerboard_after_lift(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
-    """A pad stays where it is."""
-    return carried
-
-
 @carried_in_air.case(Checkerboard)
-def checkerboard_in_air(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
-    """The other foot does not matter."""
+def checkerboard_in_air(terrain: Checkerboard, carried: bool, stands: bool, ahead: bool) -> bool:
+    """A pad stays where it is."""
     return carried
 
 
@@ -144,16 +138,10 @@ def plane_carries(terrain: AfterMidSwing, cell: int) -> bool:
     return True
 
 
-@carried_after_lift.case(AfterMidSwing)
-def plane_after_lift(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
-    """A foot that lifts behind the other swings through; one that bounces ahead comes down again."""
-    return carried and ahead
-
-
 @carried_in_air.case(AfterMidSwing)
-def plane_in_air(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
-    """Ahead and above the ground: from here on it can touch. Fallen back: no longer."""
-    return ahead
+def plane_in_air(terrain: AfterMidSwing, carried: bool, stands: bool, ahead: bool) -> bool:
+    """A swing foot above the ground can touch while it is ahead; the stance foot, when it bounces, anywhere."""
+    return stands or ahead
 
 
 @order_matters.case(AfterMidSwing)

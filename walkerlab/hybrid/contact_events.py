@@ -1,7 +1,8 @@
 """The signals whose zeros are the events of a walk on compliant ground, sampled along a step.
 
-Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). The others are joins of
-the force law, where its derivatives jump: a step that ends there keeps the method's order.
+Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). Of these the walk knows
+on which side of zero they are, and the event is that they leave it: of events at one time none can hide another. The
+others are joins of the force law, where its derivatives jump: a step that ends there keeps the method's order.
 """
 
 import math
@@ -15,18 +16,19 @@ from walkerlab.ground.terrain import cell_edges, stride_measure
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing
 from walkerlab.solvers.system import State
 
 # signals of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
-ALONG = 9  # no event: where the foot is
-PER_FOOT = 10
+MATERIAL, CLIMB = 9, 10  # no events: where the foot's material is, and how fast its height grows
+PER_FOOT = 11
 # signals of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
 SIGNALS = 2 * PER_FOOT + 3
-FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot from its foothold
+NO_SIDE = 0  # of a signal that may cross zero either way
+FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 
 
@@ -74,11 +76,41 @@ def hinged_feels(system: Pinned, carried: bool, height: float) -> bool:
     return False
 
 
+@by_type
+def is_free(system: Any, foot: int) -> bool:
+    """Whether a foot may touch and lift."""
+
+
+@is_free.case(OnGround)
+def free_both(system: OnGround, foot: int) -> bool:
+    """Both may."""
+    return True
+
+
+@is_free.case(Pinned)
+def free_other(system: Pinned, foot: int) -> bool:
+    """The hinged one may not."""
+    return foot != system.foot
+
+
 @inlined
 def feet_motion(walker: ContactWalker, y: State) -> tuple[FootMotion, FootMotion]:
     """Both feet of the free walker's state."""
     s, c = sines_cosines(walker.tree, y, 2, walker.slope)
     return foot_motion(walker, walker.feet[0], s, c, y), foot_motion(walker, walker.feet[1], s, c, y)
+
+
+@inlined
+def material_along(walker: ContactWalker, foot: int, along: float, y: State) -> float:
+    """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
+
+    The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
+    velocity; so is its way the contact point's plus radius times the change of the angle.
+    """
+    rolling = walker.feet[foot].rolling
+    for k in range(len(rolling)):
+        along += rolling[k] * y[2 + k]
+    return along
 
 
 @inlined
@@ -99,7 +131,7 @@ def sample_signals(
     frame: Frame,
     cells: Any,
     stance: int,
-    foothold: float,
+    touched: float,
     state: State,
     node: int,
     finder: CrossingFinder,
@@ -107,17 +139,19 @@ def sample_signals(
     """Values of all signals at one node of a step, where the system's state is `state`."""
     y = walker_state(system, state)
     feet = feet_motion(walker, y)
-    sample_foot(walker, feet[0], cell_edges(terrain, 0, cells[0]), 0, node, finder)
-    sample_foot(walker, feet[1], cell_edges(terrain, 1, cells[1]), PER_FOOT, node, finder)
+    for foot in range(2):
+        first = foot * PER_FOOT
+        sample_foot(walker, feet[foot], cell_edges(terrain, foot, cells[foot]), first, node, finder)
+        finder.values[first + MATERIAL, node] = material_along(walker, foot, feet[foot].along, y)
     finder.values[PASSING, node] = feet[1].along - feet[0].along
     finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
-    away = finder.values[stance * PER_FOOT + ALONG, node] - foothold
+    away = finder.values[stance * PER_FOOT + MATERIAL, node] - touched
     finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
 
 
 @inlined
 def farthest_slide(terrain: Any) -> float:
-    """How far from its foothold a loaded stance foot may get (m)."""
+    """How far a loaded stance foot may slip (m)."""
     return FARTHEST_SLIDE * stride_measure(terrain)
 
 
@@ -128,7 +162,7 @@ def sample_foot(
     """One foot's signals at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
-    values[first + ALONG, j] = motion.along
+    values[first + CLIMB, j] = motion.climb
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
@@ -164,7 +198,7 @@ def joins(law: Any) -> int:
 @joins.case(Coulomb)
 def coulomb_joins(law: Coulomb) -> int:
     """All."""
-    return ALONG
+    return MATERIAL
 
 
 @joins.case(Frictionless)
@@ -181,6 +215,7 @@ def earliest_crossing(
     watch_order: bool,
     carried: Any,
     stance: int,
+    sides: Any,
     at_zero: Any,
     finder: CrossingFinder,
 ) -> tuple[float, int]:
@@ -189,10 +224,13 @@ def earliest_crossing(
     watch_order  whether it matters that the feet pass each other
     carried      (2,) whether there is ground under each foot
     stance       the stance foot, which may slide
+    sides        (signals,) on which side of zero each signal is known to be: 1, -1, or NO_SIDE
     at_zero      (signals,) which signals the last event left at zero
     """
     best, signal = NO_CROSSING, -1
     for foot in range(2):
+        if not is_free(system, foot):
+            continue
         first = foot * PER_FOOT
         # a foot that an event left on the surface is inside or outside by rounding there
         lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
@@ -201,22 +239,37 @@ def earliest_crossing(
         inside = feels_ground(system, carried[foot] != 0, lowest)
         last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
         for index in range(first, first + last):
-            edge = index == first + LEFT_EDGE or index == first + RIGHT_EDGE
-            at = first_crossing(finder, index, FALLING if edge else 0, 0.0, at_zero[index] != 0)
+            at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
-        if inside and foot == stance:
-            at = first_crossing(finder, SLIDE, FALLING, 0.0, at_zero[SLIDE] != 0)
+        if foot == stance and sides[first + HEIGHT] < 0 and feels_ground(system, carried[foot] != 0, -1.0):
+            at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
                 best, signal = at, SLIDE
     if watch_order:
-        at = first_crossing(finder, PASSING, 0, 0.0, at_zero[PASSING] != 0)
+        at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if at < best:
             best, signal = at, PASSING
-    at = first_crossing(finder, FALL, FALLING, 0.0, at_zero[FALL] != 0)
+    at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
     if at < best:
         best, signal = at, FALL
     return best, signal
+
+
+@inlined
+def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: bool) -> float:
+    """Fraction at which a signal crosses to the other side of zero than it is known to be on.
+
+    At once if it is there already: the step before, which ended for another event, went past its zero.
+    """
+    if side != NO_SIDE:
+        beyond = zero_at_start or side * finder.values[signal, 0] < 0.0
+        if zero_at_start:
+            for j in range(1, finder.nodes.size):
+                beyond = beyond and side * finder.values[signal, j] < 0.0
+        if beyond:
+            return 0.0
+    return first_crossing(finder, signal, -side, 0.0, zero_at_start)
 
 
 @inlined

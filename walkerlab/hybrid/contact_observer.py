@@ -4,9 +4,10 @@ from typing import Any, NamedTuple
 
 from walkerlab.ground.energy import book_energy, dissipated_power, foot_elastic_energy
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import feet_motion, walker_state
+from walkerlab.hybrid.contact_events import CLIMB, HEIGHT, PER_FOOT, feet_motion, walker_state
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.kernels import inlined
+from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.stepping import T_OLD, T, end_state, interpolate
 from walkerlab.solvers.system import State
 
@@ -36,13 +37,22 @@ class ContactObserver(NamedTuple):
 
 @inlined
 def observe(
-    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, carried: Any, stance: int
+    observer: ContactObserver,
+    method: Any,
+    system: Any,
+    walker: ContactWalker,
+    finder: CrossingFinder,
+    carried: Any,
+    stance: int,
 ) -> None:
-    """Take note of the last step, which stands: samples, books, tangent."""
+    """Take note of the last step, which stands and whose signals are sampled: samples, books, tangent."""
     mode = (carried[0] != 0, carried[1] != 0)
     record_samples(observer, method, system, walker, mode, stance)
     if observer.booked:
         keep_books(observer, method, system, walker, mode)
+        for foot in range(2):
+            if mode[foot]:
+                note_depth(observer, method, system, walker, finder, foot)
     if observer.tangent.Phi.shape[1] > 0:
         carry_tangent(observer.tangent, method, system)
 
@@ -73,18 +83,28 @@ def record_samples(
 def keep_books(
     observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, mode: tuple[bool, bool]
 ) -> None:
-    """What the last step dissipated, how deep the feet are at its end, and how well the energy balances there."""
+    """What the last step dissipated, and how well the energy balances at its end."""
     damping, friction = work_until(method, system, walker, mode, 1.0)
     observer.books[DAMPING] += damping
     observer.books[FRICTION] += friction
     end = walker_state(system, end_state(method, system))
-    feet = feet_motion(walker, end)
-    for foot in range(2):
-        if mode[foot]:
-            observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], -feet[foot].height)
     lost = observer.books[DAMPING] + observer.books[FRICTION] + observer.books[EDGES]
     residual = book_energy(walker, mode, end) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
+
+
+@inlined
+def note_depth(
+    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, finder: CrossingFinder, foot: int
+) -> None:
+    """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
+    end, first = finder.nodes.size - 1, foot * PER_FOOT
+    deepest = -finder.values[first + HEIGHT, end]
+    if finder.values[first + CLIMB, 0] < 0.0 < finder.values[first + CLIMB, end]:
+        at = first_crossing(finder, first + CLIMB, RISING, 0.0, False)
+        lowest = feet_motion(walker, walker_state(system, interpolate(method, system, min(at, 1.0))))
+        deepest = max(deepest, -lowest[foot].height)
+    observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
 
 
 @inlined
@@ -99,11 +119,31 @@ def work_until(
     method: Any, system: Any, walker: ContactWalker, carried: tuple[bool, bool], fraction: float
 ) -> tuple[float, float]:
     """Work (J) lost to damping and to friction in the first part of the last step."""
-    span = fraction * (method.clock[T] - method.clock[T_OLD])
     damping, friction = 0.0, 0.0
+    for foot in range(2):
+        if carried[foot]:
+            lost = foot_work(method, system, walker, foot, fraction)
+            damping += lost[0]
+            friction += lost[1]
+    return damping, friction
+
+
+@inlined
+def foot_work(method: Any, system: Any, walker: ContactWalker, foot: int, fraction: float) -> tuple[float, float]:
+    """Work (J) lost under a foot that there is ground for.
+
+    Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
+    quadrature likes; steps end where it lets go.
+    """
+    span = fraction * (method.clock[T] - method.clock[T_OLD])
+    damping, friction, let_go = 0.0, 0.0, True
     for i in range(3):
         y = walker_state(system, interpolate(method, system, fraction * NODES[i]))
-        power = dissipated_power(walker, carried, y)
+        power = dissipated_power(walker, foot, y)
         damping += span * WEIGHTS[i] * power[0]
         friction += span * WEIGHTS[i] * power[1]
+        let_go = let_go and (i == 2 or power[2] == 0.0)
+    if let_go:
+        before = foot_elastic_energy(walker, foot, walker_state(system, interpolate(method, system, 0.0)))
+        damping = before - foot_elastic_energy(walker, foot, walker_state(system, interpolate(method, system, fraction)))
     return damping, friction

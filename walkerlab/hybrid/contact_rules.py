@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 from walkerlab.ground.terrain import (
-    carried_after_lift,
     carried_in_air,
     carried_in_cell,
     order_matters,
@@ -20,6 +19,7 @@ from walkerlab.hybrid.contact_events import (
     SLIDE,
     farthest_slide,
     feet_motion,
+    material_along,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
 from walkerlab.hybrid.outcome import Outcome
@@ -27,7 +27,7 @@ from walkerlab.kernels import inlined
 from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
-TRIP = 0.25  # of the stride measure: how far from its foothold a foot must come down to have tripped
+TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
 GOES_ON = -1
 
@@ -43,10 +43,15 @@ class Ledger(NamedTuple):
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     slip: Any  # (steps,) m, net slip of the stance foot of each step
+    rolling: Any  # (steps,) m, how far it rolled
     carried: Any  # (2,) whether there is ground under a foot
     cells: Any  # (2,) which cell of its lane a foot is over
     left_cells: Any  # (2,) the cell where it last stood
     foothold: Any  # (2,) m, where it touched
+    touched: Any  # (2,) m, where its material was then
+    stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
+    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
+    sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
     times: Any  # (2,) see the indices above
     feet: Any  # (2,) see the indices above
@@ -59,21 +64,23 @@ def happen(
     """Let an event change the ledger; returns an outcome if it ends the walk."""
     if signal == FALL:
         return FELL
-    feet = feet_motion(walker, y)
-    ledger.at_zero[signal] = 1
     if signal == SLIDE:
-        stance = ledger.feet[STANCE]
-        return SLID if ledger.carried[stance] != 0 and feet[stance].height < 0.0 else GOES_ON
+        return SLID
+    ledger.at_zero[signal] = 1
+    feet = feet_motion(walker, y)
     if signal == PASSING:
+        ledger.sides[PASSING] = -ledger.sides[PASSING]
         for foot in range(2):
-            pass_by(terrain, ledger, feet, foot)
+            pass_by(terrain, ledger, foot)
         return GOES_ON
     foot = signal // PER_FOOT
     kind = signal % PER_FOOT
     if kind == HEIGHT:
-        if feet[foot].climb < 0.0:
-            return touch(terrain, ledger, feet, foot, t)
-        lift(terrain, ledger, feet, foot)
+        ledger.sides[signal] = -ledger.sides[signal]
+        if is_above(ledger, foot):
+            lift(walker, terrain, ledger, feet, foot, y)
+        else:
+            return touch(walker, terrain, ledger, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
         ledger.at_zero[signal] = 0
         ledger.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
@@ -81,44 +88,70 @@ def happen(
         if not carried_in_cell(terrain, ledger.cells[foot]):
             observe_edge(observer, walker, foot, ledger.carried[foot] != 0, y)
             ledger.carried[foot] = 0
-        elif feet[foot].height < 0.0:
-            return OFF_PAD
-        else:
+        elif is_above(ledger, foot):
             ledger.carried[foot] = 1
+        else:
+            return OFF_PAD
     return GOES_ON
 
 
 @inlined
-def is_ahead(feet: tuple[FootMotion, FootMotion], foot: int) -> bool:
-    """Whether a foot is further along than the other."""
-    return feet[foot].along > feet[1 - foot].along
+def is_above(ledger: Ledger, foot: int) -> bool:
+    """Whether a foot is above the ground."""
+    return ledger.sides[foot * PER_FOOT + HEIGHT] > 0
 
 
 @inlined
-def pass_by(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int) -> None:
+def is_ahead(ledger: Ledger, foot: int) -> bool:
+    """Whether a foot is further along than the other; known where the order of the feet is watched."""
+    return (ledger.sides[PASSING] > 0) == (foot == 1)
+
+
+@inlined
+def pass_by(terrain: Any, ledger: Ledger, foot: int) -> None:
     """The feet changed places: one that is in the air may find ground, or lose it."""
-    if feet[foot].height > 0.0:
-        carried = carried_in_air(terrain, ledger.carried[foot] != 0, is_ahead(feet, foot))
+    if is_above(ledger, foot):
+        stands = foot == ledger.feet[STANCE]
+        carried = carried_in_air(terrain, ledger.carried[foot] != 0, stands, is_ahead(ledger, foot))
         ledger.carried[foot] = 1 if carried else 0
 
 
 @inlined
-def lift(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int) -> None:
+def lift(
+    walker: ContactWalker, terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State
+) -> None:
     """A foot rose above the ground: from its stance, or out of a scuff."""
-    if ledger.carried[foot] != 0:
-        ahead = is_ahead(feet, foot)
-        ledger.carried[foot] = 1 if carried_after_lift(terrain, True, ahead) else 0
-        if foot != ledger.feet[STANCE] and ledger.cells[foot] == ledger.left_cells[foot] and not ahead:
+    stands = foot == ledger.feet[STANCE]
+    if stands or ledger.leaving[foot] != 0:
+        note_slip(walker, ledger, feet, foot, y)
+        if not stands:
             step = ledger.feet[STEPS] - 1
-            if step >= 0:
-                ledger.slip[step] = feet[foot].along - ledger.foothold[foot]
-    else:
-        carried = carried_in_air(terrain, False, is_ahead(feet, foot))
-        ledger.carried[foot] = 1 if carried else 0
+            ledger.slip[step], ledger.rolling[step] = ledger.stood[foot, 0], ledger.stood[foot, 1]
+        ledger.leaving[foot] = 0
+    carried = carried_in_air(terrain, ledger.carried[foot] != 0, stands, is_ahead(ledger, foot))
+    ledger.carried[foot] = 1 if carried else 0
 
 
 @inlined
-def touch(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, t: float) -> int:
+def note_slip(
+    walker: ContactWalker, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State
+) -> None:
+    """How far a foot has slipped and rolled since it touched."""
+    slip = material_along(walker, foot, feet[foot].along, y) - ledger.touched[foot]
+    ledger.stood[foot, 0] = slip
+    ledger.stood[foot, 1] = feet[foot].along - ledger.foothold[foot] - slip
+
+
+@inlined
+def touch(
+    walker: ContactWalker,
+    terrain: Any,
+    ledger: Ledger,
+    feet: tuple[FootMotion, FootMotion],
+    foot: int,
+    t: float,
+    y: State,
+) -> int:
     """A foot came down on ground.
 
     It ends the step if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
@@ -127,21 +160,28 @@ def touch(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foo
     stance = ledger.feet[STANCE]
     if ledger.carried[foot] == 0:
         return GOES_ON
+    material = material_along(walker, foot, feet[foot].along, y)
     if foot == stance:
-        away = abs(feet[foot].along - ledger.foothold[foot])
-        return SLID if away > farthest_slide(terrain) else GOES_ON
+        return SLID if abs(material - ledger.touched[foot]) > farthest_slide(terrain) else GOES_ON
     measure = stride_measure(terrain)
     if not order_matters(terrain) and ledger.cells[foot] == ledger.left_cells[foot]:
-        return OFF_PAD if abs(feet[foot].along - ledger.foothold[foot]) > TRIP * measure else GOES_ON
+        away = abs(feet[foot].along - ledger.foothold[foot] - ledger.stood[foot, 1])
+        return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
         return GOES_ON
     step = ledger.feet[STEPS]
     ledger.touch_time[step] = t
     ledger.touch_along[step] = feet[foot].along
-    ledger.slip[step] = feet[stance].along - ledger.foothold[stance]
+    if not is_above(ledger, stance):
+        note_slip(walker, ledger, feet, stance, y)
+        ledger.leaving[stance] = 1
+    ledger.slip[step], ledger.rolling[step] = ledger.stood[stance, 0], ledger.stood[stance, 1]
     ledger.foothold[foot] = feet[foot].along
+    ledger.touched[foot] = material
     ledger.left_cells[foot] = ledger.cells[foot]
+    ledger.leaving[foot] = 0
     ledger.times[LAST_TOUCH] = t
     ledger.feet[STANCE] = foot
     ledger.feet[STEPS] = step + 1
+    pass_by(terrain, ledger, stance)
     return GOES_ON

@@ -12,15 +12,21 @@ from walkerlab.ground.energy import book_energy, kinetic_energy, potential_energ
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
-from walkerlab.ground.walker import ContactWalker, foot_force
+from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import (
+    FALL,
     FALLEN_HIP,
     HEIGHT,
+    LEFT_EDGE,
+    PASSING,
     PER_FOOT,
+    RIGHT_EDGE,
     SIGNALS,
+    SLIDE,
     Frame,
     feet_motion,
     hip_height,
+    material_along,
 )
 from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
 from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
@@ -38,6 +44,7 @@ Floats = NDArray[np.float64]
 
 
 NEVER = -1
+ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 
 
@@ -152,7 +159,8 @@ class ContactWalkResult:
     outcome: Outcome
     touch_time_s: Floats  # (steps,)
     touch_along_m: Floats  # (steps,)
-    slip_m: Floats  # (steps,)
+    slip_m: Floats  # (steps,) of the stance foot's material
+    rolling_m: Floats  # (steps,) how far the stance foot rolled
     end_time_s: float
     end_state: State
     max_penetration_m: float
@@ -180,22 +188,56 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
     for foot in range(2):
         on_pad = carried_in_cell(terrain, int(cells[foot]))
         carried[foot] = on_pad and starts_carried(terrain, foot == stance)
-    at_zero = np.zeros(SIGNALS, np.int8)
-    at_zero[[HEIGHT, PER_FOOT + HEIGHT]] = 1
-    foothold = np.array([motion.along for motion in feet])
-    touch_time, touch_along, slip = (np.zeros(steps) for _ in range(3))
+    sides, at_zero = known_sides(walker, feet, stance, y)
     return Ledger(
-        touch_time,
-        touch_along,
-        slip,
-        carried,
-        cells,
-        cells.copy(),
-        foothold,
-        at_zero,
-        np.zeros(2),
-        np.array([stance, 0]),
+        touch_time=np.zeros(steps),
+        touch_along=np.zeros(steps),
+        slip=np.zeros(steps),
+        rolling=np.zeros(steps),
+        carried=carried,
+        cells=cells,
+        left_cells=cells.copy(),
+        foothold=np.array([motion.along for motion in feet]),
+        touched=np.array([material_along(walker, foot, feet[foot].along, y) for foot in range(2)]),
+        stood=np.zeros((2, 2)),
+        leaving=np.zeros(2, np.int8),
+        sides=sides,
+        at_zero=at_zero,
+        times=np.zeros(2),
+        feet=np.array([stance, 0]),
     )
+
+
+def known_sides(
+    walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
+) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """On which side of zero every signal is at the start, and which are at zero, by rounding at most.
+
+    Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
+    foot is the one ahead.
+    """
+    sides, at_zero = np.zeros(SIGNALS, np.int8), np.zeros(SIGNALS, np.int8)
+    sides[[FALL, SLIDE]] = 1
+    n = len(walker.tree.arm_x)
+    size = max(abs(float(x)) for x in (*walker.feet[0].lever_x, *walker.feet[0].lever_y))
+    speed = max(abs(float(x)) for x in y[2 + n :])
+    for foot in range(2):
+        first = foot * PER_FOOT
+        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
+        signs = (feet[foot].height, feet[foot].climb)
+        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
+    rates = [feet[k].slip - sum(r * w for r, w in zip(walker.feet[k].rolling, y[4 + n :], strict=True)) for k in (0, 1)]
+    order = (feet[1].along - feet[0].along, rates[1] - rates[0])
+    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
+    return sides, at_zero
+
+
+def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
+    """On which side of zero something is, or goes to if it is zero to rounding; whether it is zero."""
+    for number, scale in zip(value_and_rate, scales, strict=True):
+        if abs(number) > ROUNDING * scale:
+            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
+    return otherwise, True
 
 
 def new_observer(
@@ -286,6 +328,7 @@ def run_parts(
         outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
+        release_hinge(walker, pinned.foot, ledger, y)
         if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
             return outcome, Stopped(t, y, spent)
     method = methods.new(len(walker.blank))
@@ -293,6 +336,15 @@ def run_parts(
     free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
     outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+
+
+def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) -> None:
+    """A hinged foot has neither slipped nor rolled; it is on the ground, about to leave."""
+    steps = ledger.feet[STEPS]
+    ledger.slip[:steps], ledger.rolling[:steps] = 0.0, 0.0
+    ledger.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
+    ledger.stood[foot] = 0.0
+    ledger.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
 def gather(
@@ -314,6 +366,7 @@ def gather(
         ledger.touch_time[:done],
         ledger.touch_along[:done],
         ledger.slip[:done],
+        ledger.rolling[:done],
         stopped.time_s,
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),

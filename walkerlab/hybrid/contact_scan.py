@@ -28,8 +28,9 @@ class Feet(NamedTuple):
 
     carried: Any  # (2,) whether there is ground under each
     cells: Any  # (2,) which cell of its lane each is over
+    sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
-    foothold: Any  # (2,) m, where each touched
+    touched: Any  # (2,) m, where the material of each was when it touched
     order: Any  # (2,) the stance foot, and how many steps it is
 
 
@@ -37,15 +38,23 @@ class Feet(NamedTuple):
 def sample(system: Any, scene: Scene, feet: Feet, state: State, node: int, finder: CrossingFinder) -> None:
     """All signals at one node of the step."""
     stance = feet.order[0]
-    foothold = feet.foothold[stance]
-    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, foothold, state, node, finder)
+    touched = feet.touched[stance]
+    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, touched, state, node, finder)
 
 
 @inlined
 def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
     """The first event of the sampled step."""
     return earliest_crossing(
-        system, scene.walker, scene.frame, scene.watch_order, feet.carried, feet.order[0], feet.at_zero, finder
+        system,
+        scene.walker,
+        scene.frame,
+        scene.watch_order,
+        feet.carried,
+        feet.order[0],
+        feet.sides,
+        feet.at_zero,
+        finder,
     )
 
 

@@ -110,36 +110,40 @@ def walk_part(
     target = deadline(frame, ledger)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
     scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
-    feet = Feet(ledger.carried, ledger.cells, ledger.at_zero, ledger.foothold, ledger.feet)
+    feet = Feet(ledger.carried, ledger.cells, ledger.sides, ledger.at_zero, ledger.touched, ledger.feet)
     while ledger.feet[STEPS] < ledger.touch_time.size:
         status = advance(method, mode, target)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
         prepare_dense(method, mode)
         fraction, found = scan(method, mode, scene, feet, finder)
-        if arriving and method.clock[T] < target:
-            arriving = False
-        if not arriving:
-            signal = found
-            if fraction <= 1.0:
-                wait = fraction * (method.clock[T] - method.clock[T_OLD])
+        happens = fraction <= 1.0
+        if happens:
+            if not arriving:
                 latest = method.clock[T]
-                target = method.clock[T_OLD] + max(wait, EVENT_TIME)
-                arriving, refinements = True, 0
-                if target < method.clock[T] and rewinds < REWINDS:
-                    rewinds += 1
-                    rewind(method, mode)
-                    continue
-        elif refinements < REFINEMENTS and rewinds < REWINDS:
-            wait = time_to_zero(method, finder, signal)
-            if abs(wait) > EVENT_TIME and method.clock[T_OLD] < target + wait <= latest:
-                target += wait
+            if found != signal or not arriving:
+                signal, refinements = found, 0
+            wait = max(fraction * (method.clock[T] - method.clock[T_OLD]), EVENT_TIME)
+            early = method.clock[T_OLD] + wait < method.clock[T] - EVENT_TIME
+            arriving = True
+            if early and refinements <= REFINEMENTS and rewinds < REWINDS:
+                target = method.clock[T_OLD] + wait
                 refinements += 1
                 rewinds += 1
                 rewind(method, mode)
                 continue
+        elif arriving and method.clock[T] >= target:
+            wait = time_to_zero(method, finder, signal)
+            happens = abs(wait) <= EVENT_TIME
+            if not happens and refinements <= REFINEMENTS and rewinds < REWINDS:
+                if method.clock[T_OLD] < target + wait <= latest:
+                    target += wait
+                    refinements += 1
+                    rewinds += 1
+                    rewind(method, mode)
+                    continue
         rewinds = 0
-        observe(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
+        observe(observer, method, mode, walker, finder, ledger.carried, ledger.feet[STANCE])
         outcome = judge(mode, scene, method, finder, ledger)
         if outcome != GOES_ON:
             return outcome
@@ -147,7 +151,8 @@ def walk_part(
             # of events at one and the same time each is found once
             for i in range(ledger.at_zero.size):
                 ledger.at_zero[i] = 0
-        if arriving:
+        arriving = False
+        if happens:
             end = walker_state(mode, end_state(method, mode))
             steps = ledger.feet[STEPS]
             outcome = happen(walker, terrain, observer, ledger, signal, method.clock[T], end)
@@ -159,7 +164,6 @@ def walk_part(
             if not is_join(signal):
                 mode = in_mode(system, ledger)
                 begin(method, mode, method.clock[T], end_state(method, mode), method.clock[H_NEXT])
-            arriving = False
         target = deadline(frame, ledger)
     return WALKED
 

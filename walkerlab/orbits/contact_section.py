@@ -21,7 +21,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion
+from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_rules import Ledger
 from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
@@ -47,6 +47,7 @@ class SectionStep:
     period_s: float
     length_m: float  # how far the walker went
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
+    rolling_m: float  # likewise
     books_J: Floats  # (3,) dissipated by damping, by friction, at edges
     height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
@@ -106,7 +107,7 @@ def step_from_section(
     finder = finder_for(method, SIGNALS)
     outcome = Outcome(walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1))
     end = method.y.copy()
-    landed = feet_motion(walker, tuple(end.tolist()))[1 - stance].along - ledger.foothold[1 - stance]
+    slipped, rolled = since_touch(walker, ledger, tuple(end.tolist()), 1 - stance)
     DP = section_derivative(walker, ledger, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
@@ -116,11 +117,19 @@ def step_from_section(
         DP,
         float(method.clock[T]),
         float(end[ALONG] - start[ALONG]),
-        float(ledger.slip[0] + landed),
+        float(ledger.slip[0] + slipped),
+        float(ledger.rolling[0] + rolled),
         observer.books.copy(),
         float(lost),
         method.counts[:4].copy(),
     )
+
+
+def since_touch(walker: ContactWalker, ledger: Ledger, y: State, foot: int) -> tuple[float, float]:
+    """How far a foot has slipped and rolled since its touch (m)."""
+    along = feet_motion(walker, y)[foot].along
+    slipped = material_along(walker, foot, along, y) - float(ledger.touched[foot])
+    return slipped, along - float(ledger.foothold[foot]) - slipped
 
 
 def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, start: State, stance: int) -> None:
@@ -129,6 +138,7 @@ def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, star
     feet = feet_motion(walker, start)
     ledger.at_zero[:] = 0
     ledger.at_zero[PASSING] = 1
+    ledger.sides[PASSING] = 1 if swing == 1 else -1
     ledger.carried[swing] = 0
     ledger.left_cells[swing] = ledger.cells[swing] - 1
     ledger.foothold[swing] = feet[stance].along - ground.frame.leg_length

@@ -125,6 +125,8 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
         "slips_m": slips.tolist(),
+        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else 0.0,
+        "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": dict(zip(("damping", "friction", "edges"), result.dissipated_J.tolist(), strict=True)),
         "rhs_evaluations": int(result.work[0]),
@@ -154,7 +156,8 @@ def steps_group(result: ContactWalkResult) -> Group:
         ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
         ("touch_time_s", result.touch_time_s, "s", "time of the touch that ends the step"),
         ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
-        ("slip_m", result.slip_m, "m", "net slip of the stance foot from its touch to its lift"),
+        ("slip_m", result.slip_m, "m", "net slip of the stance foot's material from its touch to its lift"),
+        ("rolling_m", result.rolling_m, "m", "how far the stance foot rolled from its touch to its lift"),
     )
     variables = {"step": Variable(np.arange(result.touch_time_s.size), ("step",), "1", "step number")}
     variables |= {name: Variable(values, ("step",), units, text) for name, values, units, text in rows}
