@@ -144,6 +144,7 @@ def foot_work(method: Any, system: Any, walker: ContactWalker, foot: int, fracti
         friction += span * WEIGHTS[i] * power[1]
         let_go = let_go and (i == 2 or power[2] == 0.0)
     if let_go:
-        before = foot_elastic_energy(walker, foot, walker_state(system, interpolate(method, system, 0.0)))
-        damping = before - foot_elastic_energy(walker, foot, walker_state(system, interpolate(method, system, fraction)))
+        start, end = interpolate(method, system, 0.0), interpolate(method, system, fraction)
+        damping = foot_elastic_energy(walker, foot, walker_state(system, start))
+        damping -= foot_elastic_energy(walker, foot, walker_state(system, end))
     return damping, friction

@@ -133,9 +133,7 @@ def lift(
 
 
 @inlined
-def note_slip(
-    walker: ContactWalker, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State
-) -> None:
+def note_slip(walker: ContactWalker, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State) -> None:
     """How far a foot has slipped and rolled since it touched."""
     slip = material_along(walker, foot, feet[foot].along, y) - ledger.touched[foot]
     ledger.stood[foot, 0] = slip

@@ -135,13 +135,13 @@ def walk_part(
         elif arriving and method.clock[T] >= target:
             wait = time_to_zero(method, finder, signal)
             happens = abs(wait) <= EVENT_TIME
-            if not happens and refinements <= REFINEMENTS and rewinds < REWINDS:
-                if method.clock[T_OLD] < target + wait <= latest:
-                    target += wait
-                    refinements += 1
-                    rewinds += 1
-                    rewind(method, mode)
-                    continue
+            again = refinements <= REFINEMENTS and rewinds < REWINDS
+            if not happens and again and method.clock[T_OLD] < target + wait <= latest:
+                target += wait
+                refinements += 1
+                rewinds += 1
+                rewind(method, mode)
+                continue
         rewinds = 0
         observe(observer, method, mode, walker, finder, ledger.carried, ledger.feet[STANCE])
         outcome = judge(mode, scene, method, finder, ledger)
