@@ -184,7 +184,7 @@ def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
-        return None, "what repeats itself there cannot be walked: " + "; ".join(objections)
+        return None, "the gaits there cannot be walked: " + "; ".join(objections)
     best = min(walkable, key=lambda index: gaits[index].spectral_radius)
     if gaits[best].stable:
         return best, "it is stable"

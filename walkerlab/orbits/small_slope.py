@@ -7,7 +7,8 @@ Long period: the step is symmetric about mid-swing, and both legs turn alike at 
 at leading order. What it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, is what the step
 descends, M g L alpha phi; with omega proportional to alpha that makes phi = kappa alpha^3.
 
-Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi.
+Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi. The factor
+grows without bound as the feet's mass vanishes; then this gait, too, loses alpha^2 and grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
 Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
@@ -36,6 +37,7 @@ MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no dig
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 COORDINATES = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
+THETA_2 = np.array([1.0, 0.0, 0.0])
 
 
 class Seed(NamedTuple):
@@ -90,10 +92,24 @@ def long_period_seed(walker: RigidWalker, modes: Modes) -> Seed | None:
     weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
     weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
     omega = float((modes.V @ (weights * rates_at_end)).mean())
-    kappa = 0.5 * walker.leg_length * omega**2 / walker.gravity
+    return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
+
+
+def cube_root_seed(name: str, walker: RigidWalker, per_angle: Vector, period: float) -> Seed:
+    """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
+
+    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
+    period     duration of a step, s
+    """
+    kappa = loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
-    z = LONG_AMPLITUDE * np.array([0.5, omega, omega]) - np.array([slope, 0.0, 0.0])
-    return Seed(LONG_PERIOD, slope, z, 2.0 * half, np.array([0.5, omega, omega]) / np.cbrt(kappa))
+    z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
+    return Seed(name, slope, z, period, per_angle / np.cbrt(kappa))
+
+
+def loss(walker: RigidWalker, per_angle: Vector) -> float:
+    """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs."""
+    return float(0.5 * walker.leg_length * per_angle[2] ** 2 / walker.gravity)
 
 
 def symmetric_half_period(modes: Modes) -> float | None:
@@ -110,7 +126,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed | None:
-    """The gait that is proportional to the slope, of less than `longest` (s); None if there is none."""
+    """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
     try:
         step = LinearStep(walker, modes)
         period = first_root(step.mismatch, longest)
@@ -120,6 +136,9 @@ def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed
     if period is None or z is None or z[0] <= -1.0:
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
+    per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
+    if loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
+        return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
     return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
