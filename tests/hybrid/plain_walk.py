@@ -14,7 +14,7 @@ CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
 WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE = 0, 1, 2, 3, 4, 5, 9
 # rows of events: two feet of (height, left edge, right edge), feet passing, hip, slide, two knees, sinking
 PASSING, FALL, SLIDE, KNEES, SINKING, EVENTS = 6, 7, 8, 9, 11, 12
-ARMED = 0.05  # rad of flexion from which on a knee locks
+ARMED = 0.01  # rad of flexion from which on a knee locks
 HALVINGS = 60
 
 
@@ -212,14 +212,14 @@ def material(walker, foot, y):
 
 @njit
 def lane(walker, foot):
-    """Where pad number 0 of a foot is centred: the stance foot starts in the middle of one, the other a pitch behind."""
+    """Where pad number 0 of a foot is centred: the swing foot starts a pitch behind the stance foot."""
+    """
     return 0.0 if foot == 1 else -walker.pitch
 
 
 @njit
 def event_values(walker, y, cells, stance, touched):
     """Every event function."""
-    n = walker.inertias.size
     g = np.ones(EVENTS)
     x = np.zeros(2)
     for foot in range(2):
@@ -244,7 +244,7 @@ def walk(walker, y, steps, h, hinged):
 
     Returns outcome, steps, times and places of touches, slips, rolling, time and state at the end, times of knee locks.
     """
-    n, knees = walker.inertias.size, walker.knees.shape[0]
+    knees = walker.knees.shape[0]
     tau = np.sqrt(walker.leg / walker.gravity)
     times, places, slips, rolled = np.zeros(steps), np.zeros(steps), np.zeros(steps), np.zeros(steps)
     locks, lock_count = np.zeros(2 * steps + 2), 0
@@ -281,9 +281,8 @@ def walk(walker, y, steps, h, hinged):
                         continue
                     if i == SLIDE and (side[3 * stance] > 0.0 or not carried[stance] or hinged == stance):
                         continue
-                    if i == KNEES or i == KNEES + 1:
-                        if i - KNEES >= knees or locked[i - KNEES] or not armed[i - KNEES]:
-                            continue
+                    if KNEES <= i < KNEES + 2 and (i - KNEES >= knees or locked[i - KNEES] or not armed[i - KNEES]):
+                        continue
                     found = i
             if releasing and g[SINKING] > 0.0:
                 found = SINKING

@@ -9,6 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.held import BENT, STOPPING, Knees, NoKnees, extension, extension_rate
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.pinned import Pinned, floating_state
@@ -26,7 +27,9 @@ MATERIAL, CLIMB = 9, 10  # no events: where the foot's material is, and how fast
 PER_FOOT = 11
 # signals of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
-SIGNALS = 2 * PER_FOOT + 3
+# signals of both knees: how far beyond straight, and how fast it gets there
+EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
+SIGNALS = SLIDE + 5
 NO_SIDE = 0  # of a signal that may cross zero either way
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
@@ -147,6 +150,7 @@ def sample_signals(
     finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
     away = finder.values[stance * PER_FOOT + MATERIAL, node] - touched
     finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+    sample_knees(walker.knees, y, node, finder)
 
 
 @inlined
@@ -168,6 +172,66 @@ def sample_foot(
     values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
     values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
     sample_slip(walker.friction, motion.slip, first, j, finder)
+
+
+@by_type
+def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
+    """The knees' signals at node j."""
+
+
+@sample_knees.case(NoKnees)
+def sample_no_knees(knees: NoKnees, y: State, j: int, finder: CrossingFinder) -> None:
+    """Nothing."""
+
+
+@sample_knees.case(Knees)
+def sample_both_knees(knees: Knees, y: State, j: int, finder: CrossingFinder) -> None:
+    """Extension and its rate."""
+    for knee in range(2):
+        finder.values[EXTENSION + knee, j] = extension(knees, knee, y, 2)
+        finder.values[EXTENSION_RATE + knee, j] = extension_rate(knees, knee, y, 2)
+
+
+@by_type
+def knee_crossing(
+    knees: Any, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """Fraction of the step at which a knee locks, latches or is to be released, and which signal's that is.
+
+    knee       (2,) what each knee is doing
+    releasing  whether the trailing knee is released when the stance foot stops sinking in
+    """
+
+
+@knee_crossing.case(NoKnees)
+def no_knee_crossing(
+    knees: NoKnees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """None."""
+    return NO_CROSSING, -1
+
+
+@knee_crossing.case(Knees)
+def first_knee_crossing(
+    knees: Knees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in."""
+    best, signal = NO_CROSSING, -1
+    for k in range(2):
+        at, index = NO_CROSSING, EXTENSION + k
+        if knee[k] == BENT:
+            at = leaves_side(finder, index, -1, at_zero[index] != 0)
+        elif knee[k] == STOPPING:
+            index = EXTENSION_RATE + k
+            at = leaves_side(finder, index, 1, at_zero[index] != 0)
+        if at < best:
+            best, signal = at, index
+    if releasing:
+        index = stance * PER_FOOT + CLIMB
+        at = leaves_side(finder, index, -1, at_zero[index] != 0)
+        if at < best:
+            best, signal = at, index
+    return best, signal
 
 
 @by_type
@@ -217,6 +281,9 @@ def earliest_crossing(
     stance: int,
     sides: Any,
     at_zero: Any,
+    pads: bool,
+    knee: Any,
+    releasing: bool,
     finder: CrossingFinder,
 ) -> tuple[float, int]:
     """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none.
@@ -226,6 +293,9 @@ def earliest_crossing(
     stance       the stance foot, which may slide
     sides        (signals,) on which side of zero each signal is known to be: 1, -1, or NO_SIDE
     at_zero      (signals,) which signals the last event left at zero
+    pads         whether the ground has edges
+    knee         (2,) what each knee is doing
+    releasing    whether the trailing knee is released when the stance foot stops sinking in
     """
     best, signal = NO_CROSSING, -1
     for foot in range(2):
@@ -239,6 +309,8 @@ def earliest_crossing(
         inside = feels_ground(system, carried[foot] != 0, lowest)
         last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
         for index in range(first, first + last):
+            if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
+                continue
             at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
@@ -250,6 +322,9 @@ def earliest_crossing(
         at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if at < best:
             best, signal = at, PASSING
+    at, index = knee_crossing(walker.knees, knee, releasing, stance, at_zero, finder)
+    if at < best:
+        best, signal = at, index
     at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
     if at < best:
         best, signal = at, FALL
@@ -275,4 +350,4 @@ def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: b
 @inlined
 def is_join(signal: int) -> bool:
     """Whether an event is a mere join of the force law."""
-    return signal < 2 * PER_FOOT and signal % PER_FOOT >= RELEASE
+    return signal < 2 * PER_FOOT and RELEASE <= signal % PER_FOOT < MATERIAL

@@ -2,14 +2,29 @@
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.held import (
+    BENT,
+    FLEXED,
+    LOCKED,
+    RELEASED,
+    STOPPING,
+    IdealLock,
+    Knees,
+    NoKnees,
+    extension,
+)
+from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import (
     carried_in_air,
     carried_in_cell,
-    order_matters,
+    has_pads,
     stride_measure,
 )
 from walkerlab.ground.walker import ContactWalker, FootMotion
 from walkerlab.hybrid.contact_events import (
+    CLIMB,
+    EXTENSION,
+    EXTENSION_RATE,
     FALL,
     HEIGHT,
     LEFT_EDGE,
@@ -23,12 +38,13 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
+BENT_KNEE = int(Outcome.BENT_KNEE)
 GOES_ON = -1
 
 # indices into Ledger.times
@@ -51,6 +67,10 @@ class Ledger(NamedTuple):
     touched: Any  # (2,) m, where its material was then
     stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
     leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
+    held: Any  # (n) which bodies follow others
+    knee: Any  # (2,) what each knee is doing
+    releasing: Any  # (1,) whether the trailing knee is still to be released
+    knee_strike: Any  # (steps,) s, when the knee of the step's swing leg locked; -1 if it has not
     sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
     times: Any  # (2,) see the indices above
@@ -67,6 +87,9 @@ def happen(
     if signal == SLIDE:
         return SLID
     ledger.at_zero[signal] = 1
+    if signal >= EXTENSION:
+        knee_stops(walker.knees, ledger, signal, t)
+        return GOES_ON
     feet = feet_motion(walker, y)
     if signal == PASSING:
         ledger.sides[PASSING] = -ledger.sides[PASSING]
@@ -92,6 +115,9 @@ def happen(
             ledger.carried[foot] = 1
         else:
             return OFF_PAD
+    elif kind == CLIMB:
+        ledger.at_zero[signal] = 0
+        release(walker.knees, ledger, 1 - foot)
     return GOES_ON
 
 
@@ -162,11 +188,13 @@ def touch(
     if foot == stance:
         return SLID if abs(material - ledger.touched[foot]) > farthest_slide(terrain) else GOES_ON
     measure = stride_measure(terrain)
-    if not order_matters(terrain) and ledger.cells[foot] == ledger.left_cells[foot]:
+    if has_pads(terrain) and ledger.cells[foot] == ledger.left_cells[foot]:
         away = abs(feet[foot].along - ledger.foothold[foot] - ledger.stood[foot, 1])
         return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
         return GOES_ON
+    if not is_straight(walker.knees, ledger, foot):
+        return BENT_KNEE
     step = ledger.feet[STEPS]
     ledger.touch_time[step] = t
     ledger.touch_along[step] = feet[foot].along
@@ -182,4 +210,117 @@ def touch(
     ledger.feet[STANCE] = foot
     ledger.feet[STEPS] = step + 1
     pass_by(terrain, ledger, stance)
+    follow_strike(walker.knees, ledger, stance)
     return GOES_ON
+
+
+@by_type
+def knee_stops(knees: Any, ledger: Ledger, signal: int, t: float) -> None:
+    """A knee got straight, or turned back in its stop."""
+
+
+@by_type
+def release(knees: Any, ledger: Ledger, knee: int) -> None:
+    """A knee is free again."""
+
+
+@by_type
+def is_straight(knees: Any, ledger: Ledger, foot: int) -> bool:
+    """Whether a foot may come down: its knee is locked."""
+
+
+@by_type
+def follow_strike(knees: Any, ledger: Ledger, trailing: int) -> None:
+    """The other foot has touched: the trailing knee is released, or is to be."""
+
+
+@by_type
+def note_flexion(knees: Any, ledger: Ledger, y: State) -> None:
+    """A released knee that has bent is caught when it straightens."""
+
+
+@by_type
+def catches(stop: Any) -> bool:
+    """Whether a knee that gets straight locks at once."""
+
+
+@catches.case(IdealLock)
+def lock_catches(stop: IdealLock) -> bool:
+    """Yes."""
+    return True
+
+
+@catches.case(NormalLaw)
+def stop_catches(stop: NormalLaw) -> bool:
+    """Its stop turns it back first."""
+    return False
+
+
+@knee_stops.case(NoKnees)
+def nothing_stops(knees: NoKnees, ledger: Ledger, signal: int, t: float) -> None:
+    """Nothing."""
+
+
+@release.case(NoKnees)
+def nothing_is_released(knees: NoKnees, ledger: Ledger, knee: int) -> None:
+    """Nothing."""
+
+
+@is_straight.case(NoKnees)
+def always_straight(knees: NoKnees, ledger: Ledger, foot: int) -> bool:
+    """Yes."""
+    return True
+
+
+@follow_strike.case(NoKnees)
+def nothing_follows(knees: NoKnees, ledger: Ledger, trailing: int) -> None:
+    """Nothing."""
+
+
+@note_flexion.case(NoKnees)
+def nothing_flexes(knees: NoKnees, ledger: Ledger, y: State) -> None:
+    """Nothing."""
+
+
+@knee_stops.case(Knees)
+def knee_locks(knees: Knees, ledger: Ledger, signal: int, t: float) -> None:
+    """It locks, or meets its stop, where it latches when it turns back."""
+    knee = (signal - EXTENSION) % 2
+    if signal < EXTENSION_RATE and not catches(knees.stop):
+        ledger.knee[knee] = STOPPING
+        return
+    ledger.at_zero[signal] = 0
+    ledger.knee[knee] = LOCKED
+    ledger.held[knees.shanks[knee]] = 1
+    ledger.knee_strike[ledger.feet[STEPS]] = t
+
+
+@release.case(Knees)
+def knee_is_released(knees: Knees, ledger: Ledger, knee: int) -> None:
+    """Its shank turns on its own."""
+    ledger.releasing[0] = 0
+    ledger.knee[knee] = RELEASED
+    ledger.held[knees.shanks[knee]] = 0
+
+
+@is_straight.case(Knees)
+def knee_is_straight(knees: Knees, ledger: Ledger, foot: int) -> bool:
+    """Its knee is locked."""
+    return ledger.knee[foot] == LOCKED
+
+
+@follow_strike.case(Knees)
+def knee_follows(knees: Knees, ledger: Ledger, trailing: int) -> None:
+    """At once, or when the leading foot stops sinking in."""
+    if knees.release_at_touch:
+        release(knees, ledger, trailing)
+    else:
+        ledger.releasing[0] = 1
+
+
+@note_flexion.case(Knees)
+def knees_flex(knees: Knees, ledger: Ledger, y: State) -> None:
+    """Either may."""
+    for knee in range(2):
+        if ledger.knee[knee] == RELEASED and extension(knees, knee, y, 2) < -FLEXED:
+            ledger.knee[knee] = BENT

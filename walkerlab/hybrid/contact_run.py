@@ -9,6 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.energy import book_energy, kinetic_energy, potential_energy
+from walkerlab.ground.held import (
+    BENT,
+    FLEXED,
+    LOCKED,
+    RELEASED,
+    Held,
+    Knees,
+    always_held,
+    extension,
+    knee_energy,
+    no_stops,
+    stop_flags,
+)
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
@@ -41,7 +54,8 @@ from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
 
 Floats = NDArray[np.float64]
-
+CHANNELS = ("damping", "friction", "edges", "knee_strikes", "knee_stop")
+OF_STRAIGHT_LEGS = 3  # channels
 
 NEVER = -1
 ROUNDING = 1e-14  # of a start's coordinates and velocities
@@ -74,7 +88,7 @@ class Stopped:
 class Ground(NamedTuple):
     """What a walk happens on and is judged by."""
 
-    terrain: Any  # Checkerboard or AfterMidSwing
+    terrain: Any  # Checkerboard, AfterMidSwing or Plane
     frame: Frame
 
 
@@ -94,7 +108,7 @@ def walk_free(
 
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
     """
-    system = OnGround(walker, (True, True))
+    system = OnGround(walker, (True, True), always_held(walker.held), no_stops(walker.knees))
     return walk_part(
         system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after
     )
@@ -117,13 +131,14 @@ def walk_hinged(
 
 
 @kernel
-def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies: Any) -> None:
+def sampled_energies(walker: ContactWalker, states: Any, carried: Any, knees: Any, energies: Any) -> None:
     """Kinetic, potential and book energy (J) of every sampled state into energies (samples, 3)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
         energies[i, 0] = kinetic_energy(walker, y)
         energies[i, 1] = potential_energy(walker, y)
         energies[i, 2] = book_energy(walker, (carried[i, 0] != 0, carried[i, 1] != 0), y)
+        energies[i, 2] += knee_energy(walker.knees, stop_flags(walker.knees, knees[i]), y, 2)
 
 
 @kernel
@@ -146,10 +161,11 @@ class ContactSamples:
     """A walk at evenly spaced times."""
 
     time_s: Floats  # (samples,)
-    states: Floats  # (samples, 8)
+    states: Floats  # (samples, 4 + 2 n)
     carried: NDArray[np.int8]  # (samples, 2)
     stance: NDArray[np.int64]  # (samples,)
-    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges
+    knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
+    dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
 
 
 @dataclass(frozen=True)
@@ -165,7 +181,8 @@ class ContactWalkResult:
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
-    dissipated_J: Floats  # (3,)
+    dissipated_J: Floats  # (5,)
+    knee_strike_s: Floats  # (steps,) when the knee of each step's swing leg locked; of straight legs, none
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     samples: ContactSamples | None
 
@@ -189,6 +206,7 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
         on_pad = carried_in_cell(terrain, int(cells[foot]))
         carried[foot] = on_pad and starts_carried(terrain, foot == stance)
     sides, at_zero = known_sides(walker, feet, stance, y)
+    held, knee = held_at_start(walker, stance, y)
     return Ledger(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
@@ -200,12 +218,27 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
         foothold=np.array([motion.along for motion in feet]),
         touched=np.array([material_along(walker, foot, feet[foot].along, y) for foot in range(2)]),
         stood=np.zeros((2, 2)),
+        held=held,
+        knee=knee,
+        releasing=np.zeros(1, np.int8),
+        knee_strike=np.full(steps, -1.0),
         leaving=np.zeros(2, np.int8),
         sides=sides,
         at_zero=at_zero,
         times=np.zeros(2),
         feet=np.array([stance, 0]),
     )
+
+
+def held_at_start(walker: ContactWalker, stance: int, y: State) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Which bodies follow others, and what each knee is doing: that of the stance leg is locked, the other is not."""
+    knee = np.full(2, RELEASED, np.int8)
+    held = np.array(walker.held.always if isinstance(walker.held, Held) else (), np.int8)
+    if isinstance(walker.knees, Knees):
+        held[walker.knees.shanks[stance]], knee[stance] = 1, LOCKED
+        if extension(walker.knees, 1 - stance, y, 2) < -FLEXED:
+            knee[1 - stance] = BENT
+    return held, knee
 
 
 def known_sides(
@@ -263,6 +296,7 @@ def new_observer(
         np.zeros((samples, len(walker.blank))),
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
+        np.zeros((samples, 2), np.int8),
         np.zeros((samples, BOOKS)),
         np.zeros(1, np.int64),
         np.zeros(BOOKS),
@@ -338,6 +372,12 @@ def run_parts(
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
 
 
+def by_channel(walker: ContactWalker, books: Floats) -> dict[str, float]:
+    """What was dissipated (J), by name; the knees' channels only where there are knees."""
+    count = len(CHANNELS) if isinstance(walker.knees, Knees) else OF_STRAIGHT_LEGS
+    return dict(zip(CHANNELS[:count], books[:count].tolist(), strict=True))
+
+
 def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) -> None:
     """A hinged foot has neither slipped nor rolled; it is on the ground, about to leave."""
     steps = ledger.feet[STEPS]
@@ -359,6 +399,7 @@ def gather(
             observer.states[:seen],
             observer.carried[:seen],
             observer.stance[:seen],
+            observer.knees[:seen],
             observer.sampled_books[:seen],
         )
     return ContactWalkResult(
@@ -372,6 +413,7 @@ def gather(
         float(observer.extremes[MAX_PENETRATION]),
         float(observer.extremes[RESIDUAL]),
         observer.books.copy(),
+        ledger.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
         stopped.work,
         samples,
     )

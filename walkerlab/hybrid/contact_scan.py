@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.terrain import has_pads
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_signals
 from walkerlab.kernels import by_type, inlined, kernel
@@ -18,7 +19,7 @@ class Scene(NamedTuple):
     """What does not change while a walk goes on."""
 
     walker: ContactWalker
-    terrain: Any  # Checkerboard or AfterMidSwing
+    terrain: Any  # Checkerboard, AfterMidSwing or Plane
     frame: Frame
     watch_order: bool  # whether it matters that the feet pass each other
 
@@ -32,6 +33,8 @@ class Feet(NamedTuple):
     at_zero: Any  # (signals,) which signals the last event left at zero
     touched: Any  # (2,) m, where the material of each was when it touched
     order: Any  # (2,) the stance foot, and how many steps it is
+    knee: Any  # (2,) what each knee is doing
+    releasing: Any  # (1,) whether the trailing knee is still to be released
 
 
 @inlined
@@ -54,6 +57,9 @@ def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tup
         feet.order[0],
         feet.sides,
         feet.at_zero,
+        has_pads(scene.terrain),
+        feet.knee,
+        feet.releasing[0] != 0,
         finder,
     )
 

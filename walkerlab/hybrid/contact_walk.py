@@ -5,6 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
+from walkerlab.ground.held import held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned
 from walkerlab.ground.terrain import (
@@ -20,8 +21,18 @@ from walkerlab.hybrid.contact_events import (
     is_join,
     walker_state,
 )
+from walkerlab.hybrid.contact_knee import cross_knee
 from walkerlab.hybrid.contact_observer import ContactObserver, observe
-from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, GOES_ON, LAST_TOUCH, STANCE, STEPS, Ledger, happen
+from walkerlab.hybrid.contact_rules import (
+    AIRBORNE_SINCE,
+    GOES_ON,
+    LAST_TOUCH,
+    STANCE,
+    STEPS,
+    Ledger,
+    happen,
+    note_flexion,
+)
 from walkerlab.hybrid.contact_scan import Feet, Scene, scan
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type, inlined
@@ -58,13 +69,16 @@ def in_mode(system: Any, ledger: Ledger) -> Any:
 @in_mode.case(OnGround)
 def free_mode(system: OnGround, ledger: Ledger) -> OnGround:
     """Each foot finds ground or not."""
-    return OnGround(system.walker, (ledger.carried[0] != 0, ledger.carried[1] != 0))
+    walker, carried = system.walker, (ledger.carried[0] != 0, ledger.carried[1] != 0)
+    return OnGround(walker, carried, held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee))
 
 
 @in_mode.case(Pinned)
 def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
-    """The hinge does not ask."""
-    return system
+    """The hinge does not ask for ground."""
+    walker = system.walker
+    held, stops = held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee)
+    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops)
 
 
 @by_type
@@ -110,7 +124,16 @@ def walk_part(
     target = deadline(frame, ledger)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
     scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
-    feet = Feet(ledger.carried, ledger.cells, ledger.sides, ledger.at_zero, ledger.touched, ledger.feet)
+    feet = Feet(
+        ledger.carried,
+        ledger.cells,
+        ledger.sides,
+        ledger.at_zero,
+        ledger.touched,
+        ledger.feet,
+        ledger.knee,
+        ledger.releasing,
+    )
     while ledger.feet[STEPS] < ledger.touch_time.size:
         status = advance(method, mode, target)
         if status != STEP_DONE:
@@ -143,7 +166,8 @@ def walk_part(
                 rewind(method, mode)
                 continue
         rewinds = 0
-        observe(observer, method, mode, walker, finder, ledger.carried, ledger.feet[STANCE])
+        observe(observer, method, mode, walker, finder, ledger.carried, ledger.knee, ledger.feet[STANCE])
+        note_flexion(walker.knees, ledger, walker_state(mode, end_state(method, mode)))
         outcome = judge(mode, scene, method, finder, ledger)
         if outcome != GOES_ON:
             return outcome
@@ -162,8 +186,9 @@ def walk_part(
             if released or (signal == PASSING and 0 <= stop_passing_after <= ledger.feet[STEPS]):
                 return WALKED
             if not is_join(signal):
-                mode = in_mode(system, ledger)
-                begin(method, mode, method.clock[T], end_state(method, mode), method.clock[H_NEXT])
+                before, mode = mode, in_mode(system, ledger)
+                y = cross_knee(walker.knees, observer, method, before, mode, signal)
+                begin(method, mode, method.clock[T], y, method.clock[H_NEXT])
         target = deadline(frame, ledger)
     return WALKED
 
