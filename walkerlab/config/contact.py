@@ -99,7 +99,8 @@ class Contact(Block):
         key(
             "",
             "checkerboard: a lane of raised pads per leg; "
-            "after-mid-swing: a swing foot touches only once it has passed the stance foot",
+            "after-mid-swing: a swing foot touches only once it has passed the stance foot; "
+            "plane: ordinary ground, for feet that clear it",
             _SECTION_4,
         ),
     ] = "checkerboard"

@@ -95,7 +95,7 @@ def section_points(
         finder = finder_for(method, SIGNALS)
         outcome = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
         if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:
-            yield steps, coordinates_of(method.y, int(ledger.feet[STANCE]))
+            yield steps, coordinates_of(walker, method.y, int(ledger.feet[STANCE]))
         elif ledger.feet[STEPS] > steps:
             return
 

@@ -115,5 +115,5 @@ def forces_of(
         raise ValueError("the walk was not sampled")
     feet, books = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
     sampled_feet(walker, samples.states, samples.carried, feet)
-    sampled_energies(walker, samples.states, samples.carried, books)
+    sampled_energies(walker, samples.states, samples.carried, samples.knees, books)
     return samples.time_s, feet[:, :, 2], books[:, 0] + books[:, 1]
