@@ -63,7 +63,7 @@ def on_pairs(DP: Floats) -> Floats:
     return np.asarray(straight - crossed)
 
 
-def test_value(kind: Kind, DP: Floats) -> float:
+def critical_value(kind: Kind, DP: Floats) -> float:
     """The test function of a kind of bifurcation."""
     if kind == "torus":
         pairs = on_pairs(DP)
@@ -83,10 +83,10 @@ class Bifurcation:
 
 def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
     """The bifurcation of a kind between two neighbours of a branch; None if there is none."""
-    tests = [test_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
+    tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
     if tests[0] * tests[1] >= 0.0:
         return None
-    point = root_along(segment, lambda solved: test_value(kind, solved.evaluated.data.DP))
+    point = root_along(segment, lambda solved: critical_value(kind, solved.evaluated.data.DP))
     if point is None:
         return None
     multipliers = multipliers_of(point.evaluated.data.DP)
@@ -181,7 +181,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
         return None
     B_vv = (along[0] - along[1]) / (2.0 * h)
     C_vvv = (along[0] - 2.0 * (A @ v) + along[1]) / h**2
-    inner = np.linalg.solve(np.eye(v.size) - A, B_vv)
+    inner = np.asarray(np.linalg.solve(np.eye(v.size) - A, B_vv), np.float64)
     size = float(np.linalg.norm(inner))
     across = beside(inner / size)
     if across is None:

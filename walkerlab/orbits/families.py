@@ -71,6 +71,9 @@ class Limits:
     growth: float = 1e4
 
 
+CONTROL, LIMITS = StepControl(), Limits()
+
+
 @dataclass(frozen=True, eq=False)
 class GaitPoint:
     """A gait on a branch.
@@ -169,8 +172,8 @@ class Follower:
         self,
         step_map: StepMap,
         span: Span,
-        control: StepControl = StepControl(),
-        limits: Limits = Limits(),
+        control: StepControl = CONTROL,
+        limits: Limits = LIMITS,
         advance: Callable[[], None] = lambda: None,
     ) -> None:
         """Nothing is followed yet; `advance` is told of each point."""
@@ -268,7 +271,7 @@ class Follower:
             if isinstance(following, Lost):
                 end = BranchEnd(points[-1].value, why_lost(following))
                 break
-            solved, gone, step = following
+            solved, _, step = following
             end, solved = self.within(equations, last, solved)
             segment = Segment(equations, last, solved, self.control.tolerance)
             closing = closes(last, solved, period)
@@ -291,7 +294,7 @@ class Follower:
         return Branch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
 
     def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
-        """Whether the multipliers near the unit circle moved little, so that no two crossings hide between neighbours."""
+        """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
         before = multipliers_of(last.evaluated.data.DP)
 
         def near(found: Solved[Cycle]) -> bool:
@@ -326,12 +329,18 @@ class Follower:
             value,
             z,
             multipliers_of(cycle.DP),
-            np.array([step.period_s for step in cycle.steps]),
+            strike_to_strike(cycle),
             np.array([step.length_m for step in cycle.steps]),
             np.array([step.angle for step in cycle.steps]),
             self.step_map.watch(z, value, period),
             solved,
         )
+
+
+def strike_to_strike(cycle: Cycle) -> Floats:
+    """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
+    waits = [step.period_s - step.strike_s for step in cycle.steps]
+    return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(cycle.steps)])
 
 
 def steps_word(n: int) -> str:

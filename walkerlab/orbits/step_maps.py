@@ -37,8 +37,9 @@ QUICK_RTOL, QUICK_ATOL, ENDLESS = 1e-9, 1e-11, 2**62  # of long walks
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far
 CENTRAL: tuple[tuple[int, float], ...] = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
+SIMPLE: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD: tuple[tuple[int, float], ...] = ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
-"""Offsets and weights of formulas of fourth order for a first derivative."""
+"""Offsets and weights of formulas for a first derivative, of fourth order but for the simple one."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ class MappedStep:
     DP        (d, d) its derivative with respect to where it began
     Dp        (d,) its derivative with respect to the parameter
     period_s, length_m  its duration and the distance walked
-    angle     rad, stance leg at the heel strike that the step ends with, roles changed
+    angle     rad, stance leg just after the step's heel strike
+    strike_s  when that is, from the section on
     """
 
     outcome: Outcome
@@ -69,6 +71,7 @@ class MappedStep:
     period_s: float
     length_m: float
     angle: float
+    strike_s: float
 
 
 @dataclass(frozen=True)
@@ -109,14 +112,16 @@ class StepMap(Protocol):
         """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
 
 
-def difference_formula(build: Callable[[float], W | None], p: float, scale: float) -> tuple[list[W], Floats] | None:
+def difference_formula(
+    build: Callable[[float], W | None], p: float, scale: float, few: bool = False
+) -> tuple[list[W], Floats] | None:
     """Walkers at parameter values near p and their weights in a fourth-order formula for a derivative.
 
-    Central; one-sided where the parameter ends; None if there is no room on either side.
+    Central, of second order if there are to be `few`; one-sided where the parameter ends; None without room.
     """
     h = SPREAD * scale
     backward = tuple((-offset, -weight) for offset, weight in FORWARD)
-    for formula in (CENTRAL, FORWARD, backward):
+    for formula in (SIMPLE if few else CENTRAL, FORWARD, backward):
         walkers = [build(p + offset * h) for offset, _ in formula]
         built = [walker for walker in walkers if walker is not None]
         if len(built) == len(walkers):
@@ -173,13 +178,13 @@ class CompassMap:
         """One step with all derivatives."""
         unit, near = self._unit_at(p), self._near(p)
         if unit is None or near is None:
-            return _no_step(Outcome.REJECTED, SECTION)
+            return no_step(Outcome.REJECTED, SECTION)
         walker, units = unit
         shooting = self._shooting_of(walker)
         start = np.array(z, float)
         status, period = step_with_parameter(shooting, near[0], near[1], self._method, start, self._Dp)
         if status != Outcome.WALKED:
-            return _no_step(Outcome(status), SECTION)
+            return no_step(Outcome(status), SECTION)
         ahead = shooting.z_next.copy()
         length = step_length(walker, -2.0 * walker.slope - ahead[0], ahead[0])
         return MappedStep(
@@ -190,6 +195,7 @@ class CompassMap:
             period * units.time,
             float(length) * units.length,
             float(ahead[0]),
+            period * units.time,
         )
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
@@ -230,8 +236,9 @@ def _similar(walker: RigidWalker | None) -> tuple[RigidWalker, Units] | None:
     return None if walker is None else unit_walker(walker)
 
 
-def _no_step(outcome: Outcome, d: int) -> MappedStep:
-    return MappedStep(outcome, np.zeros(d), np.eye(d), np.zeros(d), 0.0, 0.0, 0.0)
+def no_step(outcome: Outcome, d: int) -> MappedStep:
+    """A step that did not come to its end."""
+    return MappedStep(outcome, np.zeros(d), np.eye(d), np.zeros(d), 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A number of the config as the parameter of a family of walkers: which key, in which unit, and the config at a value."""
+"""A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Parameter:
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: Config, value: float) -> Config | None:
-        """The config with another value there, typed anew so that what follows from the key follows; None if refused."""
+        """The config with another value there and all that follows from it; None if the schema refuses it."""
         data = {name: _as_given(getattr(config, name)) for name in PHYSICAL}
         block = data
         for name in self.path[:-1]:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.config.continuation import Continuation
+from walkerlab.config.continuation import Continuation, Span
 from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
+from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.families import Branch
 from walkerlab.orbits.step_maps import Monitor
 from walkerlab.scene.parameter import Parameter
-from walkerlab.store.content import Group, Variable
+from walkerlab.store.content import Attribute, Group, Variable
 
 if TYPE_CHECKING:
     from walkerlab.stages.continuation import Followed
@@ -37,6 +38,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
         "attractors": [attractor_summary(one.model, one.attractors) for one in found if one.attractors.found],
+        "curves": [row for one in found for row in curve_rows(one)],
     }
 
 
@@ -119,10 +121,41 @@ def attractor_summary(model: str, attractors: Attractors) -> dict[str, Any]:
     }
 
 
-def groups(found: Sequence[Followed], parameter: Parameter) -> dict[str, Group]:
-    """One group a branch, and one for bifurcations, exponents and attractor of each model."""
+def curve_rows(followed: Followed) -> Iterator[dict[str, Any]]:
+    """Curves of bifurcations over the plane: where they begin and end, and why."""
+    for curve in followed.curves:
+        yield {
+            "model": followed.model,
+            "kind": curve.kind,
+            "period": curve.period,
+            "points": int(curve.first.size),
+            "begins": [float(curve.first[0]), float(curve.second[0])],
+            "ends": [float(curve.first[-1]), float(curve.second[-1])],
+            "reasons": [end.reason for end in curve.ends],
+        }
+
+
+def curve_group(curve: BifurcationCurve, parameter: Parameter, second: Span) -> Group:
+    """A curve over the plane of both parameters."""
+    along = ("point",)
+    return Group(
+        {
+            "value": Variable(curve.first, along, parameter.unit, parameter.key),
+            "second": Variable(curve.second, along, "1", second.over),
+        },
+        {"kind": curve.kind, "period": curve.period},
+    )
+
+
+def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation) -> dict[str, Group]:
+    """One group a branch and a curve, and one for bifurcations, exponents and attractor of each model."""
     stored: dict[str, Group] = {}
     for one in found:
+        if one.step_map is None:
+            continue
+        if block.second is not None:
+            for number, curve in enumerate(one.curves):
+                stored[f"{one.model}/curve_{number}"] = curve_group(curve, parameter, block.second)
         for number, branch in enumerate(one.branches):
             stored[f"{one.model}/branch_{number}"] = branch_group(branch, one.step_map.monitors, parameter)
         rows = list(bifurcation_rows(one))
@@ -154,7 +187,11 @@ def branch_group(branch: Branch, monitors: Sequence[Monitor], parameter: Paramet
     for column, monitor in enumerate(monitors):
         values = np.array([point.monitors[column] for point in points])
         variables[monitor.name] = Variable(values, POINT, monitor.unit, monitor.meaning)
-    attrs = {"period": branch.period, "begins": branch.ends[0].reason, "ends": branch.ends[1].reason}
+    attrs: dict[str, Attribute] = {
+        "period": branch.period,
+        "begins": branch.ends[0].reason,
+        "ends": branch.ends[1].reason,
+    }
     return Group(variables, attrs)
 
 
