@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.continuation import Floats
+from walkerlab.orbits.families import Seed
 from walkerlab.orbits.step_maps import StepMap
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
@@ -55,9 +57,9 @@ class Attractors:
     lost_at, reason  the first value at which the walk did not go on, and how it ended; None if it always did
     """
 
-    found: tuple[Attractor, ...]
-    lost_at: float | None
-    reason: str
+    found: tuple[Attractor, ...] = ()
+    lost_at: float | None = None
+    reason: str = ""
 
 
 def period_of(points: Floats) -> int:
@@ -115,4 +117,38 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
 def feigenbaum_ratios(flips: list[float]) -> list[float]:
     """Ratios of successive distances between the flips of a cascade; they tend to 4.669."""
     gaps = np.diff(np.array(flips))
-    return [float(one / other) for one, other in zip(gaps[:-1], gaps[1:], strict=True)]
+    return [float(one / other) for one, other in pairwise(gaps)]
+
+
+def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
+    """Points of an attractor that nearly return after so many steps: near unstable gaits of as many, one each.
+
+    steps  that are walked to look for them
+    """
+    walk = step_map.iterate(attractor.last, attractor.value, steps, None)
+    points, found = walk.points, []
+    for period in periods:
+        if points.shape[0] > period:
+            misses = np.linalg.norm(points[period:] - points[:-period], axis=1)
+            found.append(Seed(points[int(np.argmin(misses))], attractor.value, period))
+    return found
+
+
+def settled_elsewhere(
+    step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
+) -> list[Seed]:
+    """Periodic gaits that walks from starts scattered about an attractor settle on, other than itself.
+
+    starts  walks
+    spread  standard deviation of the starts' coordinates, as a share of the largest
+    """
+    found: list[Seed] = []
+    periods = {attractor.period}
+    scale = spread * float(np.max(np.abs(attractor.last)))
+    for _ in range(starts):
+        start = attractor.last + scale * generator.standard_normal(attractor.last.size)
+        here = settled(step_map, start, attractor.value, transient, 2 * LONGEST_PERIOD)
+        if not isinstance(here, Outcome) and here.period and here.period not in periods:
+            periods.add(here.period)
+            found.append(Seed(here.last, attractor.value, here.period))
+    return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -133,36 +134,30 @@ class Branch:
 
     @property
     def stable_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Ranges of the parameter over which the branch is stable, bounded by its bifurcations."""
+        """Ranges of the parameter over which the branch is stable, bounded by its bifurcations and its ends."""
         found: list[list[float]] = []
-        for point, last in zip(self.points, (None, *self.points[:-1]), strict=True):
-            if not point.stable:
-                if last is not None and last.stable:
-                    found[-1][1] = self._edge(last.value, point.value)
-                continue
-            if last is None:
-                found.append([self.ends[0].value, point.value])
-            elif not last.stable:
-                found.append([self._edge(last.value, point.value), point.value])
-            found[-1][1] = point.value
-        if self.points[-1].stable:
-            found[-1][1] = self.ends[1].value
-        return tuple((min(pair), max(pair)) for pair in found)
+        values = [self.ends[0].value]  # of the stable stretch being passed through
+        stable = self.points[0].stable
+        for one, other in pairwise(self.points):
+            if one.stable:
+                values.append(one.value)
+            if one.stable != other.stable:
+                edge = self._edge(one, other)
+                if stable:
+                    found.append([*values, edge])
+                values, stable = [edge], other.stable
+        if stable:
+            found.append([*values, self.points[-1].value, self.ends[1].value])
+        return tuple((min(stretch), max(stretch)) for stretch in found)
 
-    def _edge(self, before: float, after: float) -> float:
-        """The bifurcation between two neighbours, where stability changes; else the middle."""
-        middle = 0.5 * (before + after)
-        reach = abs(after - before)
-        near = [one.value for one in self.bifurcations if abs(one.value - middle) <= max(reach, 1e-9 * abs(middle))]
-        return min(near, key=lambda value: abs(value - middle)) if near else middle
-
-
-class Seed(NamedTuple):
-    """Section coordinates z (d,) near a gait of `period` steps at a value of the parameter."""
-
-    z: Floats
-    value: float
-    period: int = 1
+    def _edge(self, one: GaitPoint, other: GaitPoint) -> float:
+        """The bifurcation between two neighbours, of which one is stable."""
+        both = (one.solved.x, other.solved.x)
+        for bifurcation, segment in self.segments:
+            ends = (segment.first.x, segment.second.x)
+            if all(any(np.array_equal(x, end) for end in ends) for x in both):
+                return bifurcation.value
+        return 0.5 * (one.value + other.value)
 
 
 class Follower:
@@ -214,7 +209,7 @@ class Follower:
         """Whether a gait is on a branch already, at whichever of its steps it is looked at."""
         value = float(gait.x[-1]) * self.span.size
         starts = [gait.x[:-1], *(step.z for step in gait.evaluated.data.steps)]
-        for one, other in zip(branch.points[:-1], branch.points[1:], strict=True):
+        for one, other in pairwise(branch.points):
             if not min(one.value, other.value) <= value <= max(one.value, other.value) or one.value == other.value:
                 continue
             share = (value - one.value) / (other.value - one.value)

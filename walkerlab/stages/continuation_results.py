@@ -149,7 +149,8 @@ def curve_group(curve: BifurcationCurve, parameter: Parameter, second: Span) -> 
 
 def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation) -> dict[str, Group]:
     """One group a branch and a curve, and one for bifurcations, exponents and attractor of each model."""
-    stored: dict[str, Group] = {}
+    branches = [branch_summary(one.model, branch) for one in found for branch in one.branches]
+    stored: dict[str, Group] = {"branches": overview(branches, parameter)} if branches else {}
     for one in found:
         if one.step_map is None:
             continue
@@ -166,6 +167,20 @@ def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation)
         if one.attractors.found:
             stored[f"{one.model}/attractor"] = attractor_group(one.attractors, parameter)
     return stored
+
+
+def overview(rows: Sequence[dict[str, Any]], parameter: Parameter) -> Group:
+    """Every branch of every model in a row."""
+    along = ("branch",)
+    return Group(
+        {
+            "model": Variable(np.array([row["model"] for row in rows]), along, "", "model"),
+            "period": Variable(np.array([row["period"] for row in rows]), along, "1", "steps of the gait"),
+            "from": Variable(np.array([row["from"] for row in rows]), along, parameter.unit, "where it begins"),
+            "to": Variable(np.array([row["to"] for row in rows]), along, parameter.unit, "where it ends"),
+        },
+        {"over": parameter.key},
+    )
 
 
 def branch_group(branch: Branch, monitors: Sequence[Monitor], parameter: Parameter) -> Group:
