@@ -23,6 +23,7 @@ from walkerlab.orbits.step_maps import StepMap
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
 BLOCKS = 10
+CANDIDATES = 4  # near returns that are tried, of one number of steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,16 +122,20 @@ def feigenbaum_ratios(flips: list[float]) -> list[float]:
 
 
 def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
-    """Points of an attractor that nearly return after so many steps: near unstable gaits of as many, one each.
+    """Points of an attractor that nearly return after so many steps: near unstable gaits of as many, a few each.
 
     steps  that are walked to look for them
     """
     walk = step_map.iterate(attractor.last, attractor.value, steps, None)
     points, found = walk.points, []
     for period in periods:
-        if points.shape[0] > period:
-            misses = np.linalg.norm(points[period:] - points[:-period], axis=1)
-            found.append(Seed(points[int(np.argmin(misses))], attractor.value, period))
+        if points.shape[0] <= period:
+            continue
+        misses = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        for _ in range(CANDIDATES):
+            nearest = int(np.argmin(misses))
+            found.append(Seed(points[nearest], attractor.value, period))
+            misses[max(0, nearest - 2 * period) : nearest + 2 * period] = np.inf
     return found
 
 

@@ -160,6 +160,14 @@ class Branch:
         return 0.5 * (one.value + other.value)
 
 
+class Seed(NamedTuple):
+    """Section coordinates z (d,) near a gait of `period` steps at a value of the parameter."""
+
+    z: Floats
+    value: float
+    period: int = 1
+
+
 class Follower:
     """Follows branches of one model over one span."""
 
