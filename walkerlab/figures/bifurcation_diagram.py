@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -67,53 +67,61 @@ def label_of(results: Results) -> str:
     return f"{words} ({unit})" if unit not in ("", "1") else words
 
 
-def stretches(stable: NDArray[Any]) -> Iterator[tuple[slice, bool]]:
-    """Runs of points of one stability, each with the first point of the next."""
-    bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(stable.astype(int)))), stable.size]
-    for begin, end in pairwise(bounds):
-        yield slice(begin, min(end + 1, stable.size)), bool(stable[begin])
+@dataclass(frozen=True)
+class Curve:
+    """A quantity of every step along a branch, bifurcations among its points.
+
+    value     (points,) of the parameter
+    quantity  (points, steps)
+    stable    (points - 1,) whether the gaits between neighbours are
+    marks     where the bifurcations are, and of which kind
+    """
+
+    value: NDArray[np.float64]
+    quantity: NDArray[np.float64]
+    stable: NDArray[np.bool_]
+    marks: tuple[tuple[int, str], ...]
 
 
-def draw_branch(axes: Axes, branch: Drawn, values: NDArray[np.float64]) -> None:
-    """A quantity of every step of a branch, solid where it is stable."""
-    group = branch.group
+def curve_of(group: Group, name: str) -> Curve:
+    """A quantity along a branch; its stability changes at bifurcations, and else in the middle between neighbours."""
+    value, quantity = group["value"], group[name]
+    stable = group["stable"].astype(bool)
+    if "mark_after" not in group.variables:
+        return Curve(value, quantity, stable[:-1] & stable[1:], ())
+    places = group["mark_after"].astype(int) + 1
+    order = np.argsort(places, kind="stable")
+    marked = places[order] + np.arange(places.size)
+    value = np.insert(value, places[order], group["mark_value"][order])
+    quantity = np.insert(quantity, places[order], group[f"mark_{name}"][order], axis=0)
+    on_mark = np.zeros(value.size, bool)
+    on_mark[marked] = True
+    known = np.insert(stable, places[order], True)  # a bifurcation bounds what is stable and what is not
+    between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
+    kinds = tuple(str(kind) for kind in group["mark_kind"][order])
+    return Curve(value, quantity, between, tuple(zip((int(place) for place in marked), kinds, strict=True)))
+
+
+def draw_branch(axes: Axes, branch: Drawn, name: str) -> set[str]:
+    """A quantity of every step of a branch, solid where it is stable, with its bifurcations; their kinds."""
+    curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
-    for part, stable in stretches(group["stable"]):
-        for column in range(values.shape[1]):
-            axes.plot(
-                group["value"][part], values[part, column], color=branch.colour, linestyle=STYLES[stable],
-                linewidth=width if stable else 0.6 * width, zorder=4 if stable else 3,
-            )  # fmt: skip
-
-
-def mark_bifurcations(axes: Axes, results: Results, branch: Drawn, values: NDArray[np.float64]) -> set[str]:
-    """The bifurcations of a branch on its curves; which kinds there are."""
-    rows = results[STAGE].groups.get(f"{branch.model}/bifurcations")
-    kinds: set[str] = set()
-    if rows is None:
-        return kinds
-    for row in np.flatnonzero(rows["branch"] == branch.number):
-        kind, value = str(rows["kind"][row]), float(rows["value"][row])
+    bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
+    for begin, end in pairwise(bounds):
+        if begin == end:
+            continue
+        stable = bool(curve.stable[begin])
+        axes.plot(
+            curve.value[begin : end + 1], curve.quantity[begin : end + 1], color=branch.colour,
+            linestyle=STYLES[stable], linewidth=width if stable else 0.6 * width, zorder=4 if stable else 3,
+        )  # fmt: skip
+    for place, kind in curve.marks:
         marker, colour = MARKS[kind]
-        nearest = int(np.argmin(np.abs(branch.group["value"] - value)))
-        for column in range(values.shape[1]):
-            axes.plot(
-                value, at(branch.group["value"], values[:, column], value, nearest), marker=marker, markersize=3.0,
-                color=colour, markeredgewidth=0.0, zorder=6,
-            )  # fmt: skip
-        kinds.add(kind)
-    return kinds
-
-
-def at(value: NDArray[np.float64], quantity: NDArray[np.float64], where: float, nearest: int) -> float:
-    """A quantity at a value of the parameter, linear between the neighbours about it; else that of the nearest point."""
-    for index in (nearest - 1, nearest):
-        if 0 <= index < value.size - 1:
-            one, other = value[index], value[index + 1]
-            if min(one, other) <= where <= max(one, other) and one != other:
-                share = (where - one) / (other - one)
-                return float(quantity[index] + share * (quantity[index + 1] - quantity[index]))
-    return float(quantity[nearest])
+        axes.plot(
+            np.full(curve.quantity.shape[1], curve.value[place]), curve.quantity[place], linestyle="none",
+            marker=marker, markersize=2.6, color=colour, markeredgewidth=0.0, zorder=6,
+        )  # fmt: skip
+    return {kind for _, kind in curve.marks}
 
 
 def entries(models: set[str], kinds: set[str], others: bool, attractor: bool) -> list[Artist]:

@@ -17,7 +17,6 @@ from walkerlab.figures.bifurcation_diagram import (
     draw_branch,
     entries,
     label_of,
-    mark_bifurcations,
 )
 from walkerlab.figures.canvas import blank, legend_above
 from walkerlab.figures.illustration import paper_figure
@@ -62,8 +61,7 @@ def draw(axes: Axes, results: Results, name: str) -> set[str]:
             colour = BLACK if model == "rigid" else GREY
             axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
     for branch in branches_of(results):
-        draw_branch(axes, branch, branch.group[name])
-        kinds |= mark_bifurcations(axes, results, branch, branch.group[name])
+        kinds |= draw_branch(axes, branch, name)
     return kinds
 
 

@@ -238,7 +238,7 @@ def follow_contact(asked: Question, progress: Progress) -> Followed:
 def beyond_flips(followed: Followed, asked: Question, samples: Samples, progress: Progress) -> Followed:
     """The attractor from before the first flip of a stable branch on, and the exponents along it."""
     begun = first_flip(followed.branches)
-    if begun is None or followed.step_map is None:
+    if begun is None or followed.step_map is None or asked.periods == 1:
         return followed
     flip, start = begun
     begin = max(asked.span.least, flip - BEFORE_FLIP * asked.span.size)
@@ -264,8 +264,10 @@ def with_others(followed: Followed, asked: Question, follower: Follower, progres
     if followed.step_map is None or not followed.attractors.found:
         return followed
     generator = np.random.default_rng(asked.config.seed)
-    found = followed.attractors.found
-    sampled = found[:: max(1, len(found) // OTHERS_AT)]
+    sampled = []
+    for chaotic in (False, True):
+        found = [one for one in followed.attractors.found if (one.period == 0) is chaotic]
+        sampled += found[:: max(1, len(found) // OTHERS_AT)]
     progress.start(f"continuation: other gaits of the {followed.model} model", len(sampled))
     seeds: list[Seed] = []
     for attractor in sampled:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
 from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
-from walkerlab.orbits.families import Branch
-from walkerlab.orbits.step_maps import Monitor
+from walkerlab.orbits.families import Branch, strike_to_strike
+from walkerlab.orbits.step_maps import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
 from walkerlab.store.content import Attribute, Group, Variable
 
@@ -158,7 +160,8 @@ def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation)
             for number, curve in enumerate(one.curves):
                 stored[f"{one.model}/curve_{number}"] = curve_group(curve, parameter, block.second)
         for number, branch in enumerate(one.branches):
-            stored[f"{one.model}/branch_{number}"] = branch_group(branch, one.step_map.monitors, parameter)
+            marks = [*birth_of(branch, one.branches), *marks_on(branch)]
+            stored[f"{one.model}/branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, parameter)
         rows = list(bifurcation_rows(one))
         if rows:
             stored[f"{one.model}/bifurcations"] = bifurcation_group(rows, parameter)
@@ -183,7 +186,51 @@ def overview(rows: Sequence[dict[str, Any]], parameter: Parameter) -> Group:
     )
 
 
-def branch_group(branch: Branch, monitors: Sequence[Monitor], parameter: Parameter) -> Group:
+class Mark(NamedTuple):
+    """A bifurcation among the points of a branch: after which point, and the steps of the gait there."""
+
+    after: int
+    kind: str
+    value: float
+    cycle: Cycle
+
+
+def marks_on(branch: Branch) -> list[Mark]:
+    """The bifurcations of a branch in their order along it."""
+    found = []
+    for one, segment in branch.segments:
+        ends = (segment.first.x, segment.second.x)
+        for index, pair in enumerate(pairwise(branch.points)):
+            if all(any(np.array_equal(point.solved.x, end) for end in ends) for point in pair):
+                found.append(Mark(index, one.kind, one.value, one.point.evaluated.data))
+    return sorted(found, key=lambda mark: mark.after)
+
+
+def birth_of(branch: Branch, branches: Sequence[Branch]) -> list[Mark]:
+    """The flip that a branch begins at: its parent's gait, twice."""
+    for parent in branches:
+        for one in parent.bifurcations:
+            if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
+                cycle = one.point.evaluated.data
+                return [Mark(-1, one.kind, one.value, replace(cycle, steps=(*cycle.steps, *cycle.steps)))]
+    return []
+
+
+def mark_variables(marks: Sequence[Mark], parameter: Parameter) -> dict[str, Variable]:
+    """Where on a branch its bifurcations are."""
+    along, steps = ("mark",), ("mark", "step")
+    periods = np.array([strike_to_strike(mark.cycle) for mark in marks])
+    angles = np.array([[step.angle for step in mark.cycle.steps] for mark in marks])
+    return {
+        "mark_after": Variable(np.array([m.after for m in marks]), along, "1", "point before a bifurcation; -1: none"),
+        "mark_kind": Variable(np.array([m.kind for m in marks]), along, "", "fold, flip or torus"),
+        "mark_value": Variable(np.array([m.value for m in marks]), along, parameter.unit, "where it is"),
+        "mark_step_period": Variable(periods, steps, "s", "durations of the steps there"),
+        "mark_stance_angle": Variable(angles, steps, "rad", "stance leg just after each heel strike there"),
+    }
+
+
+def branch_group(branch: Branch, marks: Sequence[Mark], monitors: Sequence[Monitor], parameter: Parameter) -> Group:
     """The gaits of a branch in their order along it."""
     points = branch.points
     multipliers = np.array([point.multipliers for point in points])
@@ -202,6 +249,8 @@ def branch_group(branch: Branch, monitors: Sequence[Monitor], parameter: Paramet
     for column, monitor in enumerate(monitors):
         values = np.array([point.monitors[column] for point in points])
         variables[monitor.name] = Variable(values, POINT, monitor.unit, monitor.meaning)
+    if marks:
+        variables |= mark_variables(marks, parameter)
     attrs: dict[str, Attribute] = {
         "period": branch.period,
         "begins": branch.ends[0].reason,
