@@ -55,6 +55,7 @@ class Stage:
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -72,6 +73,7 @@ class Stage:
     compiles_long: bool = False
     campaign_of: str = ""
     keeps_parts: bool = False
+    follows: bool = False
     does_without: Lacks = nothing
 
 
@@ -104,7 +106,7 @@ class Graph:
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
 PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "seed")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "continuation", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -177,12 +179,19 @@ PIPELINE = Graph(
         keeps_parts=True,
     ),
     Stage(
+        "continuation",
+        "walkerlab.stages.continuation",
+        "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
+        reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        follows=True,
+    ),
+    Stage(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune", "stability-maps"),
+        if_current=("accuracy", "tune", "stability-maps", "continuation"),
         draws=True,
     ),
     Stage(
@@ -191,7 +200,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("stability-maps",),
+        if_current=("stability-maps", "continuation"),
         draws=True,
     ),
 )
