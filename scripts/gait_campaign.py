@@ -15,10 +15,10 @@ import argparse
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
 from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker
 from walkerlab.solvers.registry import method_named
 
 FOLLOWED_ONLY = SearchSettings(random_starts=0)

@@ -213,7 +213,6 @@ def material(walker, foot, y):
 @njit
 def lane(walker, foot):
     """Where pad number 0 of a foot is centred: the swing foot starts a pitch behind the stance foot."""
-    """
     return 0.0 if foot == 1 else -walker.pitch
 
 

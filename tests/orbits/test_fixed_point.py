@@ -6,16 +6,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import SIGNALS
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
-from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, choice, find_gaits
+from walkerlab.hybrid.rigid_walk import EVENTS
+from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, choice
+from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
-from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, new_shooting, newton
+from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton
+from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.stepping import RHS
+
+
+def find_gaits(walker, *rest, **options):
+    return find_gaits_of_model(assembled(walker), *rest, **options)
+
+
+def new_shooting(walker, *rest, **options):
+    return new_shooting_of_model(assembled(walker), *rest, **options)
+
 
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 PRINTED = PAPER._replace(c21_sign=AS_PRINTED)
@@ -27,7 +38,7 @@ def on_slope(degrees, walker=PAPER):
 
 def shooting(walker):
     method = new_dop853(16, 1e-13, 1e-15, 10**5)
-    return new_shooting(walker, method, finder_for(method, SIGNALS))
+    return new_shooting(walker, method, finder_for(method, EVENTS))
 
 
 # from two other integrations of the same equations
@@ -108,7 +119,7 @@ def test_the_same_seed_draws_the_same_starts():
 
 
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
-    search = Search(PAPER, SearchSettings())
+    search = Search(assembled(PAPER), SearchSettings())
     work = []
     branch = Branch(search.looking, seeds(search.walker)[0])
     correct = branch._correct

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.mechanics.standing import on_slope
 from walkerlab.orbits.small_slope import Seed, Vector
 from walkerlab.orbits.step_map import Shooting, newton
 
@@ -63,7 +64,7 @@ class Branch:
         """Take the gait at s among the points, if Newton's method finds it near where it is expected."""
         expected = self._expected(s)
         z = self._state(s, expected)
-        shooting = self.shooting._replace(walker=self.shooting.walker._replace(slope=s**3))
+        shooting = self.shooting._replace(walker=on_slope(self.shooting.walker, s**3))
         status, period, residual, _ = newton(shooting, z, SLACK * s)
         if status != Outcome.WALKED or residual > 100.0 * SLACK * s:
             return False

@@ -29,7 +29,7 @@ from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import CompassWalker, Config, Contact
+    from walkerlab.config.schema import Config, Contact
 
 GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
 GAIT_BUDGET = 10_000_000  # right-hand sides
@@ -123,7 +123,7 @@ def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State)
     return find_gait_from(scene.walker, scene.ground, methods, start_state(scene, rigid_state))
 
 
-def compass_parts(walker: CompassWalker) -> CompassParts:
+def compass_parts(walker: Any) -> CompassParts:
     """The measures that the walker is assembled by."""
     return CompassParts(
         walker.leg_length_m,

@@ -8,7 +8,7 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.mechanics.rigid_compass import step_length
+from walkerlab.mechanics.standing import swing_foot
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
@@ -37,7 +37,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
         rigid_state, length = tuple(float(x) for x in gait.state), float(gait.step_length)
     else:
         rigid_state = config.start
-        length = abs(float(step_length(walker, rigid_state[1], rigid_state[0])))
+        length = abs(float(swing_foot(walker, rigid_state)[1]))
     own = own_pitch(config, length, rigid_state)
     if own is None:
         return None
