@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
@@ -16,6 +17,7 @@ from walkerlab.config.stability import Case, Stability
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Basin",
     "Case",
     "CompassWalker",
     "Config",
@@ -296,6 +298,7 @@ class Config(Block):
     solver: Solvers = Solvers()
     stability: Stability = Stability()
     tune: Tune = Tune()
+    basin: Basin = Basin()
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
