@@ -13,6 +13,7 @@ from walkerlab.figures import (
     figure_10,
     figure_11,
     figure_12,
+    figure_15,
     stability_maps,
 )
 from walkerlab.figures.illustration import Illustration
@@ -27,6 +28,7 @@ FIGURES: tuple[Illustration, ...] = (
     figure_10.FIGURE,
     figure_11.FIGURE,
     figure_12.FIGURE,
+    figure_15.FIGURE,
     *accuracy.FIGURES,
     *stability_maps.FIGURES,
 )

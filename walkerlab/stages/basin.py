@@ -38,6 +38,7 @@ from walkerlab.verification.processes import in_order
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
 DRAWN = 4_000  # starts from which attractors are sought
 SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
+FAILED = NONE - 1  # class of a cell that does not walk
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -59,15 +60,16 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
     pieces = cells_of(question, window)
     finish(pieces, "basin", progress, parts, jobs, clock)
     found = unpacked(np.concatenate([parts.kept[piece.name] for piece in pieces]))
-    classes = (found.outcome + 16 * found.attractor).reshape(window.cells)
-    edges = edge_cells(classes)
-    walking = (found.outcome == Outcome.WALKED).astype(float)
+    walked = found.outcome == Outcome.WALKED
+    edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
+    walking = walked.astype(float)
     if config.basin.refine > 1 and edges.size:
         pieces = edges_of(question, window, edges, config.basin.refine)
         finish(pieces, "basin: edges", progress, parts, jobs, clock)
         walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
     group = group_of(config.basin, window, found, walking)
-    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, gait))
+    aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
+    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, gait), aperiodic)
     said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
     return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
 
@@ -91,7 +93,8 @@ def finish(pieces: list[Piece], label: str, progress: Progress, parts: Parts, jo
     waiting = [piece for piece in pieces if piece.name not in parts.kept]
     progress.start(label, sum(piece.walks for piece in pieces))
     progress.advance(sum(piece.walks for piece in pieces if piece.name in parts.kept))
-    for piece, numbers in zip(waiting, in_order(waiting, jobs, (0,) if label == "basin" else ()), strict=True):
+    worth_sharing = sum(piece.walks for piece in waiting) >= waiting[0].question.shared_from if waiting else False
+    for piece, numbers in zip(waiting, in_order(waiting, jobs if worth_sharing else 1, (0,)), strict=True):
         parts.keep(piece.name, numbers)
         clock.walks += piece.walks
         progress.advance(piece.walks)
@@ -181,7 +184,7 @@ def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> 
 
 
 def summary(
-    config: Config, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]]
+    config: Config, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
     """What the command prints."""
     settings = config.basin
@@ -204,6 +207,7 @@ def summary(
         "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
         "outcomes": {Outcome(int(one)).label: int(many) for one, many in zip(numbers, counts, strict=True)},
         "attractors": attractors,
+        "aperiodic": aperiodic,
         "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == NONE))),
         "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
     }

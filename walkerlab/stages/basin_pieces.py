@@ -56,6 +56,7 @@ class RigidQuestion:
     steps: int
     cells_at_once: int = 10_000
     edges_at_once: int = 1_000
+    shared_from: int = 200_000  # walks that take longer than starting another process
 
     def walked(self, z: Floats) -> Found:
         """Walk from section coordinates z (n, 3), SI."""
@@ -71,6 +72,7 @@ class ContactQuestion:
     starts: ScaledStarts
     cells_at_once: int = 100
     edges_at_once: int = 10
+    shared_from: int = 500
 
     def walked(self, z: Floats) -> Found:
         """Walk from section coordinates z (n, 3), SI."""
