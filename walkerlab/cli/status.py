@@ -49,7 +49,7 @@ def state_of(step: Step) -> str:
         return "current" if step.found is not None and step.found.complete else "no answer"
     if step.damaged:
         return "damaged"
-    if step.stage.campaign_of:
+    if step.stage.optional:
         return "not run" if step.found is None else "outdated"
     return "missing" if step.found is None else "stale"
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
@@ -27,6 +28,7 @@ from walkerlab.config.walkers import (
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Basin",
     "Case",
     "CompassWalker",
     "Config",
@@ -249,6 +251,7 @@ class Config(Block):
     stability: Stability = Stability()
     tune: Tune = Tune()
     continuation: Continuation = Continuation()
+    basin: Basin = Basin()
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

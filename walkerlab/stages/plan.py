@@ -75,7 +75,7 @@ class Planner:
         for stage in stages:
             self.look_at_current(stage, stages)
             step = self.decide(stage)
-            if not (stage.campaign_of and step.action == "run"):  # a campaign is counted on once it is there
+            if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
                 self.expect(step)
             steps.append(step)
         return tuple(steps)
@@ -138,8 +138,9 @@ class Planner:
 
     def _why_absent(self, name: str) -> str:
         main = self.graph[name].campaign_of
-        if main:
-            return self.left_out.get(name, f"it was not asked for; `walkerlab {main} --full` makes it")
+        if self.graph[name].optional:
+            command = f"{main} --full" if main else name
+            return self.left_out.get(name, f"it was not asked for; `walkerlab {command}` makes it")
         return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
 
     def _why_left_out(self, stage: Stage) -> str | None:

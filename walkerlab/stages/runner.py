@@ -260,11 +260,11 @@ class Run:
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
         """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
 
-        A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
+        What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
         """
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
-        found = [entry for entry in found if not graph[entry.what].campaign_of]
+        found = [entry for entry in found if not graph[entry.what].optional]
         found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         entries = [*by_stage]
         for done in self.done:
