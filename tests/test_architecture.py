@@ -14,6 +14,7 @@ PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
 LAYERS = (
     "cli",
+    "sweeps",
     "stages",
     "report",
     "figures",

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
+from walkerlab.config.sweep import Sweep
 
 __all__ = [
     "METHODS",
@@ -31,6 +32,7 @@ __all__ = [
     "Solvers",
     "Stability",
     "State",
+    "Sweep",
     "Tune",
 ]
 
@@ -296,6 +298,7 @@ class Config(Block):
     solver: Solvers = Solvers()
     stability: Stability = Stability()
     tune: Tune = Tune()
+    sweep: Sweep | None = None
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
