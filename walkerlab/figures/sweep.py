@@ -20,7 +20,7 @@ MAP_HEIGHT: Final = 2.9
 MOST_PANELS: Final = 4
 MOST_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
-PREFERRED: Final = (
+PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "spectral_radius", "step_length_m", "steps", "mean_period_s", "slip_per_step_m", "max_penetration_m",
     "min_normal_force_N", "energy_drift_J", "end_time_s",
 )  # fmt: skip
@@ -68,10 +68,7 @@ def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, .
     """
     title = f"{stage} over {', '.join(parameters)}"
     with styled():
-        if len(dims) == 2:
-            figure = maps(group, parameters, names)
-        else:
-            figure = panels(group, parameters, dims, names)
+        figure = maps(group, parameters, names) if len(dims) == 2 else panels(group, parameters, dims, names)
         settle(figure)
         svg, png = svg_of(figure, f"sweep-{stage}", title), png_of(figure, title)
     return Drawn(svg, png, title, caption(group, dims, parameters, names))

@@ -24,6 +24,7 @@ from walkerlab.solvers.registry import finder_for
 RANDOM_START = "random start"
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
 SAME = 1e-5  # relative distance of states below which two searches found one gait
+UNITY = np.eye(3)
 # ranges of random starting values: angle between the legs (rad), both angular velocities (sqrt(g/L))
 LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0])
 
@@ -120,6 +121,7 @@ class Search:
         self.looking = new_shooting(self.walker, new_dop853(n, settings.rtol, settings.atol, budget), self.finder)
         solved = new_dop853(n, settings.solved_rtol, settings.solved_atol, budget)
         self.solving = new_shooting(self.walker, solved, self.finder)
+        self.at, self.ahead, self.slopes = b"", np.zeros(3), UNITY
 
     def follow_seeds(self) -> None:
         """Follow the gaits of the small-slope theory to the walker's slope."""
@@ -138,18 +140,28 @@ class Search:
             angle, omega_1, omega_2 = generator.uniform(LEAST_START, MOST_START)
             start = np.array([0.5 * angle - self.walker.slope, omega_1, omega_2])
             try:
-                solution = root(self.mismatch, start, jac=True, options={"maxfev": 60})
+                # Most starts take no step at all: known before the solver is set up.
+                self.mismatch(start)
+                solution = root(self.mismatch, start, jac=self.derivative, options={"maxfev": 60})
             except NoStep:
                 continue
             if solution.success:
                 self.keep(solution.x, RANDOM_START)
 
-    def mismatch(self, z: Vector) -> tuple[Vector, Vector]:
-        """P(z) - z and its derivative."""
-        status, _ = evaluate(self.looking, z)
-        if status != Outcome.WALKED:
-            raise NoStep
-        return self.looking.z_next - z, self.looking.DP - np.eye(3)
+    def mismatch(self, z: Vector) -> Vector:
+        """P(z) - z; the derivative comes with it, and both are kept for the next question about the same z."""
+        if z.tobytes() != self.at:
+            self.at = b""
+            status, _ = evaluate(self.looking, z)
+            if status != Outcome.WALKED:
+                raise NoStep
+            self.at, self.ahead, self.slopes = z.tobytes(), self.looking.z_next - z, self.looking.DP - UNITY
+        return self.ahead.copy()
+
+    def derivative(self, z: Vector) -> Vector:
+        """The derivative of P(z) - z."""
+        self.mismatch(z)
+        return self.slopes.copy()
 
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""

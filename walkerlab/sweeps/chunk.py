@@ -173,7 +173,7 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: 
     variables["wall_s"] = Variable(walls, ("point",), "s", "time it took", timing=True)
     labels = {name: list(label) for name, label in chunk.labels.items()}
     content = Content({"points": Group(variables)}, {"labels": labels})
-    name = stored_name(stage, code_digest, texts["key"])
+    name = stored_name(stage, code_digest, [row.key for row in rows])
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
     path = folder.path / FOLDER / name
     path.parent.mkdir(exist_ok=True)

@@ -42,10 +42,11 @@ class Column:
         if array.ndim != self.values.ndim - 1:
             return  # a list where others have a number says something else
         self._make_room(array.shape)
-        self.values[(place, *(slice(0, length) for length in array.shape))] = array
+        own: tuple[Any, ...] = (place, *(slice(0, length) for length in array.shape))
+        self.values[own] = array
 
     def _make_room(self, shape: tuple[int, ...]) -> None:
-        grown = tuple(max(pair) for pair in zip(self.values.shape[1:], shape, strict=True))
+        grown = tuple(max(old, new) for old, new in zip(self.values.shape[1:], shape, strict=True))
         if grown != self.values.shape[1:]:
             old = self.values
             self.values = np.full((len(old), *grown), np.nan)
