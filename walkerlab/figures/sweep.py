@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import blank, png_of, settle, styled, svg_of
-from walkerlab.figures.style import BLACK, BLUE, GREY, VERMILLION, WIDTH
+from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
 from walkerlab.store.content import Group, Variable
 
 PANEL_HEIGHT: Final = 1.9
@@ -26,6 +27,7 @@ PREFERRED: Final[tuple[str, ...]] = (
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
 LABELS: Final = {RADIUS: "largest multiplier (1)"}
+WHITE: Final = "#FFFFFF"
 LOG_SPAN: Final = 50.0
 """Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
 
@@ -93,10 +95,11 @@ def words(variable: Variable) -> str:
 
 
 def label(group: Group, name: str) -> str:
-    """A variable's axis: what it is, and its unit."""
-    variable = group.variables[name]
-    text = LABELS.get(name, f"{words(variable)} ({variable.units or '1'})")
-    return text if len(text) <= 34 else f"{name.rpartition('.')[2].replace('_', ' ')} ({variable.units or '1'})"
+    """A variable's axis: its name in words, and its unit."""
+    unit = group.variables[name].units or "1"
+    ending = re.sub(r"[^A-Za-z0-9]+", "_", unit.replace("^", ""))
+    spoken = name.rpartition(".")[2].removesuffix(f"_{ending}").replace("_", " ")
+    return LABELS.get(name, f"{spoken} ({unit})")
 
 
 def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
@@ -184,7 +187,7 @@ def draw_map(figure: Figure, axes: Axes, group: Group, parameters: Sequence[str]
     mesh = axes.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
     figure.colorbar(mesh, ax=axes, label=label(group, name))
     if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
-        axes.contour(across, up, values, levels=[1.0], colors=BLACK, linewidths=1.0)
+        axes.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
     for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
         getattr(axes, f"set_{axis}label")(label(group, parameter))
         if is_logarithmic(scale):
