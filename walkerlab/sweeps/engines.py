@@ -74,7 +74,9 @@ def local(order: Order) -> Iterator[Pool]:
         # Loaded once, by the process that all workers are forked from.
         context.set_forkserver_preload(["walkerlab.sweeps.chunk", *order.modules])
     with one_thread_each():
-        executor = ProcessPoolExecutor(workers, context, initializer=begin_worker, initargs=(order.modules,))
+        # The server that workers are forked from may be older than what the environment says now.
+        given = (order.modules, dict(os.environ))
+        executor = ProcessPoolExecutor(workers, context, initializer=begin_worker, initargs=given)
         try:
             yield Pool(executor, workers)
         finally:
@@ -96,10 +98,11 @@ def one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def begin_worker(modules: tuple[str, ...]) -> None:
+def begin_worker(modules: tuple[str, ...], environment: Mapping[str, str]) -> None:
     """End with the process that began this one, and load what chunks need; an interrupt is the other's to deal with."""
     import signal
 
+    os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with_parent, daemon=True).start()
     for module in modules:

@@ -179,7 +179,15 @@ def axis(key: str, values: Any, source: str) -> Axis:
         raise refusal(
             [Problem(Position(source, 1, 1), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
         )
-    return Axis(key, spaced(low, high, count, logarithmic), source, (low, high))
+    return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
+
+
+def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
+    """Whole numbers as integers where a key takes nothing else; what is not whole is left for the schema to refuse."""
+    field = next((field for path, field in leaves(Config) if ".".join(path) == key), None)
+    if field is None or field.annotation is not int:
+        return tuple(values)
+    return tuple(int(value) if value.is_integer() else value for value in values)
 
 
 def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
@@ -235,7 +243,7 @@ def drawn(one: Axis, column: Any) -> Iterator[Value]:
     """The values of one parameter for numbers from 0 to 1."""
     for share in column.tolist():
         if one.ends is not None:
-            yield one.ends[0] + share * (one.ends[1] - one.ends[0])
+            yield from as_the_key_has_it(one.key, [one.ends[0] + share * (one.ends[1] - one.ends[0])])
         else:
             yield one.values[min(int(share * len(one.values)), len(one.values) - 1)]
 
