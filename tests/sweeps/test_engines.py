@@ -92,7 +92,7 @@ def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_
     script.write_text(SWEEPER)
     command = [sys.executable, str(script), str(toy.runs)]
     chunks = toy.runs / "paper" / "sweep-chunks"
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 90.0
     while not (chunks.is_dir() and len(list(chunks.glob("*.h5"))) >= 3) and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -21,8 +21,8 @@ LEAST_CHUNK_S: Final = 0.5
 LARGEST_CHUNK: Final = 5000
 SHARES: Final = 3
 """A chunk is at most this part of what is left to a worker, so that all end together."""
-MOST_DEATHS: Final = 20
-"""Deaths in a row, with no point computed between, after which it is the machine and not the points."""
+MOST_DEATHS: Final = 12
+"""Deaths before any chunk has come back, after which it is the machine and not the points."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,7 @@ class FanOut:
         self._again: deque[Try] = deque()
         self._running: dict[Future[Chunk], Try] = {}
         self._deaths = 0
+        self._alive = False
 
     def run(self, graph: str, target: str, keep: Callable[[Chunk], None]) -> None:
         """Compute all points and hand each chunk to `keep`; points that could not be computed come as failed rows.
@@ -122,7 +123,7 @@ class FanOut:
         return broken
 
     def _arrived(self, chunk: Chunk) -> None:
-        self._deaths = 0
+        self._alive = True
         wall = sum(row.wall_s for row in chunk.rows)
         # The first points also load the compiled code; the last ones tell better what the next will take.
         latest = max(1e-6, chunk.rows[-1].wall_s if self.point_s is None else wall / len(chunk.rows))
@@ -133,7 +134,7 @@ class FanOut:
         """Try a chunk again, then split it, then give its point up."""
         self._deaths += 1
         said = f"{type(error).__name__}: {error}"
-        if self._deaths > MOST_DEATHS:
+        if self._deaths > MOST_DEATHS and not self._alive:
             raise NoAnswer(
                 f"no worker lives: {said}",
                 "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
@@ -147,7 +148,6 @@ class FanOut:
             self._again.append(again)
         else:
             self.point_s = self.point_s or 1.0
-            self._deaths = 0
             key = one.task.keys[0][self.target]
             self.keep(Chunk((Row(key, "failed", f"its worker died: {said}", {}),), {}))
 
