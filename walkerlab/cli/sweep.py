@@ -36,7 +36,7 @@ EngineName = Annotated[
 ]
 EngineOptions = Annotated[
     list[str] | None,
-    typer.Option("--engine-option", metavar="NAME=VALUE", help="Of slurm: partition, timeout_min, cluster, ..."),
+    typer.Option("--engine-option", metavar="NAME=VALUE", help="Of slurm: slurm_partition, timeout_min, cluster, ..."),
 ]
 Jobs = Annotated[
     int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; default: all cores, of slurm 16.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -35,7 +36,8 @@ class Column:
     def put(self, place: int, value: Any) -> None:
         """Take one result's value; one that has another shape than those so far makes room for itself."""
         if self.text:
-            self.values[place] = str(value)
+            # of many equal texts one is kept
+            self.values[place] = sys.intern(value)
             return
         array = np.asarray(value, float)
         self.kinds.update(types_in(value))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,6 @@ class Merge:
         self.columns = Columns(size)
         self.own = {name: np.full(size, "", object) for name in OWN}
         self.there = np.zeros(size, bool)
-        self._texts: dict[str, str] = {}
 
     def put(self, place: int, row: Row) -> None:
         """Take one result's row."""
@@ -45,8 +45,7 @@ class Merge:
         summary = dict(row.summary)
         outcome = summary.pop("outcome", None) or OUTCOMES[row.status]
         for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
-            # of many equal texts one is kept
-            self.own[name][place] = self._texts.setdefault(text, text)
+            self.own[name][place] = sys.intern(text)
         self.columns.put(place, summary)
 
     def put_all(self, chunk: Chunk, places: Mapping[str, int]) -> None:
