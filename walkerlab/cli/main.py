@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import housekeeping
+from walkerlab.cli import housekeeping, runs, sweep
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -51,6 +51,8 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     for stage in graph.stages:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
+    sweep.add_to(app, graph)
+    runs.add_to(app, graph)
     return app
 
 

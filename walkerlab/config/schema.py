@@ -14,6 +14,7 @@ from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
+from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
     LIGHTEST_CONTACT,
     CompassWalker,
@@ -48,6 +49,7 @@ __all__ = [
     "Stability",
     "State",
     "StraightLegs",
+    "Sweep",
     "Tune",
     "Walker",
 ]
@@ -252,6 +254,7 @@ class Config(Block):
     tune: Tune = Tune()
     continuation: Continuation = Continuation()
     basin: Basin = Basin()
+    sweep: Sweep | None = None
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
