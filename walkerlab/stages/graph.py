@@ -101,7 +101,7 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "seed")
+EVERYTHING = ("name", "source", *MODEL, "contact", "solver", "tune", "stability", "seed")
 
 PIPELINE = Graph(
     Stage(
