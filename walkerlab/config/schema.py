@@ -254,9 +254,13 @@ class Tune(Block):
 class Source(Block):
     """The study that a config redoes, as the report names it."""
 
-    title: Annotated[str, key("", "title of the study", "this project", bounds="any text, not empty"), Field(min_length=1)]
+    title: Annotated[
+        str, key("", "title of the study", "this project", bounds="any text, not empty"), Field(min_length=1)
+    ]
     authors: Annotated[str | None, key("", "its authors", "this project", bounds="any text")] = None
-    published: Annotated[str | None, key("", "where and when it was published", "this project", bounds="any text")] = None
+    published: Annotated[str | None, key("", "where and when it was published", "this project", bounds="any text")] = (
+        None
+    )
     url: Annotated[
         str | None,
         key("", "where it can be read", "this project", bounds="an address that begins with http:// or https://"),

@@ -127,4 +127,6 @@ FIGURE = paper_figure(
     (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID),
     caption,
     plot,
+    "Four plots over time on logarithmic axes, one for each leg's angle and velocity: the difference at the same time, "
+    "that at the same phase, and the paper's largest as a dotted line.",
 )

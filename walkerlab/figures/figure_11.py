@@ -118,4 +118,8 @@ def caption(results: Results) -> str:
     )
 
 
-FIGURE = paper_figure(11, "Starts that walk", (MAP,), caption, plot)
+SEEN = (
+    "Two maps of scaled starts, one a model, coloured by how the walk from each ends, with marks for the rigid start, "
+    "the adjusted one and the contact gait."
+)
+FIGURE = paper_figure(11, "Starts that walk", (MAP,), caption, plot, SEEN)

@@ -1,4 +1,4 @@
-"""A walk as the page's player moves it: where the joints are, the ground's forces, slip and energies, thinned in time."""
+"""A walk as the page's player moves it: joints, the ground's forces, slip and energies, thinned in time."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def player(results: Results, tracks: dict[str, Track]) -> Block:
         leg_m=length,
         foot_radius_m=float(getattr(config.walker, "foot_radius_m", 0.0)),
         torso_m=0.0 if torso is None else float(torso.above_hip_m),
-        weight_N=weight(tracks, length),
+        ordinary_force=weight(tracks),
         closeup_m=closeup(tracks, length),
         pads=pads(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
@@ -89,7 +89,13 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
     times: Any = np.array([0.0, *strikes])
     wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
-    names = ["f0", *(["k0"] if "kx0" in track.channels else []), "h", *(["k1"] if "kx1" in track.channels else []), "f1"]
+    names = [
+        "f0",
+        *(["k0"] if "kx0" in track.channels else []),
+        "h",
+        *(["k1"] if "kx1" in track.channels else []),
+        "f1",
+    ]
     return tuple(tuple(point(track, name, int(row)) for name in names) for row in rows)
 
 
@@ -99,10 +105,10 @@ def point(track: Track, name: str, row: int) -> tuple[int, int]:
     return round(1000 * float(track[f"{joint}x{leg}"][row])), -round(1000 * float(track[f"{joint}y{leg}"][row]))
 
 
-def weight(tracks: dict[str, Track], length: float) -> float:
-    """A force to scale arrows by (N): what the ground carries in the mean; the length of a leg if forces are unknown."""
+def weight(tracks: dict[str, Track]) -> float:
+    """A force to scale arrows by (N): what the ground carries most of the time; any number if forces are unknown."""
     loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
-    return max((load for load in loads if load > 0.0), default=length)
+    return max((load for load in loads if load > 0.0), default=1.0)
 
 
 def closeup(tracks: dict[str, Track], length: float) -> float:
@@ -152,6 +158,7 @@ def alt(results: Results, stages: tuple[str, ...]) -> str:
         f"the {MODELS[stage].lower()} takes {len(results.stored[stage].summary['step_periods_s'])} steps"
         for stage in stages
     ]
-    return f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: " + "; ".join(
-        walked
+    return (
+        f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: "
+        + "; ".join(walked)
     )
