@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import PAPER, Cell, Column, Finding, Findings, Section, Table, Tone, body
+from walkerlab.report.blocks import PAPER, Cell, Column, Finding, Findings, Paragraph, Section, Table, Tone, body
 from walkerlab.report.numbers import NONE, count, listed, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
@@ -50,7 +50,16 @@ def section(results: Results) -> Section | None:
     told = Findings(
         tuple(Finding(f"{name.capitalize()}:", MEANINGS[name], tone=TONES[name]) for name in MEANINGS), "lines"
     )
-    return Section("paper-numbers", "The paper’s numbers", (told, numbers), finding, PAPER)
+    return Section("paper-numbers", "The paper’s numbers", (*departures(results), told, numbers), finding, PAPER)
+
+
+def departures(results: Results) -> tuple[Paragraph, ...]:
+    """How the scene differs from the paper's; nothing if it does not."""
+    if not results.departures:
+        return ()
+    differs = in_signs("; ".join(str(departure) for departure in results.departures))
+    said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
+    return (Paragraph(said, "fair"),)
 
 
 def paper_numbers(results: Results) -> Sequence[Mapping[str, Any]]:
