@@ -96,6 +96,10 @@ def test_conclusions_stand_beside_their_scenes(made):
     ]
 
 
+def test_the_section_comes_to_the_fastest_methods(made):
+    assert made.finding == "Fastest: dop853 on rigid; radau5 on contact."
+
+
 def test_references_come_with_what_is_known_of_them(made):
     assert tables(made)["References"]["", "rigid"] == ["heyoka-taylor", "dop853", "9 × 10⁻¹⁶"]
 

@@ -9,8 +9,8 @@ SUBSCRIPTS = str.maketrans("0123456789+-aehijklmnoprstuvx", "₀₁₂₃₄₅�
 SUPERSCRIPTS = str.maketrans("0123456789+-en", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ᵉⁿ")
 DOT = "\u0307"
 
-POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b")
-"""A number as programs print it, such as 1.1e-09."""
+POWER = re.compile(r"(?<![\w.])(?<!\w-)(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b")
+"""A number as programs print it, such as 1.1e-09; not the end of a name such as k-1e8."""
 
 
 CARET = re.compile(r"(?<=\d)\^(-?\d+)\b")

@@ -40,7 +40,16 @@ def section(results: Results) -> Section | None:
     blocks = (Paragraph(introduction(summary)), Findings(tuple(findings)), costs, references(summary))
     drawn = [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")]
     tables = (*blocks, *drawn, *not_run(summary))
-    return Section("accuracy", "Error against run time", tables, findings[0].text, COSTS)
+    return Section("accuracy", "Error against run time", tables, fastest(summary), COSTS)
+
+
+def fastest(summary: Mapping[str, Any]) -> str:
+    """The fastest methods of each scene, in one sentence."""
+    scenes: dict[str, list[str]] = {}
+    for scene, best in summary["best"].items():
+        scenes.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
+    said = "; ".join(f"{methods} on {listed(found)}" for methods, found in scenes.items() if methods)
+    return f"Fastest: {said}." if said else ""
 
 
 def levels_of(summary: Mapping[str, Any]) -> list[float]:

@@ -32,7 +32,7 @@ WAITED_FOR = {
 def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
     """Links to the other pages, each with what it comes to, and what will be there."""
     items = tuple(
-        (file, title, brief(one.finding for one in elsewhere if one.page == file))
+        (file, title, brief(on(file, elsewhere)))
         for file, title in TITLES.items()
         if any(one.page == file for one in elsewhere)
     )
@@ -41,9 +41,9 @@ def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
     return Section("further", "Further pages", tuple(blocks)) if blocks else None
 
 
-def brief(findings: Iterable[str]) -> str:
-    """What a page comes to: of each finding what stands before its first semicolon."""
-    return " ".join(f"{found.partition('; ')[0].rstrip('.')}." for found in findings if found)
+def brief(sections: Iterable[Section]) -> str:
+    """What a page comes to, in a sentence for each of its sections."""
+    return " ".join(section.finding for section in sections if section.finding)
 
 
 def on(page: str, sections: Sequence[Section]) -> tuple[Section, ...]:
