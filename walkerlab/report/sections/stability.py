@@ -68,8 +68,8 @@ def judgement() -> Paragraph:
     judged = (
         "A case passes if it ends as expected, within its budget of right-hand sides, with finite numbers, its energy "
         "balanced, nothing won back from friction or damping, momentum kept at rigid heel strikes and elsewhere given "
-        "by ground and gravity, and the same times at a tolerance ten times tighter and by another method; walkers of other "
-        "sizes also agree with a twin of ordinary size."
+        "by ground and gravity, and the same times at a tolerance ten times tighter and by another method; walkers of "
+        "other sizes also agree with a twin of ordinary size."
     )
     return Paragraph(judged)
 
@@ -86,9 +86,9 @@ def maps(results: Results) -> Paragraph:
     fixed = listed(f"{many} {name}" for name, many in summary["fixed_step"].items())
     return Paragraph(
         f"Two of the figures map whole planes. Over stiffness and stiction velocity the default method’s walks ended: "
-        f"{ends}; {summary['ends_otherwise_sharper']} end otherwise at a tolerance ten times tighter, the others differ by "
-        f"{number(summary['median_error'], 2)} in the median and {number(summary['largest_error'], 2)} at most. Over "
-        f"stiffness and step size a game engine’s method was: {fixed}."
+        f"{ends}; {summary['ends_otherwise_sharper']} end otherwise at a tolerance ten times tighter, the others "
+        f"differ by {number(summary['median_error'], 2)} in the median and {number(summary['largest_error'], 2)} at "
+        f"most. Over stiffness and step size a game engine’s method was: {fixed}."
     )
 
 

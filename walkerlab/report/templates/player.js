@@ -84,7 +84,7 @@ function force(c, scene, track, leg, x, y, unit, most) {
 
 function drawWalk(picture, scene, tracks, colours) {
   const { context: c, width, height } = picture;
-  const scale = (0.66 * height) / scene.leg_m;
+  const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
   const hip = tracks.reduce((sum, track) => sum + track.at("hx"), 0) / tracks.length;
   const place = picture.place = (x, y) => [
@@ -137,15 +137,17 @@ function drawWalker(picture, scene, track, colours, scale, index) {
   c.globalAlpha = track.over ? 0.35 : index === 0 && !track.alone ? 0.75 : 1;
   for (const leg of [1, 0]) {
     const bent = track.has(`kx${leg}`);
-    const line = bent ? ["h", `k${leg}`, `f${leg}`] : ["h", `f${leg}`];
     c.strokeStyle = c.fillStyle = colours[track.style];
     const path = new Path2D();
-    for (const name of line) path.lineTo(...joint(name));
+    for (const name of bent ? ["h", `k${leg}`] : ["h"]) path.lineTo(...joint(name));
+    // The sole is where the leg's own direction meets the foot's arc.
+    const [x, y] = place(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
+    const radius = scale * scene.foot_radius_m;
+    const down = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
+    path.lineTo(x + radius * Math.cos(down), y + radius * Math.sin(down));
     if (scene.foot_radius_m > 0.01 * scene.leg_m) {
-      const [x, y] = place(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
-      const middle = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
-      path.moveTo(x + scale * scene.foot_radius_m * Math.cos(middle - 0.6), y + scale * scene.foot_radius_m * Math.sin(middle - 0.6));
-      path.arc(x, y, scale * scene.foot_radius_m, middle - 0.6, middle + 0.6);
+      path.moveTo(x + radius * Math.cos(down - 0.6), y + radius * Math.sin(down - 0.6));
+      path.arc(x, y, radius, down - 0.6, down + 0.6);
     }
     c.lineWidth = broad;
     c.stroke(path);
@@ -383,7 +385,7 @@ function play(root) {
   const strikes = [0, ...tracks[tracks.length - 1].strikes, end];
   const [walk, foot] = [
     new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
-    new Picture(find(".foot"), () => 0.8),
+    new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
   ];
   const [slider, clock, button] = [find(".time"), find(".clock"), find(".play")];
   const close = tracks[tracks.length - 1];
@@ -536,7 +538,11 @@ function makeReadout(table, tracks) {
     heading.scope = "row";
     heading.textContent = said;
     row.append(heading);
-    return tracks.map((track) => [track, name, row.insertCell()]);
+    return tracks.map((track) => {
+      const cell = row.insertCell();
+      cell.className = track.style;
+      return [track, name, cell];
+    });
   });
   return () => {
     for (const [track, name, cell] of cells.flat()) cell.textContent = track.has(name) ? minus(track.at(name).toFixed(4)) : "–";
