@@ -113,7 +113,7 @@ class Graph:
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
 PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "continuation", "basin", "seed")
+EVERYTHING = ("name", "source", *MODEL, "contact", "solver", "tune", "stability", "continuation", "basin", "seed")
 
 PIPELINE = Graph(
     Stage(

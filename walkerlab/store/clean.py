@@ -11,7 +11,7 @@ from walkerlab.store.files import TEMPORARY, storing
 from walkerlab.store.index import indexed_files
 from walkerlab.store.runfolder import RunFolder
 
-DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html")
+DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """What the drawing stages write, for the case that the index of it is gone."""
 SWEPT = ("sweep-*.h5", "sweep-*.csv", "sweep-chunks/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
