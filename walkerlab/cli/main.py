@@ -1,6 +1,7 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
 import inspect
+import os
 from collections.abc import Callable
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from walkerlab.cli.options import (
     Full,
     Jobs,
     NoWait,
+    Open,
     Quiet,
     Runs,
     Sets,
@@ -72,11 +74,12 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         sets: Sets = None,
         strides: Strides = None,
         runs: Runs = RUNS,
-        jobs: Jobs = 1,
+        jobs: Jobs = None,
         full: Full = False,
         force: Force = False,
         dry_run: DryRun = False,
         no_wait: NoWait = False,
+        open_page: Open = False,
         as_json: AsJson = False,
         quiet: Quiet = False,
         verbose: Verbose = False,
@@ -86,10 +89,16 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
-            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=jobs, full=full)
+            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose, open_page)
+            cores = jobs or all_cores()
+            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=cores, full=full)
 
-    meant = {"strides": stage.walks, "jobs": uses_jobs(stage, graph), "full": bool(graph.campaigns_of(stage.name))}
+    last = stage is graph.stages[-1]
+    meant = {
+        "strides": stage.walks or last,
+        "full": bool(graph.campaigns_of(stage.name)),
+        "open_page": last,
+    }
     meaningless = {name for name, has in meant.items() if not has}
     signature = inspect.signature(command)
     options = [option for name, option in signature.parameters.items() if name not in meaningless]
@@ -97,6 +106,6 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
     return command
 
 
-def uses_jobs(stage: Stage, graph: Graph) -> bool:
-    """Whether a stage has independent cells, or runs stages that have."""
-    return stage.has_cells or (stage is graph.stages[-1] and any(other.has_cells for other in graph.stages))
+def all_cores() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -17,7 +17,11 @@ Runs = Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all
 Strides = Annotated[
     int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
 ]
-Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Processes for independent cells.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."),
+]
+Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")]
 Full = Annotated[bool, typer.Option("--full", help="Run the long campaign too; interrupted, it goes on the next time.")]
 Force = Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would happen and why; touch nothing.")]

@@ -29,11 +29,12 @@ class Request:
     as_json: bool = False
     quiet: bool = False
     verbose: bool = False
+    open_page: bool = False
 
     @cached_property
     def console(self) -> Console:
         """Where messages go."""
-        return Console(self.quiet, self.verbose)
+        return Console(self.quiet, self.verbose, self.open_page)
 
     @cached_property
     def loaded(self) -> LoadedConfig:

@@ -54,6 +54,8 @@ class Stage:
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
+    alone          whether it measures times, and so runs with nothing beside it
+    early_with     the results with which it is worth drawing while others are still being computed
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -70,6 +72,8 @@ class Stage:
     compiles_long: bool = False
     campaign_of: str = ""
     keeps_parts: bool = False
+    alone: bool = False
+    early_with: tuple[str, ...] = ()
     does_without: Lacks = nothing
 
 
@@ -154,6 +158,7 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         has_cells=True,
+        alone=True,
     ),
     Stage(
         "stability",
@@ -188,6 +193,7 @@ PIPELINE = Graph(
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
         if_current=("stability-maps",),
         draws=True,
+        early_with=("fixedpoint", "simulate", "contact-sim"),
     ),
 )
 STAGES = PIPELINE.stages
