@@ -27,6 +27,7 @@ class Console:
         self.verbose = verbose
         self.open_page = open_page
         self.running: list[StageLine] = []
+        self.shown = False
         self._drawn = False
         self._live: Live | None = None
         self._said_at = time.monotonic()
@@ -67,7 +68,7 @@ class Console:
         if self.open_page:
             from walkerlab.cli.browser import open_file
 
-            open_file(path, self)
+            self.shown = open_file(path, self)
 
     def refresh(self) -> None:
         """Draw the bars anew, where there are any."""
@@ -198,11 +199,13 @@ class StageLine:
 
     def seconds_left(self) -> float | None:
         """By the rate of the piece of work, or by how long the stage took the last time; None if nobody knows."""
-        computed = time.monotonic() - self.work_began - self.compiled_s
+        now = time.monotonic()
+        compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
+        computed = now - self.work_began - compiled
         if self.total and self.done:
             return computed / self.done * (self.total - self.done)
         if self.expected_s is not None:
-            return max(0.0, self.expected_s - (time.monotonic() - self.began))
+            return max(0.0, self.expected_s - (now - self.began))
         return None
 
     def said(self) -> str:

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -10,16 +11,22 @@ import typer
 
 from walkerlab.errors import StoppedError, WalkerlabError
 
+ADVISED = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
+"""A command in a text, unless it is about no run."""
+
 
 @contextlib.contextmanager
-def exit_on_failure(command: str, as_json: bool) -> Iterator[None]:
-    """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too."""
+def exit_on_failure(command: str, as_json: bool, typed: str = "") -> Iterator[None]:
+    """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too.
+
+    typed  the options of the command that say which run it is about: advice has them too
+    """
     try:
         yield
     except WalkerlabError as error:
         if as_json:
             print_json(failed(command, error))
-        say(error)
+        say(error, typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "Stages that were finished are kept; the same command does the rest.")
@@ -29,11 +36,16 @@ def exit_on_failure(command: str, as_json: bool) -> Iterator[None]:
         raise typer.Exit(stopped.exit_code) from None
 
 
-def say(error: WalkerlabError) -> None:
+def say(error: WalkerlabError, typed: str = "") -> None:
     """Print a failure and what to do about it on stderr."""
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
-        print(f"advice: {error.advice}", file=sys.stderr)
+        print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
+
+
+def to_type_back(text: str, typed: str) -> str:
+    """A text with the options that say which run it is about in the commands that it advises."""
+    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
 def failed(command: str, error: WalkerlabError) -> dict[str, Any]:

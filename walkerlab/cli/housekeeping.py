@@ -18,6 +18,7 @@ from walkerlab.cli.options import (
     Strides,
     Verbose,
     Yes,
+    typed_options,
 )
 from walkerlab.stages.graph import Graph
 
@@ -38,7 +39,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         verbose: Verbose = False,
     ) -> None:
         """Say of each stage whether its result is current, and if not, why."""
-        with exit_on_failure("status", as_json):
+        with exit_on_failure("status", as_json, typed_options(config, sets, strides, runs)):
             from walkerlab.cli.request import Request
             from walkerlab.cli.status import print_status
 
@@ -58,7 +59,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Print what is stored of a stage: summary, arrays, and where it comes from."""
         if stage not in names:
             raise typer.BadParameter(f"{stage!r} is no stage; there are {', '.join(names)}.", param_hint="STAGE")
-        with exit_on_failure(stage, as_json):
+        with exit_on_failure(stage, as_json, typed_options(config, sets, strides, runs)):
             from walkerlab.cli.request import Request
             from walkerlab.cli.show import print_stored
 
@@ -89,7 +90,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         verbose: Verbose = False,
     ) -> None:
         """Remove the results of a run, and what killed runs left; other files stay."""
-        with exit_on_failure("clean", as_json):
+        with exit_on_failure("clean", as_json, typed_options(config, sets, strides, runs)):
             from walkerlab.cli.clean import clean_run
             from walkerlab.cli.request import Request
 

@@ -25,6 +25,7 @@ from walkerlab.cli.options import (
     Sets,
     Strides,
     Verbose,
+    typed_options,
 )
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
@@ -84,7 +85,7 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> None:
-        with exit_on_failure(stage.name, as_json):
+        with exit_on_failure(stage.name, as_json, typed_options(config, sets, strides, runs)):
             # Imported here: help loads neither a config nor an array.
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage

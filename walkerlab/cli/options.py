@@ -1,5 +1,7 @@
-"""The options, each declared once."""
+"""The options, each declared once, and how they are typed again."""
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -33,3 +35,13 @@ Check = Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 
 RUNS = Path("runs")
+
+
+def typed_options(config: Path | None, sets: Sequence[str] | None, strides: int | None, runs: Path) -> str:
+    """The options that say which run is meant, each with a blank before it; none if it is that of the paper config."""
+    words = [] if config is None else ["-c", str(config)]
+    for setting in sets or ():
+        words += ["--set", setting]
+    words += [] if strides is None else ["--set", f"strides={strides}"]
+    words += [] if runs == Path("runs") else ["--runs", str(runs)]
+    return "".join(f" {shlex.quote(word)}" for word in words)

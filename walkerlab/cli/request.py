@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from walkerlab.cli.console import Console
+from walkerlab.cli.options import typed_options
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
@@ -35,6 +36,11 @@ class Request:
     def console(self) -> Console:
         """Where messages go."""
         return Console(self.quiet, self.verbose, self.open_page)
+
+    @property
+    def typed(self) -> str:
+        """The options that say which run it is, as they can be typed again."""
+        return typed_options(self.config, self.sets, self.strides, self.runs)
 
     @cached_property
     def loaded(self) -> LoadedConfig:

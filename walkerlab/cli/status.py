@@ -37,7 +37,7 @@ def print_status(request: Request, graph: Graph, check: bool) -> None:
         print(f"{folder.path}:")
         print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), s.reason] for s in steps)])))
     if check and error is not None:
-        say(error)
+        say(error, request.typed)
         raise typer.Exit(error.exit_code)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 import importlib
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,7 @@ class StageReport:
     summary    of the result; empty if there is none
     steps      what was done with each stage
     no_answer  message and advice, if the computation has no answer or the drawing had to do without one
+    results    the summaries of all stages on the way that have a result
     """
 
     stage: str
@@ -63,6 +64,7 @@ class StageReport:
     summary: dict[str, Any]
     steps: tuple[Done, ...]
     no_answer: NoAnswer | None = None
+    results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
 def execute(
@@ -331,6 +333,7 @@ class Run:
             summary=summary,
             steps=tuple(self.done),
             no_answer=self._no_answer(summary.get("no_answer")),
+            results={name: dict(one.summary) for name, one in self.planner.results.items() if one.complete},
         )
 
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
