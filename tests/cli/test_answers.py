@@ -42,7 +42,11 @@ def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
 
 
 def test_a_walker_with_more_angles_has_its_own_names():
-    kneed = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2], "state_names": ["hip", "knee", "foot", "dhip", "dk", "df"]}
+    kneed = {
+        **GAIT,
+        "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2],
+        "state_names": ["hip", "knee", "foot", "dhip", "dk", "df"],
+    }
     text = "\n".join(answer("fixedpoint", kneed))
     assert "knee" in text
     assert "0.300000" in text

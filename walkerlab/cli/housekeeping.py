@@ -66,15 +66,18 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             print_stored(Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose), graph, stage)
 
     @app.command()
-    def schema(as_json: AsJson = False) -> None:
-        """Print every key of a config: type, unit, bounds, default, meaning, source."""
+    def schema(
+        key: Annotated[str, typer.Argument(metavar="[KEY]", help="A key or a block of keys; default: all.")] = "",
+        as_json: AsJson = False,
+    ) -> None:
+        """Print the keys of a config: type, unit, bounds, default, meaning, source."""
         with exit_on_failure("schema", as_json):
-            from walkerlab.config.reference import as_json_schema, as_text
+            from walkerlab.config.reference import as_json_schema, as_paragraphs
 
             if as_json:
                 print_json(as_json_schema())
             else:
-                print(as_text())
+                print(as_paragraphs(key))
 
     @app.command()
     def clean(

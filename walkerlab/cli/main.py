@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import housekeeping
+from walkerlab.cli import around, housekeeping
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -49,6 +49,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     for stage in graph.stages:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
+    around.add_to(app, graph)
     return app
 
 
@@ -85,12 +86,13 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> None:
-        with exit_on_failure(stage.name, as_json, typed_options(config, sets, strides, runs)):
+        with exit_on_failure(stage.name, as_json, typed_options(config, sets, strides, runs)) as asked:
             # Imported here: help loads neither a config nor an array.
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
             request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose, open_page)
+            asked.run_dir = request.folder.path
             cores = jobs or all_cores()
             run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=cores, full=full)
 

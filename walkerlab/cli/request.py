@@ -8,7 +8,7 @@ from pathlib import Path
 
 from walkerlab.cli.console import Console
 from walkerlab.cli.options import typed_options
-from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.loader import EarlierRun, LoadedConfig, load
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
 
@@ -43,9 +43,19 @@ class Request:
         return typed_options(self.config, self.sets, self.strides, self.runs)
 
     @cached_property
+    def earlier(self) -> EarlierRun | None:
+        """The run that `--config` names, if it is a run's folder or one of its artifacts."""
+        if self.config is None or not (self.config.is_dir() or self.config.suffix == ".h5"):
+            return None
+        # Imported here: reading a config from a file needs no HDF5.
+        from walkerlab.cli.earlier import run_at
+
+        return run_at(self.config)
+
+    @cached_property
     def loaded(self) -> LoadedConfig:
         """The config, its warnings said; ConfigError if it is not usable."""
-        loaded = load(self.config, self.sets, self.strides)
+        loaded = load(self.config, self.sets, self.strides, self.earlier)
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 

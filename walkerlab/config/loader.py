@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,16 +34,36 @@ class LoadedConfig:
     source: str
 
 
-def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None) -> LoadedConfig:
+@dataclass(frozen=True, slots=True)
+class EarlierRun:
+    """A run that a config is taken from.
+
+    text   its resolved config
+    name   of its folder, in which the same config runs again
+    label  as messages name it
+    """
+
+    text: str
+    name: str
+    label: str
+
+
+def load(
+    path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
+) -> LoadedConfig:
     """Load a config.
 
     path     of a YAML file, or the name of a built-in config; None is the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, over everything else
+    run      whose config it is, instead of a file's
 
     Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
     """
-    file = builtin(DEFAULT) if path is None else find(path)
+    if run is not None:
+        file = ConfigFile(Path(run.name), run.label, run.text)
+    else:
+        file = builtin(DEFAULT) if path is None else find(path)
     tree = _named(stacked(read_layers(file)), file)
     settings = parse_settings(sets)
     if strides is not None:
@@ -51,7 +73,14 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
     base = typed(tree) if settings else changed
     refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
-    return LoadedConfig(config, run_name(base, changed, _degrees(changed_tree)), warnings, file.label)
+    name = run_name(base, changed, _degrees(changed_tree), None if run is None else run.name)
+    return LoadedConfig(config, name, (*_renamed(tree, file), *warnings), file.label)
+
+
+def safe_name(text: str) -> str:
+    """A text as the name of a run folder: accents, blanks and what else such a name cannot have replaced."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
 def _named(tree: Mapping, file: ConfigFile) -> Mapping:
@@ -59,9 +88,17 @@ def _named(tree: Mapping, file: ConfigFile) -> Mapping:
     if "name" in tree.entries:
         return tree
     named = tree.without()
-    start = Position(file.label, 1, 1)
-    named.put("name", Scalar(start, file.path.stem, file.path.stem), start)
+    start, name = Position(file.label, 1, 1), safe_name(file.path.stem)
+    named.put("name", Scalar(start, name, name), start)
     return named
+
+
+def _renamed(tree: Mapping, file: ConfigFile) -> tuple[str, ...]:
+    """That the run cannot have the file's own name, if so."""
+    name = tree.entries["name"]
+    if not isinstance(name, Scalar) or name.position != Position(file.label, 1, 1) or name.value == file.path.stem:
+        return ()
+    return (f"{file.label}: the run is named {name.value}, since a run folder cannot be named as the file is",)
 
 
 def _degrees(tree: Mapping) -> float | None:
