@@ -30,7 +30,7 @@ def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) ->
         report = execute(config, stage, RunFolder(Path(scratch), name), reporter=console, graph=graph)
         again = None if report.artifact is None else artifact_at(report.artifact)
     before, after = stored.digest(), None if again is None else again.digest()
-    same_code = again is not None and again.identity.code_digest == stored.identity.code_digest
+    same_code = again is not None and again.identity.key == stored.identity.key
     if as_json:
         print_json(
             {

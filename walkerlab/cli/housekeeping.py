@@ -7,6 +7,7 @@ import typer
 from walkerlab.cli.failures import exit_on_failure, print_json
 from walkerlab.cli.options import (
     RUNS,
+    AllRuns,
     AsJson,
     Check,
     ConfigFile,
@@ -85,6 +86,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         sets: Sets = None,
         strides: Strides = None,
         runs: Runs = RUNS,
+        all_runs: AllRuns = False,
         yes: Yes = False,
         dry_run: DryRun = False,
         no_wait: NoWait = False,
@@ -94,8 +96,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Remove the results of a run, and what killed runs left; other files stay."""
         with exit_on_failure("clean", as_json, typed_options(config, sets, strides, runs)):
-            from walkerlab.cli.clean import clean_run
+            from walkerlab.cli.clean import clean_all, clean_run
             from walkerlab.cli.request import Request
 
             request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
-            clean_run(request, names, yes=yes, dry_run=dry_run, wait=not no_wait)
+            clean = clean_all if all_runs else clean_run
+            clean(request, names, yes=yes, dry_run=dry_run, wait=not no_wait)

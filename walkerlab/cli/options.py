@@ -32,6 +32,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on s
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")]
+AllRuns = Annotated[bool, typer.Option("--all", help="Every run in the folder of all runs.")]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 
 RUNS = Path("runs")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
 from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
@@ -74,7 +75,8 @@ def load(
     refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
     name = run_name(base, changed, _degrees(changed_tree), None if run is None else run.name)
-    return LoadedConfig(config, name, (*_renamed(tree, file), *warnings), file.label)
+    warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
+    return LoadedConfig(config, name, warnings, file.label)
 
 
 def safe_name(text: str) -> str:
@@ -99,6 +101,20 @@ def _renamed(tree: Mapping, file: ConfigFile) -> tuple[str, ...]:
     if not isinstance(name, Scalar) or name.position != Position(file.label, 1, 1) or name.value == file.path.stem:
         return ()
     return (f"{file.label}: the run is named {name.value}, since a run folder cannot be named as the file is",)
+
+
+def _left_behind(config: Config, tree: Mapping) -> tuple[str, ...]:
+    """That a leg was given another length than the config beneath has, and its mass stays where that puts it."""
+    walker = tree.entries.get("walker")
+    if not isinstance(walker, Mapping) or not {"leg_length_m", "foot_to_mass_m"} <= walker.entries.keys():
+        return ()
+    leg, mass = walker.keys["leg_length_m"], walker.keys["foot_to_mass_m"]
+    if leg.source == mass.source or config.walker.foot_to_mass_m == config.walker.leg_length_m / 2:
+        return ()
+    return (
+        f"{leg}: walker.leg_length_m is {short(config.walker.leg_length_m)} m, and walker.foot_to_mass_m stays "
+        f"{short(config.walker.foot_to_mass_m)} m, as {mass.source} has it: the mass is not in the middle of the leg",
+    )
 
 
 def _degrees(tree: Mapping) -> float | None:

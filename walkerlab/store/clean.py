@@ -44,3 +44,12 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
             path.unlink(missing_ok=True)
     with contextlib.suppress(OSError):
         folder.figures.rmdir()
+
+
+def remove_if_empty(folder: RunFolder) -> None:
+    """Remove a run folder that has nothing in it but its lock; to be called after its lock was given back."""
+    lock = folder.path / ".lock"
+    if list(folder.path.iterdir()) == [lock]:
+        with contextlib.suppress(OSError):
+            lock.unlink()
+            folder.path.rmdir()
