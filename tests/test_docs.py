@@ -52,9 +52,8 @@ def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
     stands_for = {"STAGE": "fixedpoint", "FILE": "my.yaml"}
     words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
     if any(word.startswith("runs/") for word in words):
-        words = [
-            word for word in words if not word.startswith("runs/") and word != "-c"
-        ]  # it takes a run that is there
+        # the paper's own config instead of a run that is not there
+        words = [word for word in words if not word.startswith("runs/") and word != "-c"]
     for name in (word for word in words if word.endswith(".yaml") and not word.startswith("configs/")):
         (tmp_path / name).write_text("extends: paper\n", encoding="utf-8")
     dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
