@@ -1,19 +1,34 @@
 """How physics becomes machine code: compiled functions, bodies chosen by type, and where the code is cached.
 
 Numba's own cache does not notice that a called function in another file changed, so the cache folder is keyed by
-a digest of all sources that kernels can be made of: an edited function can never run stale.
+a digest of all sources that kernels can be made of: an edited function can never run stale. The folder serves this
+package's kernels alone: what another program compiles with Numba stays where that program has it.
 """
 
 import contextlib
 import functools
 import hashlib
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
+
+import numba
+from llvmlite import binding as llvm
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    IPythonCacheLocator,
+    UserProvidedCacheLocator,
+)
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.extending import overload, register_jitable
 
 # the only packages in which compiled functions may stand (a test says so)
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
@@ -31,14 +46,51 @@ watchers: list[Callable[[str], None]] = []
 """Told the name of the kernel that this process begins to compile, or waits for, and '' once it is there."""
 
 
+PACKAGE = Path(__file__).parent
+HOLDS_KERNELS = re.compile(r"walkerlab\.kernels|numba|\.case\(")
+IMPORTS = re.compile(
+    r"^[ \t]*(?:from|import)[ \t]+walkerlab\.([\w.]+)(?:[ \t]+import[ \t]+(\([^)]*\)|.*))?", re.MULTILINE
+)
+
+
+def kernel_sources() -> list[Path]:
+    """The files that kernels can be made of: those that hold any, and what these import from the package."""
+    homes = (path for home in KERNEL_HOMES for path in (PACKAGE / home).rglob("*.py"))
+    waiting = [
+        PACKAGE / "kernels.py",
+        *(path for path in homes if HOLDS_KERNELS.search(path.read_text(encoding="utf-8"))),
+    ]
+    found = set(waiting)
+    while waiting:
+        new = set(imported_files(waiting.pop())) - found
+        found |= new
+        waiting.extend(new)
+    return sorted(found)
+
+
+def imported_files(path: Path) -> Iterator[Path]:
+    """The files of the package that a source file imports, modules named behind `import` included."""
+    for module, names in IMPORTS.findall(path.read_text(encoding="utf-8")):
+        base = PACKAGE.joinpath(*module.split("."))
+        candidates = (base, base / "__init__", *(base / name for name in re.findall(r"\w+", names)))
+        yield from (file for file in (each.with_suffix(".py") for each in candidates) if file.is_file())
+
+
 def sources_digest() -> str:
     """Digest (hex) of every source file that a kernel can be made of."""
-    root = Path(__file__).parent
-    paths = [Path(__file__), *(path for home in KERNEL_HOMES for path in (root / home).rglob("*.py"))]
     digest = hashlib.sha256()
-    for path in sorted(paths):
-        digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in kernel_sources():
+        digest.update(str(path.relative_to(PACKAGE)).encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
+
+
+def compiled_for() -> str:
+    """The processor that code is compiled for: its name, and a digest of its features."""
+    name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
+    features = numba.config.CPU_FEATURES
+    if features is None:
+        features = llvm.get_host_cpu_features().flatten()
+    return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
 
 
 def cache_root() -> Path:
@@ -63,12 +115,12 @@ def _writable(folder: Path) -> bool:
 
 
 def _open_cache() -> Path:
-    """The folder of this state of the sources; older generations beyond a few are removed."""
-    root = cache_root()
-    folder = root / f"kernels-{sources_digest()[:16]}-py{sys.version_info.major}{sys.version_info.minor}"
+    """This processor's folder of this state of the sources; its older generations beyond a few are removed."""
+    root, host = cache_root(), compiled_for()
+    folder = root / f"kernels-{sources_digest()[:16]}-py{sys.version_info.major}{sys.version_info.minor}-{host}"
     folder.mkdir(exist_ok=True)
     os.utime(folder)
-    generations = sorted(root.glob("kernels-*"), key=_age, reverse=True)
+    generations = sorted(root.glob(f"kernels-*-{host}"), key=_age, reverse=True)
     for old in generations[KEPT_GENERATIONS:]:
         shutil.rmtree(old, ignore_errors=True)
     return folder
@@ -83,17 +135,115 @@ def _age(folder: Path) -> float:
 
 CACHE_FOLDER = _open_cache()
 
-import numba  # noqa: E402  (the cache folder is set before anything is compiled)
-from numba.core.codegen import JITCodeLibrary  # noqa: E402
-from numba.core.compiler import CompilerBase, DefaultPassBuilder  # noqa: E402
-from numba.extending import overload, register_jitable  # noqa: E402
-
-numba.config.CACHE_DIR = str(CACHE_FOLDER)
-
 
 def nothing_compiled_yet() -> bool:
     """Whether this state of the sources has no compiled code so far: the first run on a machine, or after a change."""
     return next(CACHE_FOLDER.rglob("*.nbc"), None) is None
+
+
+class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
+    """Numba's locator for a folder that was chosen, which is `CACHE_FOLDER`, for kernels alone."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        """The folder of a function's file."""
+        super().__init__(py_func, py_file)
+        self._cache_path = str(CACHE_FOLDER / self.get_suitable_cache_subpath(py_file))
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """A locator for a function in a file, whether or not a folder was chosen for all of Numba."""
+        return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
+
+
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    """Results of compiling in `CACHE_FOLDER`; those of a notebook's cells, which have no file, where IPython says."""
+
+    _locator_classes = (KernelLocator, IPythonCacheLocator)
+
+
+class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
+    """A kernel's stored code, begun anew where it was stored for types that this process cannot import.
+
+    Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
+    """
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+
+
+class KernelCache(FunctionCache):  # type: ignore[misc]
+    """A kernel's machine code on disk: of several processes that call one at once, one compiles it and all load it."""
+
+    _impl_class = KernelCacheImpl
+
+    def __init__(self, py_func: Any) -> None:
+        """Of a Python function."""
+        super().__init__(py_func)
+        locator = self._impl.locator
+        self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+        self._kernel = py_func.__name__
+        self._held: dict[str, Any] = {}
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The stored code; None if this process is to compile it, once no other does."""
+        found = super().load_overload(signature, context)
+        if found is not None or str(signature) in self._held:
+            return found
+        for tell in watchers:
+            tell(self._kernel)
+        lock = _lock(f"{self._kernel} {signature}")
+        lock.acquire()
+        found = super().load_overload(signature, context)
+        if found is None:
+            self._held[str(signature)] = lock
+        else:
+            _finished(lock)
+        return found
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Store what was compiled."""
+        try:
+            with _lock(self._kernel):  # one index for all signatures
+                super().save_overload(signature, data)
+        finally:
+            _finished(self._held.pop(str(signature), None))
+
+
+def _lock(name: str) -> Any:
+    """A lock between processes in the folder of compiled code."""
+    # Imported here: a process that finds everything compiled takes no lock.
+    from filelock import FileLock
+
+    return FileLock(CACHE_FOLDER / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
+
+
+def _finished(lock: Any) -> None:
+    """Give a kernel's lock back, if it was held, and say that it is there."""
+    if lock is not None:
+        lock.release()
+    for tell in watchers:
+        tell("")
+
+
+@contextlib.contextmanager
+def watched(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have `tell` among the watchers of what is compiled meanwhile."""
+    watchers.append(tell)
+    try:
+        yield
+    finally:
+        watchers.remove(tell)
+
+
+def kernel(function: F) -> F:
+    """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    compiled = numba.njit(**FLAGS)(function)
+    # what enable_caching does, with the kernels' own folder
+    compiled._cache = KernelCache(function)
+    return cast(F, compiled)
 
 
 class _WithoutEnvironment:
@@ -142,90 +292,6 @@ class _PartCompiler(CompilerBase):  # type: ignore[misc]
 
 
 PART_FLAGS["pipeline_class"] = _PartCompiler
-
-
-def kernel(function: F) -> F:
-    """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    compiled = numba.njit(cache=True, **FLAGS)(function)
-    _forgive_unknown_types(compiled)
-    _compile_once(compiled)
-    return cast(F, compiled)
-
-
-def _compile_once(compiled: Any) -> None:
-    """Let one of several processes compile what they all call; the others wait, and load it."""
-    cache = compiled._cache
-    load, save, name = cache.load_overload, cache.save_overload, compiled.py_func.__name__
-    held: dict[str, Any] = {}
-
-    def load_or_be_first(signature: Any, context: Any) -> Any:
-        found = load(signature, context)
-        if found is not None or str(signature) in held:
-            return found
-        for tell in watchers:
-            tell(name)
-        lock = _lock(f"{name} {signature}")
-        lock.acquire()
-        found = load(signature, context)
-        if found is None:
-            held[str(signature)] = lock
-        else:
-            _finished(lock)
-        return found
-
-    def save_for_others(signature: Any, data: Any) -> None:
-        try:
-            with _lock(name):  # one index for all signatures
-                save(signature, data)
-        finally:
-            _finished(held.pop(str(signature), None))
-
-    cache.load_overload, cache.save_overload = load_or_be_first, save_for_others
-
-
-def _lock(name: str) -> Any:
-    """A lock between processes in the folder of compiled code."""
-    # Imported here: a process that finds everything compiled takes no lock.
-    from filelock import FileLock
-
-    return FileLock(CACHE_FOLDER / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
-
-
-def _finished(lock: Any) -> None:
-    """Give a kernel's lock back, if it was held, and say that it is there."""
-    if lock is not None:
-        lock.release()
-    for tell in watchers:
-        tell("")
-
-
-@contextlib.contextmanager
-def watched(tell: Callable[[str], None]) -> Iterator[None]:
-    """Have `tell` among the watchers of what is compiled meanwhile."""
-    watchers.append(tell)
-    try:
-        yield
-    finally:
-        watchers.remove(tell)
-
-
-def _forgive_unknown_types(compiled: Any) -> None:
-    """Begin a kernel's stored code anew where it was stored for types that this process cannot import.
-
-    Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
-    """
-    stored = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if stored is None:
-        return
-    load_index = stored._load_index
-
-    def index() -> Any:
-        try:
-            return load_index()
-        except (ImportError, AttributeError):
-            return {}
-
-    stored._load_index = index
 
 
 def inlined(function: F) -> F:

@@ -14,7 +14,7 @@ from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import CompassWalker, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
 from walkerlab.config.validation import typed
 
@@ -105,15 +105,15 @@ def _renamed(tree: Mapping, file: ConfigFile) -> tuple[str, ...]:
 
 def _left_behind(config: Config, tree: Mapping) -> tuple[str, ...]:
     """That a leg was given another length than the config beneath has, and its mass stays where that puts it."""
-    walker = tree.entries.get("walker")
-    if not isinstance(walker, Mapping) or not {"leg_length_m", "foot_to_mass_m"} <= walker.entries.keys():
+    walker, block = config.walker, tree.entries.get("walker")
+    if not isinstance(walker, CompassWalker) or not isinstance(block, Mapping):
         return ()
-    leg, mass = walker.keys["leg_length_m"], walker.keys["foot_to_mass_m"]
-    if leg.source == mass.source or config.walker.foot_to_mass_m == config.walker.leg_length_m / 2:
+    leg, mass = block.keys.get("leg_length_m"), block.keys.get("foot_to_mass_m")
+    if leg is None or mass is None or leg.source == mass.source or walker.foot_to_mass_m == walker.leg_length_m / 2:
         return ()
     return (
-        f"{leg}: walker.leg_length_m is {short(config.walker.leg_length_m)} m, and walker.foot_to_mass_m stays "
-        f"{short(config.walker.foot_to_mass_m)} m, as {mass.source} has it: the mass is not in the middle of the leg",
+        f"{leg}: walker.leg_length_m is {short(walker.leg_length_m)} m, and walker.foot_to_mass_m stays "
+        f"{short(walker.foot_to_mass_m)} m, as {mass.source} has it: the mass is not in the middle of the leg",
     )
 
 
