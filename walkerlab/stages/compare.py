@@ -42,7 +42,7 @@ from walkerlab.store.content import Content
 
 STEPS_OF_A_STRIDE = 2
 SAMPLES_OF_A_MOTION = 2
-X_P_BUDGET = 2_000_000  # right-hand sides; the paper's own ground takes 25,000
+X_P_BUDGET = 2_000_000  # right-hand sides
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
