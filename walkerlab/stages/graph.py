@@ -49,6 +49,7 @@ class Stage:
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
+    of_compass     whether it is about the paper's compass, and left out for other walkers
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
@@ -70,6 +71,7 @@ class Stage:
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
+    of_compass: bool = False
     draws: bool = False
     walks: bool = False
     has_cells: bool = False
@@ -153,6 +155,7 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
+        of_compass=True,
         has_cells=True,
     ),
     Stage(
@@ -178,6 +181,7 @@ PIPELINE = Graph(
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
         reads_of_paper=PAPERS_WALK,
+        of_compass=True,
         has_cells=True,
     ),
     Stage(

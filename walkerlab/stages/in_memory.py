@@ -11,7 +11,7 @@ from walkerlab.config.canonical import only, slice_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import NO_CONTACT
+from walkerlab.stages.plan import why_unsuited
 from walkerlab.stages.progress import Progress, Silent
 from walkerlab.store.code import Sources
 from walkerlab.store.content import Content
@@ -47,9 +47,10 @@ class Keys:
         keys: dict[str, str] = {}
         for stage in self.graph.needed_for(target, config):
             refuse_files(stage)
-            if stage.needs_contact and config.contact is None:
+            unsuited = why_unsuited(stage, config)
+            if unsuited is not None:
                 raise ConfigError(
-                    f"{target} cannot be had: {NO_CONTACT}.",
+                    f"{target} cannot be had: {unsuited}.",
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}
