@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.contact import Contact, ContactSI
+from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
 from walkerlab.config.walkers import (
@@ -32,6 +33,7 @@ __all__ = [
     "Contact",
     "ContactSI",
     "ContactSolver",
+    "Continuation",
     "Equations",
     "Kneed",
     "Method",
@@ -246,6 +248,7 @@ class Config(Block):
     solver: Solvers = Solvers()
     stability: Stability = Stability()
     tune: Tune = Tune()
+    continuation: Continuation = Continuation()
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

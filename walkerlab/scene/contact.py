@@ -169,6 +169,11 @@ def compass_parts(walker: Any) -> CompassParts:
     )
 
 
+def wants_own_pitch(contact: Contact) -> bool:
+    """Whether there are pads, to be laid for the contact gait's own step length."""
+    return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
+
+
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
     """Pitch of the pads (m); on a plane the rigid step length, by which steps are judged."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":

@@ -25,7 +25,15 @@ from walkerlab.hybrid.contact_run import (
 )
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinge_of, scene_measures, start_state
+from walkerlab.scene.contact import (
+    ContactScene,
+    contact_gait,
+    contact_scene,
+    hinge_of,
+    scene_measures,
+    start_state,
+    wants_own_pitch,
+)
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
@@ -117,7 +125,7 @@ def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, t
 def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
     """Step length (m) of the contact gait, if the pads are laid for it; raises NoAnswer if there is no such gait."""
     contact = config.contact
-    if contact is None or contact.pad_pitch != "own" or contact.terrain != "checkerboard":
+    if contact is None or not wants_own_pitch(contact):
         return None
     answer = contact_gait(config, rigid_step, rigid_state)
     if answer.gait is None:

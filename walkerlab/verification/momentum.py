@@ -35,9 +35,10 @@ from walkerlab.solvers.stepping import ACCEPTED
 from walkerlab.verification.contact_start import Prepared
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.second_method import MAGNIFIED, promised
-from walkerlab.verification.verdict import Finding, finite
+from walkerlab.verification.verdict import Finding, NotMeasured, finite
 
 Array = NDArray[np.float64]
+MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
@@ -63,19 +64,28 @@ class Balance:
     steps: int
 
 
-def momentum_findings(ready: Prepared, config: Config, case: Case) -> list[Finding]:
-    """Momentum against impulse; nothing for a hinged start, whose hinge pushes too, or where impulses are not known.
+def momentum_finding(ready: Prepared, config: Config, case: Case) -> Finding | NotMeasured:
+    """Momentum against impulse, or why it cannot be judged.
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
     """
     if ready.scene.pinned is not None:
-        return []
+        return NotMeasured(MEASURE, "the hinge pushes too")
     found = momentum_balance(ready, config, case)
     unknown = found.unsure + found.unresolved
     if unknown > MOST_UNKNOWN:
-        return []
+        return NotMeasured(MEASURE, why_unknown(found))
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
-    return [Finding("momentum not given by ground and gravity, over the walker's", finite(found.residual), limit)]
+    return Finding(MEASURE, finite(found.residual), limit)
+
+
+def why_unknown(found: Balance) -> str:
+    """What keeps the impulses of a balance from being known."""
+    shares = {
+        "the impulses' sums do not settle": found.unsure,
+        "friction hangs on slip velocities below the tolerance": found.unresolved,
+    }
+    return " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
 
 
 def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
