@@ -13,6 +13,8 @@ from kneed_walks import (
     PAPER_MASS,
     PERIOD,
     RATES,
+    RIGID_ANGLES,
+    RIGID_RATES,
     SHANK,
     SLOPE,
     STEP,
