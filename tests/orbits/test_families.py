@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.attractors import close_returns, feigenbaum_ratios, largest_exponent, period_of, settled
@@ -15,9 +14,18 @@ from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepContro
 from walkerlab.orbits.families import Follower, Limits, Seed, Span
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_maps import CompassMap, multipliers_of, walk_steps
+from walkerlab.orbits.step_maps import RigidMap, multipliers_of, walk_steps
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
 A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81
+
+
+def map_of(walker_at, scale):
+    def model_at(value):
+        walker = walker_at(value)
+        return None if walker is None else assembled(walker)
+
+    return RigidMap(model_at, scale, assembled(paper_walker(0.05)))
 
 
 def paper_walker(slope):
@@ -30,10 +38,10 @@ def simplest_walker(slope):
 
 def seeds_at(walker_at, slope):
     walker = walker_at(slope)
-    _, units = unit_walker(walker)
+    _, units = unit_walker(assembled(walker))
     return [
         Seed(np.array([gait.state[1], gait.state[2] * units.time, gait.state[3] * units.time]), slope)
-        for gait in find_gaits(walker).gaits
+        for gait in find_gaits(assembled(walker)).gaits
     ]
 
 
@@ -52,7 +60,7 @@ def period_three_start(follower):
 
 @cache
 def family(walker_at, least, most, at, periods):
-    follower = Follower(CompassMap(walker_at, most - least), Span(least, most))
+    follower = Follower(map_of(walker_at, most - least), Span(least, most))
     return follower.family(seeds_at(walker_at, at), periods)
 
 
@@ -197,7 +205,7 @@ def test_located_flips_have_their_multiplier_at_minus_one_and_their_branch_begin
 
 
 def test_every_point_of_a_branch_is_a_gait_of_so_many_steps_and_of_no_fewer():
-    step_map = CompassMap(paper_walker, 0.1)
+    step_map = map_of(paper_walker, 0.1)
     for branch in compass_family():
         for point in branch.points[:: max(1, len(branch.points) // 4)]:
             cycle = walk_steps(step_map, point.z, point.value, branch.period)
@@ -216,7 +224,7 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
 
 
 def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():
-    step_map = CompassMap(paper_walker, 0.1)
+    step_map = map_of(paper_walker, 0.1)
     one, two = (next(b for b in compass_family() if b.period == n and b.stable_ranges) for n in (1, 2))
     slope = float(np.mean(two.stable_ranges[0]))
     nearest = min(one.points, key=lambda point: abs(point.value - slope))
@@ -227,7 +235,7 @@ def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to
 
 
 def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
-    step_map = CompassMap(paper_walker, 0.1)
+    step_map = map_of(paper_walker, 0.1)
     one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     gait = next(point for point in one.points if point.value > 0.03)
     calm = largest_exponent(step_map, gait.z, gait.value, 50, 300)
@@ -239,7 +247,7 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
 
 
 def test_a_gait_of_three_steps_is_born_in_a_fold():
-    follower = Follower(CompassMap(paper_walker, 0.1), Span(1e-4, 0.1))
+    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1))
     start = period_three_start(follower)
     (branch,) = [b for b in follower.family([start], 3) if b.period == 3]
     (fold,) = [one for one in branch.bifurcations if one.kind == "fold"]
@@ -251,7 +259,7 @@ def test_a_gait_of_three_steps_is_born_in_a_fold():
 
 def test_curves_of_flips_pass_through_flips_located_for_other_masses():
     def map_at(hip_mass):
-        return CompassMap(lambda slope: paper_walker(slope)._replace(hip_mass=hip_mass), 0.1)
+        return map_of(lambda slope: paper_walker(slope)._replace(hip_mass=hip_mass), 0.1)
 
     branch = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     (flip,) = branch.bifurcations
@@ -268,14 +276,14 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
     def walker_at(mass):
         return paper_walker(0.05)._replace(hip_mass=mass) if mass < 13.0 else None
 
-    follower = Follower(CompassMap(walker_at, 10.0), Span(8.0, 18.0))
+    follower = Follower(map_of(walker_at, 10.0), Span(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
     assert branch.ends[1].reason == "no walker has the parameter's next value"
     assert 12.5 < branch.ends[1].value < 13.0
 
 
 def test_a_branch_that_uses_up_its_points_says_so():
-    follower = Follower(CompassMap(paper_walker, 0.1), Span(1e-4, 0.1), limits=Limits(points=5))
+    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1), limits=Limits(points=5))
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "5 points are used up" for end in branch.ends)
 

@@ -9,10 +9,12 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact, ContactSI
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
+from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
     LIGHTEST_CONTACT,
     CompassWalker,
@@ -27,6 +29,7 @@ from walkerlab.config.walkers import (
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Basin",
     "Case",
     "CompassWalker",
     "Config",
@@ -43,9 +46,11 @@ __all__ = [
     "SlopeInDegrees",
     "SolverSettings",
     "Solvers",
+    "Source",
     "Stability",
     "State",
     "StraightLegs",
+    "Sweep",
     "Tune",
     "Walker",
 ]
@@ -202,6 +207,23 @@ class Tune(Block):
         return value
 
 
+class Source(Block):
+    """The study that a config redoes, as the report names it."""
+
+    title: Annotated[
+        str, key("", "title of the study", "this project", bounds="any text, not empty"), Field(min_length=1)
+    ]
+    authors: Annotated[str | None, key("", "its authors", "this project", bounds="any text")] = None
+    published: Annotated[str | None, key("", "where and when it was published", "this project", bounds="any text")] = (
+        None
+    )
+    url: Annotated[
+        str | None,
+        key("", "where it can be read", "this project", bounds="an address that begins with http:// or https://"),
+        Field(pattern=r"^https?://\S+$"),
+    ] = None
+
+
 class Config(Block):
     """A scene and what is to be computed of it."""
 
@@ -216,6 +238,7 @@ class Config(Block):
         ),
         Field(pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$"),
     ] = "paper"
+    source: Source | None = None
     walker: Annotated[Walker, key("", "the walker; its keys depend on its type", "Fig. 1")] = CompassWalker()
     gravity_m_s2: Annotated[float, key("m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)] = 9.81
     slope_rad: Annotated[
@@ -249,6 +272,8 @@ class Config(Block):
     stability: Stability = Stability()
     tune: Tune = Tune()
     continuation: Continuation = Continuation()
+    basin: Basin = Basin()
+    sweep: Sweep | None = None
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

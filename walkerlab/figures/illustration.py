@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import png_of, settle, styled, svg_of
+from walkerlab.figures.canvas import bytes_of, png_of, resize, settle, styled, svg_of
 from walkerlab.figures.needs import Need, Results, why_not
 
 
@@ -30,6 +30,7 @@ class Illustration:
     caption  one or two sentences with numbers of the results
     plot     the figure; called within the common style
     number   the paper's; None if the paper has no such figure
+    seen     what one sees, in a sentence or two, for those who do not see it
     """
 
     name: str
@@ -38,6 +39,12 @@ class Illustration:
     caption: Callable[[Results], str]
     plot: Callable[[Results], Figure]
     number: int | None = None
+    seen: str = ""
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages whose results it cannot be drawn without."""
+        return tuple(dict.fromkeys(need.stage for need in self.needs))
 
     @property
     def called(self) -> str:
@@ -59,6 +66,15 @@ class Illustration:
             settle(figure)
             return Drawing(svg_of(figure, self.name, title), png_of(figure, title), self.caption(results))
 
+    def as_file(self, results: Results, kind: str, columns: int) -> bytes:
+        """The figure as PDF, SVG or PNG, as wide as one or two columns of a journal."""
+        title = self.title if self.number is None else f"Figure {self.number}. {self.title}"
+        with styled(columns):
+            figure = self.plot(results)
+            resize(figure, columns)
+            settle(figure)
+            return bytes_of(figure, kind, self.name, title)
+
 
 def paper_figure(
     number: int,
@@ -66,6 +82,7 @@ def paper_figure(
     needs: tuple[Need, ...],
     caption: Callable[[Results], str],
     plot: Callable[[Results], Figure],
+    seen: str,
 ) -> Illustration:
     """A figure of the paper, drawn anew."""
-    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number)
+    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number, seen)

@@ -15,6 +15,7 @@ from walkerlab.figures import (
     figure_12,
     figure_13,
     figure_14,
+    figure_15,
     figure_16,
     stability_maps,
 )
@@ -32,6 +33,7 @@ FIGURES: tuple[Illustration, ...] = (
     figure_12.FIGURE,
     figure_13.FIGURE,
     figure_14.FIGURE,
+    figure_15.FIGURE,
     figure_16.FIGURE,
     *accuracy.FIGURES,
     *stability_maps.FIGURES,

@@ -6,14 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import Ground, MethodSettings
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.contact_section import COORDINATES, Floats, SectionStep, step_from_section
+from walkerlab.orbits.contact_section import Floats, SectionStep, angled_bodies, step_from_section, turning_bodies
 from walkerlab.orbits.step_maps import (
     REMEMBERED,
     Iterates,
@@ -33,14 +35,13 @@ class WalkerOnGround:
 
 
 class ContactMap:
-    """A walker on compliant ground, six coordinates where the feet pass, in units of leg length and pendulum time.
+    """A walker on compliant ground, its coordinates where the feet pass, in units of leg length and pendulum time.
 
     Pads let the swing foot of straight legs through, so that a family is followed where it touches only ahead of the
     stance foot; `watch` says where pads of the gait's own step length would trip it. The derivative along the section
     is exact, that along the parameter a difference of exact steps, which only steers.
     """
 
-    names = ("height", "angle", "along_rate", "height_rate", "swing_rate", "stance_rate")
     monitors = (
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
@@ -53,6 +54,7 @@ class ContactMap:
         methods: MethodSettings,
         step_length_m: float,
         on_pads: bool,
+        like: ContactWalker,
     ) -> None:
         """A family of walkers.
 
@@ -61,20 +63,25 @@ class ContactMap:
         methods        the integrator and its tolerances
         step_length_m  that steps are judged by
         on_pads        whether the ground that was asked for has pads, so that tripping is to be watched
+        like           one of the walkers
         """
         self._at = lru_cache(REMEMBERED)(walker_at)
         self._near = lru_cache(REMEMBERED)(self._formula)
         self._scale, self._methods, self._measure, self._on_pads = scale, methods, step_length_m, on_pads
         self._units: Floats | None = None
+        angled, turning = angled_bodies(like, STANCE_FOOT), turning_bodies(like, STANCE_FOOT)
+        self._angles, self._rates = len(angled), len(turning)
+        rates = (f"rate_{body}" for body in turning)
+        self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
 
     def _formula(self, p: float) -> tuple[list[WalkerOnGround], Floats] | None:
         return difference_formula(self._at, p, min(self._scale, abs(p)) if p != 0.0 else self._scale, few=True)
 
     def units(self, frame_length: float, pendulum_time: float) -> Floats:
-        """(6,) what one unit of each coordinate is in SI; those of the first walker, whatever the parameter."""
+        """(d,) what one unit of each coordinate is in SI; those of the first walker, whatever the parameter."""
         if self._units is None:
             L, tau = frame_length, pendulum_time
-            self._units = np.array([L, 1.0, L / tau, L / tau, 1.0 / tau, 1.0 / tau])
+            self._units = np.array([L, *[1.0] * self._angles, L / tau, L / tau, *[1.0 / tau] * self._rates])
         return self._units
 
     def of_section(self, z: Floats, p: float) -> Floats:
@@ -83,12 +90,12 @@ class ContactMap:
         assert here is not None, "a point of the section belongs to a walker"
         return np.asarray(z / self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time))
 
-    def _walk(self, here: WalkerOnGround, z: Floats, terrain: AfterMidSwing | Checkerboard) -> SectionStep:
+    def _walk(self, here: WalkerOnGround, z: Floats, terrain: Any) -> SectionStep:
         units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
         measure = terrain.pitch if isinstance(terrain, Checkerboard) else self._measure
         return step_from_section(here.walker, Ground(terrain, here.ground.frame), self._methods, z * units, measure)
 
-    def _terrain(self, here: WalkerOnGround) -> AfterMidSwing:
+    def _terrain(self, here: WalkerOnGround) -> Any:
         terrain = here.ground.terrain
         return AfterMidSwing(self._measure) if isinstance(terrain, Checkerboard) else terrain
 
@@ -96,15 +103,15 @@ class ContactMap:
         """One step with all derivatives."""
         here, near = self._at(p), self._near(p)
         if here is None or near is None:
-            return no_step(Outcome.REJECTED, COORDINATES)
+            return no_step(Outcome.REJECTED, z.size)
         step = self._walk(here, z, self._terrain(here))
         if step.outcome is not Outcome.WALKED:
-            return no_step(step.outcome, COORDINATES)
-        Dp = np.zeros(COORDINATES)
+            return no_step(step.outcome, z.size)
+        Dp = np.zeros(z.size)
         for beside, weight in zip(*near, strict=True):
             other = self._walk(beside, z, self._terrain(beside))
             if other.outcome is not Outcome.WALKED:
-                return no_step(other.outcome, COORDINATES)
+                return no_step(other.outcome, z.size)
             Dp += weight * other.z
         return self._mapped(here, step, Dp)
 
@@ -151,7 +158,7 @@ class ContactMap:
             outcome = step.outcome
             if outcome is not Outcome.WALKED:
                 break
-            mapped = self._mapped(here, step, np.zeros(COORDINATES))
+            mapped = self._mapped(here, step, np.zeros(z.size))
             if direction is not None:
                 direction = mapped.DP @ direction
                 lengths.append(float(np.linalg.norm(direction)))
@@ -163,7 +170,7 @@ class ContactMap:
             before = mapped.period_s - mapped.strike_s
         return Iterates(
             outcome,
-            np.array(points).reshape(-1, COORDINATES),
+            np.array(points).reshape(-1, z.size),
             np.array(lengths),
             np.array(periods),
             np.array(angles),

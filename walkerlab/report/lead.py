@@ -6,16 +6,10 @@ import math
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.report.numbers import count, length, listed, number, quantity
+from walkerlab.report.numbers import count, length, number, quantity
 from walkerlab.report.results import Results
 
-CONTENTS = {
-    "fixedpoint": "the periodic gait of the rigid model",
-    "simulate": "its walk",
-    "contact-sim": "the walk of the assembled model on ground as ADAMS has it",
-    "compare": "both compared with each other and with every number of the paper",
-}
-"""What the result of a stage brings into the report."""
+"""Radius of a foot, in leg lengths, above which it is called round."""
 
 
 def title(run: str) -> str:
@@ -24,19 +18,18 @@ def title(run: str) -> str:
 
 
 def lead(results: Results, run: str) -> tuple[str, ...]:
-    """What was run and what is in the report."""
-    return (scene(results.config, run), contents(results))
+    """What was run."""
+    return (scene(results.config, run),)
 
 
 def scene(config: Config, run: str) -> str:
     """The walker, its slope and what it was to do."""
-    walker = config.walker
     _, _, change = run.partition("@")
     changed = f", changed by {change.replace(',', ', ')}" if change else ""
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: {walker_in_words(walker)} on a slope of "
+        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of "
         f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
@@ -71,12 +64,3 @@ def equations(config: Config) -> str:
 def state(start: tuple[float, ...]) -> str:
     """Four numbers of a state."""
     return f"({', '.join(number(value) for value in start)}) rad and rad/s"
-
-
-def contents(results: Results) -> str:
-    """What is in the report."""
-    there = [text for stage, text in CONTENTS.items() if stage in results.stored]
-    if not there:
-        return "There are no results to show; the verdict says why."
-    pictures = f" {count(len(results.pictures), 'figure')} show it." if results.pictures else ""
-    return f"In it: {listed(there)}.{pictures}"

@@ -55,9 +55,11 @@ def contact_map(config: Config, parameter: Parameter, scale: float, step_length_
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
     from walkerlab.hybrid.contact_run import MethodSettings
     from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import contact_scene
     from walkerlab.solvers.registry import method_named
 
     methods = MethodSettings(method_named("radau5"), CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET)
     on_pads = config.contact is not None and config.contact.terrain == "checkerboard"
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    return ContactMap(walkers, scale, methods, step_length_m, on_pads)
+    like = contact_scene(config, step_length_m, step_length_m).walker
+    return ContactMap(walkers, scale, methods, step_length_m, on_pads, like)

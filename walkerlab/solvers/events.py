@@ -63,11 +63,16 @@ def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: f
 
     Returns NO_CROSSING if there is none.
     """
-    stack, ends = finder.stack, finder.ends
-    size = finder.nodes.size
     if not spans_zero(finder, signal):
         return NO_CROSSING
-    size = set_root_piece(finder, signal, zero_at_start)
+    return crossing_of_piece(finder, set_root_piece(finder, signal, zero_at_start), direction, after)
+
+
+@inlined
+def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
+    """`first_crossing` of the polynomial whose `size` Bernstein coefficients are at the bottom of the stack."""
+    stack, ends = finder.stack, finder.ends
+    ends[0, 0], ends[0, 1] = 0.0, 1.0
     top = 0
     while top >= 0:
         low, high = ends[top, 0], ends[top, 1]
@@ -80,7 +85,7 @@ def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: f
             rising = stack[top + 1, 0] < 0.0
             turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
             if turned and direction != (FALLING if rising else RISING):
-                return bisect(stack, top + 1, size, low, high)
+                return regula_falsi(stack, top + 1, size, low, high)
             continue
         split(stack, top, size)
         middle = 0.5 * (low + high)
@@ -116,9 +121,12 @@ def set_root_piece(finder: CrossingFinder, signal: int, zero_at_start: bool) -> 
         for j in range(size):
             total += finder.to_bernstein[i, j] * finder.values[signal, j]
         stack[0, i] = total
-    finder.ends[0, 0], finder.ends[0, 1] = 0.0, 1.0
-    if not zero_at_start:
-        return size
+    return without_zero_at_start(stack, size) if zero_at_start else size
+
+
+@inlined
+def without_zero_at_start(stack: Any, size: int) -> int:
+    """Divide a zero at the start out of the coefficients at the bottom of the stack; returns how many are left."""
     degree = size - 1
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i
@@ -148,8 +156,8 @@ def split(stack: Any, piece: int, size: int) -> None:
 
 
 @inlined
-def bisect(stack: Any, piece: int, size: int, low: float, high: float) -> float:
-    """Fraction at which the only crossing of a piece lies: regula falsi (Illinois), kept inside its bracket."""
+def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
+    """Fraction at which the only crossing of a piece lies: the Illinois variant, kept inside its bracket."""
     a, b = 0.0, 1.0
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0

@@ -98,6 +98,7 @@ def summary_of(
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": REPEATS,
+        "rigid_velocity_factor": OFF_THE_GAIT,
         "budget": BUDGET,
         "reference": {
             name: {
