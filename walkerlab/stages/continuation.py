@@ -124,6 +124,7 @@ def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str
         raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
     wanted = (RIGID, CONTACT) if block.model == "both" else (block.model,)
     refuse_values(asked)
+    refuse_second(config)
     touched = tuple(model for model in wanted if touches(asked, model))
     if not touched:
         raise ConfigError(
@@ -141,6 +142,20 @@ def refuse_values(asked: Question) -> None:
                 f"continuation.{name}: {asked.parameter.key} cannot be {value:g} {asked.parameter.unit}",
                 f"`walkerlab schema {asked.parameter.key}` says what the key allows.",
             )
+
+
+def refuse_second(config: Config) -> None:
+    """Raise ConfigError if the second key is no number, or if its range leaves out the config's own value."""
+    block = config.continuation.second
+    if block is None:
+        return
+    second = parameter_of(block.over, config)
+    own = second.value_in(config)
+    if own not in Span(block.least, block.most):
+        raise ConfigError(
+            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
+            "Curves begin at the config's own value; choose a range around it.",
+        )
 
 
 def touches(asked: Question, model: str) -> bool:
@@ -167,11 +182,6 @@ def with_curves(followed: Followed, asked: Question, progress: Progress) -> Foll
         return None if changed is None else rigid_map(changed, asked.parameter, asked.span.size)
 
     own = second.value_in(asked.config)
-    if own not in plane[1]:
-        raise ConfigError(
-            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
-            "Curves begin at the config's own value; choose a range around it.",
-        )
     progress.start(f"continuation: curves of bifurcations of the {followed.model} model")
     found = []
     for branch in followed.branches:
@@ -185,16 +195,20 @@ def with_curves(followed: Followed, asked: Question, progress: Progress) -> Foll
 
 
 def follow_rigid(asked: Question, progress: Progress) -> Followed:
-    """Every branch of the rigid model, its cascades, attractor and exponents."""
+    """All of the rigid model: branches, cascades, attractor, exponents, and gaits of other numbers of steps."""
+    followed, follower = rigid_branches(asked, progress)
+    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+
+
+def rigid_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower]:
+    """Every branch of the rigid model's gaits of one step, and the cascades beyond their flips."""
     config, parameter, span = asked.config, asked.parameter, asked.span
     walker_at = rigid_walkers(config, parameter)
     step_map = rigid_map(config, parameter, span.size)
     progress.start("continuation: branches of the rigid model")
     follower = Follower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
     seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
-    branches = follower.family(seeds, asked.periods)
-    followed = Followed(RIGID, step_map, branches)
-    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+    return Followed(RIGID, step_map, follower.family(seeds, asked.periods)), follower
 
 
 def gaits_at(walker: RigidWalker | None, value: float, seed: int) -> list[Seed]:
@@ -209,7 +223,12 @@ def gaits_at(walker: RigidWalker | None, value: float, seed: int) -> list[Seed]:
 
 
 def follow_contact(asked: Question, progress: Progress) -> Followed:
-    """The contact model's branch, its first cascades and its attractor."""
+    """All of the contact model: its branch, its cascade, its attractor and exponents."""
+    return beyond_flips(contact_branches(asked, progress), asked, CONTACT_SAMPLES, progress)
+
+
+def contact_branches(asked: Question, progress: Progress) -> Followed:
+    """The branch of the contact model's gait, and the cascade beyond its flips."""
     from walkerlab.scene.contact import contact_gait
 
     progress.start("continuation: a gait of the contact model")
@@ -231,7 +250,7 @@ def follow_contact(asked: Question, progress: Progress) -> Followed:
         follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
         seed = Seed(step_map.of_section(found.gait.z, value), value)
         branches = follower.family([seed], min(asked.periods, CONTACT_PERIODS))
-        return beyond_flips(Followed(CONTACT, step_map, branches), asked, CONTACT_SAMPLES, progress)
+        return Followed(CONTACT, step_map, branches)
     return Followed(CONTACT, None, ())
 
 
