@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -108,7 +108,8 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     for model in models_of(block, config, asked):
         followed = FOLLOW[model](asked, progress)
         found.append(with_curves(followed, asked, progress) if block.second is not None else followed)
-    content = Content(groups(found, parameter, block), summary(found, parameter, block))
+    said = summary(found, parameter, block) | {"left_out": left_out(found, asked)}
+    content = Content(groups(found, parameter, block), said)
     if not any(followed.branches for followed in found):
         raise NoAnswer(
             f"no gait with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}",
@@ -118,11 +119,31 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     return content
 
 
+def left_out(found: Sequence[Followed], asked: Question) -> list[dict[str, str]]:
+    """What was not followed, and why."""
+    followed = {one.model: one for one in found}
+    entries = []
+    for model in wanted_models(asked.config.continuation):
+        if model not in followed:
+            entries.append((f"the {model} model's gaits", f"{asked.parameter.key} does not touch that model"))
+        elif not followed[model].branches:
+            entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
+        elif model == CONTACT and asked.periods > CONTACT_PERIODS:
+            what = f"the contact model's gaits of more than {CONTACT_PERIODS} steps"
+            entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
+    return [{"what": what, "why": why, "saves": ""} for what, why in entries]
+
+
+def wanted_models(block: Continuation) -> tuple[str, ...]:
+    """The models that are asked for."""
+    return (RIGID, CONTACT) if block.model == "both" else (block.model,)
+
+
 def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str, ...]:
     """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
     if block.model != RIGID and config.contact is None:
         raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
-    wanted = (RIGID, CONTACT) if block.model == "both" else (block.model,)
+    wanted = wanted_models(block)
     refuse_values(asked)
     refuse_second(config)
     touched = tuple(model for model in wanted if touches(asked, model))
