@@ -12,7 +12,7 @@ from walkerlab.orbits.attractors import close_returns, feigenbaum_ratios, larges
 from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import Follower, Limits, Seed, Span
+from walkerlab.orbits.families import Follower, Limits, Seed, Span, period_amplitude
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_maps import CompassMap, multipliers_of, walk_steps
@@ -213,6 +213,13 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
     assert [end.reason for end in stable.ends] == ["end of the span"] * 2
     doubled = next(b for b in branches if b.period == 2)
     assert doubled.stable_ranges == ((flips[(1, "flip")], flips[(2, "flip")]),)
+
+
+def test_a_doubled_branch_is_followed_away_from_its_flip():
+    for branch in compass_family():
+        if branch.period > 1:
+            parted = [period_amplitude(point.solved, branch.period) for point in branch.points[:3]]
+            assert 0.0 < parted[0] < parted[1] < parted[2]
 
 
 def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():
