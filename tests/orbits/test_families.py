@@ -158,14 +158,28 @@ def multiplier_by_differences(step, z, slope):
 
 
 @pytest.mark.parametrize(
-    ("walker_at", "step", "span", "coordinates"),
+    ("walker_at", "step", "span", "coordinates", "printed"),
     [
-        (paper_walker, compass_step, (1e-4, 0.1, 0.05), lambda z, _: z * [1.0, np.sqrt(G / L), np.sqrt(G / L)]),
-        (simplest_walker, simplest_step, (5e-3, 0.0185, 0.012), lambda z, slope: np.array([z[0] + slope, z[2]])),
+        (
+            paper_walker,
+            compass_step,
+            (1e-4, 0.1, 0.05),
+            lambda z, _: z * [1.0, np.sqrt(G / L), np.sqrt(G / L)],
+            np.radians(4.37),
+        ),
+        (
+            simplest_walker,
+            simplest_step,
+            (5e-3, 0.0185, 0.012),
+            lambda z, slope: np.array([z[0] + slope, z[2]]),
+            0.0151,
+        ),
     ],
     ids=["compass", "simplest"],
 )
-def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(walker_at, step, span, coordinates):
+def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(
+    walker_at, step, span, coordinates, printed
+):
     branch = next(b for b in family(walker_at, *span, 8) if b.period == 1 and any(p.stable for p in b.points))
     (flip,) = branch.bifurcations
     z = coordinates(flip.point.x[:-1], flip.value)
@@ -176,6 +190,7 @@ def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences
     elsewhere = slopes[0] - values[0] * (slopes[1] - slopes[0]) / (values[1] - values[0])
     assert flip.kind == "flip"
     assert abs(flip.value - elsewhere) < 1e-7
+    assert flip.value == pytest.approx(printed, rel=6e-3)  # Goswami et al. 1996, Garcia et al. 1998
 
 
 def test_the_cascade_of_the_compass_is_followed_by_itself():
