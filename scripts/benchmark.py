@@ -28,11 +28,16 @@ from whole_process import whole_process_times
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.config.loader import load
+from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import newton
+from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
+from walkerlab.stages.progress import Silent
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
@@ -170,6 +175,16 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 
 
+def family_lines(watch: Stopwatch) -> Iterator[Line]:
+    """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
+    config = load().config
+    rigid = Question(config, parameter_of("slope_rad", config), Span(1e-4, 0.1), periods=16, points=400)
+    yield at_most("rigid branches to period 16", watch(lambda: rigid_branches(rigid, Silent())), "s", 5.0, 2.5)
+    contact = Question(config, parameter_of("slope_deg", config), Span(0.2, 4.2), periods=1, points=400)
+    seconds = watch(lambda: contact_branches(contact, Silent()))
+    yield at_most("contact branch from 0.2 deg to beyond its first flip", seconds, "s", 60.0, 30.0)
+
+
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     """The two right-hand sides, and what generality costs."""
     rigid, contact, hinged = times["rigid"], times["contact"], times["contact, hinged"]
@@ -250,7 +265,7 @@ def main() -> None:
     options = parser.parse_args()
     watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
 
-    lines = [*rigid_lines(watch), *newton_lines(watch)]
+    lines = [*rigid_lines(watch), *newton_lines(watch), *family_lines(Stopwatch(3, 10.0))]
     trial = contact_trial_at_one_degree()
     reference = reference_for(trial)
     lines += contact_lines(trial, reference, watch)
