@@ -76,7 +76,7 @@ def slice_of(values: NDArray[Any]) -> NDArray[Any]:
 
 def draw(axes: Axes, cells: Group, plane: tuple[str, str], values: NDArray[Any], **how: Any) -> Any:
     """Values of cells, the first coordinate across."""
-    sides = [side for name in plane for side in sides_of(cells[name])]
+    sides = (*sides_of(cells[plane[0]]), *sides_of(cells[plane[1]]))
     return axes.imshow(values.T, extent=sides, origin="lower", aspect="auto", interpolation="nearest", **how)
 
 
@@ -154,9 +154,8 @@ def caption(results: Results) -> str:
         if row["cells"]
     ]
     if summary["unsettled_cells"]:
-        said.append(
-            f"{summary['unsettled_cells']:,} cells still walk, unsettled, after {summary['steps_wanted']} steps."
-        )
+        unsettled, steps = summary["unsettled_cells"], summary["steps_wanted"]
+        said.append(f"{unsettled:,} cells still walk after {steps} steps and have settled on no gait.")
     return " ".join(said)
 
 

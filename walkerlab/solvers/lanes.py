@@ -26,7 +26,7 @@ Lanes = Any
 """A number in each lane; for annotations."""
 
 
-class LanesType(types.Type):
+class LanesType(types.Type):  # type: ignore[misc]
     """Type of lanes in compiled code; a float may be taken for them."""
 
     def __init__(self) -> None:

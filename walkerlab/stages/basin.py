@@ -161,7 +161,7 @@ def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str,
 
 def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> Group:
     """The grid."""
-    dims = tuple(settings.plane)
+    dims: tuple[str, ...] = settings.plane
     variables = {
         name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
         for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
