@@ -15,7 +15,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.mechanics.heel_strike import feet_on_slope, impact
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.rigid_compass import RigidWalker, accelerations
 from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
@@ -42,6 +42,19 @@ NO_ERROR = 1e-300
 WALKED, FELL, REJECTED = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.REJECTED)
 NO_HEEL_STRIKE, BUDGET_EXHAUSTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.BUDGET_EXHAUSTED)
 SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
+
+
+class Swings(NamedTuple):
+    """The swing phases of one walker in all lanes."""
+
+    walker: RigidWalker
+
+
+@derivative.case(Swings, woven=True)
+def swings_derivative(system: Swings, t: float, y: State) -> State:
+    """As that of the walker."""
+    alpha_1, alpha_2 = accelerations(system.walker, y[0], y[1], y[2], y[3])
+    return (y[2], y[3], alpha_1, alpha_2)
 
 
 class LaneMemory(NamedTuple):
@@ -174,7 +187,7 @@ def try_steps(walker: RigidWalker, memory: LaneMemory) -> bool:
     y, k1 = four(rows, START), four(rows, START_RATE)
     left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
     h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(walker, 0.0, y, k1, h)
+    used, end, end_rate = stages_of(Swings(walker), 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
