@@ -22,7 +22,9 @@ Refused = Callable[..., str]
 
 def test_without_a_path_it_is_the_paper() -> None:
     paper = load()
-    assert paper.config == Config(contact=Contact())
+    assert paper.config == Config(contact=Contact(), source=paper.config.source)
+    assert paper.config.source is not None
+    assert "MSC ADAMS" in paper.config.source.title
     assert (paper.run_name, paper.warnings, paper.source) == ("paper", (), "built-in paper.yaml")
 
 

@@ -78,7 +78,9 @@ def test_the_index_has_every_file_as_it_was_written(whole):
 def test_each_entry_has_the_words_and_the_files_of_its_figure(whole):
     folder, content = whole
     for entry in content.summary["figures"]:
-        assert set(entry) == {"number", "title", "svg", "png", "caption"}
+        assert set(entry) == {"number", "title", "svg", "png", "caption", "alt", "results"}
+        assert entry["alt"].endswith(".")
+        assert set(entry["results"]) <= {stage.name for stage in PIPELINE.stages}
         assert (folder / entry["svg"]).is_file()
         assert (folder / entry["png"]).is_file()
 

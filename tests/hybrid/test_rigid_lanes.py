@@ -5,8 +5,8 @@ import pytest
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, walk_lanes
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
+from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import method_named
 
 STEPS = 10
@@ -29,7 +29,7 @@ def on_slope(walker, z):
 def in_lanes(walker, starts, rtol=1e-9, steps=STEPS):
     strikes = Strikes(np.zeros((len(starts), steps)), np.zeros((len(starts), steps, 4)))
     fates = new_fates(len(starts))
-    walk_lanes(walker, new_lane_memory(rtol, 1e-2 * rtol), strikes, starts, fates)
+    walk_lanes(two_legs(assembled(walker)), new_lane_memory(rtol, 1e-2 * rtol), strikes, starts, fates)
     return fates, strikes
 
 
@@ -54,7 +54,7 @@ def test_random_starts_fare_as_they_do_one_by_one(walker):
     method = method_named("dop853").new(4, 1e-12, 1e-14, 10**7)
     time = np.sqrt(walker.leg_length / walker.gravity)
     for i, start in enumerate(starts.tolist()):
-        walk = take_walk(walker, method, tuple(start), STEPS)
+        walk = take_walk(assembled(walker), method, tuple(start), STEPS)
         walked = walk.steps == STEPS  # a ground that would have to pull does not end a rigid walk
         assert (fates.outcome[i], fates.steps[i]) == (0 if walked else walk.outcome, walk.steps)
         assert strikes.times[i, : walk.steps] == pytest.approx(walk.heel_strikes, abs=1e-6 * time)
@@ -66,7 +66,7 @@ def test_starts_around_a_gait_walk_as_they_do_one_by_one():
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
     method = method_named("dop853").new(4, 1e-11, 1e-13, 10**7)
-    walks = [take_walk(ONE_DEGREE, method, tuple(start), STEPS) for start in starts.tolist()]
+    walks = [take_walk(assembled(ONE_DEGREE), method, tuple(start), STEPS) for start in starts.tolist()]
     assert [walk.steps for walk in walks] == fates.steps.tolist()
     assert 10 < np.count_nonzero(fates.steps == STEPS) < 60
     for i, walk in enumerate(walks):

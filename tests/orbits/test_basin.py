@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
+from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.orbits.basin import (
     CAPTURE,
     NONE,
@@ -18,10 +18,15 @@ from walkerlab.orbits.basin import (
     inside_cell,
     on_section,
 )
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import method_named
 
-UNIT = RigidWalker(1.0, 0.5, 0.25, 0.5, 0.0, 1.0, np.deg2rad(1.0), CORRECTED)
-STEEPER = UNIT._replace(slope=np.deg2rad(4.7))
+
+def at_slope(degrees):
+    return two_legs(assembled(RigidWalker(1.0, 0.5, 0.25, 0.5, 0.0, 1.0, np.deg2rad(degrees), CORRECTED)))
+
+
+UNIT, STEEPER, STEEPEST = at_slope(1.0), at_slope(4.7), at_slope(5.15)
 RATE = np.sqrt(9.81)
 # published states of the paper's walker at one degree, and near the gait at 4.7
 GAIT = np.array([0.1695390, -0.6057394 / RATE, -0.8617140 / RATE])
@@ -40,7 +45,7 @@ def gentle():
 
 def walked(walker, z, steps):
     method = method_named("dop853").new(4, 1e-12, 1e-14, 10**7)
-    return take_walk(walker, method, tuple(on_section(walker, np.atleast_2d(z))[0].tolist()), steps)
+    return take_walk(walker.model, method, tuple(on_section(walker, np.atleast_2d(z))[0].tolist()), steps)
 
 
 def test_the_only_attractor_of_a_gentle_slope_is_its_gait(gentle):
@@ -59,7 +64,7 @@ def test_past_the_first_flip_steps_repeat_in_pairs():
 
 
 def test_where_steps_never_repeat_there_is_no_cycle():
-    found = find_attractors(UNIT._replace(slope=np.deg2rad(5.15)), around(STEEP_GAIT), seed=0)
+    found = find_attractors(STEEPEST, around(STEEP_GAIT), seed=0)
     assert found.aperiodic
     assert found.cycles == ()
 

@@ -2,7 +2,7 @@
 
 from html.parser import HTMLParser
 
-VOID = {"meta", "img", "input", "line", "rect", "circle", "polyline"}
+VOID = {"meta", "img", "input", "line", "polyline"}
 
 
 class Page(HTMLParser):

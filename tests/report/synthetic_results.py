@@ -137,6 +137,31 @@ def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
     return stored("contact-sim", {"trajectory": trajectory}, walk(outcome, steps, **(numbers | changed)))
 
 
+def with_motion(result):
+    """The same result, whose trajectory also has what the player's other views show: velocities, energies, forces."""
+    trajectory = result.groups["trajectory"]
+    time = trajectory["time"]
+    pair, wave = ("time", "leg"), np.sin(9.0 * time)
+    both = np.column_stack((wave, -wave))
+    more = {
+        "velocity": Variable(both, pair, "rad/s", "velocity"),
+        "kinetic_J": column(4.0 + wave, "time", "J"),
+        "potential_J": column(146.0 - wave, "time", "J"),
+        "mechanical_J": column(150.0 + 0.0 * wave, "time", "J"),
+    }
+    if result.identity.stage == "contact-sim":
+        loaded = np.column_stack((wave > 0.0, wave <= 0.0))
+        more |= {
+            "angle": Variable(0.2 * both, pair, "rad", "angle"),
+            "normal_force_N": Variable(196.0 * loaded, pair, "N", "normal force"),
+            "friction_force_N": Variable(10.0 * both * loaded, pair, "N", "friction"),
+            "penetration_m": Variable(6e-5 * np.abs(both) * loaded, pair, "m", "penetration"),
+            "slip_velocity_m_s": Variable(1e-3 * both, pair, "m/s", "slip velocity"),
+        }
+    groups = {**result.groups, "trajectory": Group({**trajectory.variables, **more})}
+    return stored(result.identity.stage, groups, result.summary)
+
+
 def paper_row(where, quantity, printed, verdict, evidence, **values):
     models = {"unit": "rad", "as_printed": None, "corrected": None, "contact": None}
     return {"where": where, "quantity": quantity, "printed": printed, "verdict": verdict, "evidence": evidence} | (

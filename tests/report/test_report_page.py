@@ -9,18 +9,28 @@ import pytest
 from html_page import Page
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
-from walkerlab.report.blocks import Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
-from walkerlab.report.lead import lead
-from walkerlab.report.page import render
-from walkerlab.report.registry import sections_of
+from walkerlab.report.blocks import MAIN, Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
+from walkerlab.report.page import Page as Sheet
+from walkerlab.report.page import render, said
+from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
-DRAWN = Picture("Figure 7. Legs.", "Both legs.", "Figure 7: legs.", "data:image/svg+xml;base64,PHN2Zy8+", 518, 400)
+PIXELS = "data:image/png;base64,"
+DRAWN = Picture("Figure 7. Legs.", "Both legs.", "Figure 7: legs.", None, PIXELS, 518, 400, "figure-07")
+READS_AS_TYPED = {"style", "script", "pre", "code"}
+
+
+def pages(results):
+    return {page.file: render(page) for page in pages_of(results, "paper")}
 
 
 def page_of(results):
-    return render("Passive walking: paper", lead(results, "paper"), sections_of(results))
+    return pages(results)[MAIN]
+
+
+def sheet(*sections, title="t", lead=()):
+    return render(Sheet(title, sections, lead))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +46,8 @@ def page(whole):
 def test_nothing_is_fetched_from_elsewhere(whole, page):
     links = [value for _, attrs in page.elements for name, value in attrs.items() if name in ("src", "href", "srcset")]
     assert links
-    assert all(link.startswith(("#", "data:")) for link in links)
+    beside = pages(Results(config(), {name: make() for name, make in EVERYTHING.items()}, (DRAWN,)))
+    assert all(link.startswith(("#", "data:")) or link in beside for link in links)
     assert not {"link", "iframe", "object", "embed", "base"} & {tag for tag, _ in page.elements}
     assert not re.search(r"@import|url\(", whole)
 
@@ -50,7 +61,8 @@ def test_the_page_itself_forbids_fetching_and_foreign_scripts(page):
 
 def test_every_id_is_unique_and_every_link_leads_to_one(page):
     assert len(set(page.ids)) == len(page.ids)
-    assert {attrs["href"].removeprefix("#") for attrs in page.all("a")} <= set(page.ids)
+    inside = {attrs["href"].removeprefix("#") for attrs in page.all("a") if attrs["href"].startswith("#")}
+    assert inside <= set(page.ids)
     labels = [attrs["aria-labelledby"] for _, attrs in page.elements if "aria-labelledby" in attrs]
     assert set(labels) <= set(page.ids)
 
@@ -59,11 +71,16 @@ def test_every_picture_says_what_it_shows(page):
     assert page.all("img")
     assert all(attrs["alt"].strip() for attrs in page.all("img"))
     assert all(attrs["role"] == "img" and attrs["aria-label"].strip() for attrs in page.all("svg"))
+    assert all(attrs["role"] == "img" and attrs["aria-label"].strip() for attrs in page.all("canvas"))
 
 
-def test_every_table_has_a_caption_and_every_head_a_scope(page):
-    assert len(page.all("table")) == len(page.all("caption")) == len(page.said("caption"))
-    assert {attrs.get("scope") for attrs in page.all("th")} == {"col", "row", "rowgroup"}
+def test_every_table_has_a_caption_and_every_head_a_scope():
+    results = Results(config(), {name: make() for name, make in EVERYTHING.items()}, (DRAWN,))
+    found = [Page(html) for html in pages(results).values()]
+    for page in found:
+        named = [attrs for attrs in page.all("table") if "aria-label" not in attrs]
+        assert len(named) == len(page.all("caption")) == len(page.said("caption"))
+    assert {attrs.get("scope") for page in found for attrs in page.all("th")} == {"col", "row", "rowgroup"}
 
 
 def test_headings_go_down_one_level_at_a_time(page):
@@ -81,9 +98,22 @@ def test_language_encoding_and_width_are_declared(whole, page):
 
 
 def test_what_needs_scripts_is_hidden_until_they_run(page):
-    (controls,) = [attrs for attrs in page.all("div") if attrs.get("class") == "controls"]
-    assert "hidden" in controls
-    assert all("hidden" in attrs for tag, attrs in page.elements if tag == "g" and "data-frames" in attrs)
+    (live,) = [attrs for attrs in page.all("div") if attrs.get("class") == "live"]
+    assert "hidden" in live
+    assert [attrs for attrs in page.all("svg") if attrs.get("class") == "stills"]
+
+
+def test_no_text_has_a_backtick_or_a_number_as_programs_print_it(page):
+    texts = [part for tag, parts in page.words.items() if tag not in READS_AS_TYPED for part in parts]
+    assert not any("`" in text for text in texts)
+    assert not any(re.search(r"\d[eE][-+]?\d", text) for text in texts if not re.search("[0-9a-f]{16}", text))
+
+
+def test_what_is_to_be_typed_is_set_as_code_and_powers_are_raised():
+    assert said("`walkerlab x --at 1e-3` errs by 2.5e-07, 1e-03 and 10^-4") == (
+        "<code>walkerlab x --at 1e-3</code> errs by 2.5 × 10⁻⁷, 10⁻³ and 10⁻⁴"
+    )
+    assert said("`<b>` & <i>") == "<code>&lt;b&gt;</code> &amp; &lt;i&gt;"
 
 
 def test_texts_of_results_never_become_markup():
@@ -97,15 +127,16 @@ def test_texts_of_results_never_become_markup():
             "contact-sim": contact_sim(NASTY, 1, advice=NASTY),
             "compare": compare([row]),
         },
-        (Picture(NASTY, NASTY, NASTY, "data:image/png;base64,", 1, 1),),
+        (Picture(NASTY, NASTY, NASTY, None, PIXELS, 1, 1, NASTY, ((NASTY, NASTY),)),),
         (Absent(NASTY, NASTY, failed=True), Absent("tune", NASTY)),
     )
-    html = render(NASTY, [NASTY, *lead(results, f"paper@{NASTY}")], sections_of(results))
-    page = Page(html)
-    assert NASTY not in html
-    assert len(page.all("script")) == 1
-    assert not page.all("b") or all("title" not in attrs for attrs in page.all("b"))
-    assert page.said("h1") == [NASTY]
+    for one in pages_of(results, f"paper@{NASTY}"):
+        html = render(one)
+        page = Page(html)
+        assert NASTY not in html
+        assert len(page.all("script")) == 1
+        assert not page.all("b") or all("title" not in attrs for attrs in page.all("b"))
+        assert NASTY in " ".join(page.said("h1"))
 
 
 def test_command_lines_and_versions_never_become_markup():
@@ -126,14 +157,14 @@ def test_any_block_may_hold_any_text():
             table(NASTY, [Column(NASTY), Column(NASTY, numeric=True)], [[NASTY, NASTY]], wordy=True, note=NASTY),
         ),
     )
-    html = render("t", [], [section])
+    html = sheet(section)
     assert NASTY not in html
     assert Page(html).said("h2") == [NASTY]
 
 
 @pytest.mark.parametrize("row", [[Cell("it", "good"), "other"], ["other", Cell("it", "good")]])
 def test_a_cell_with_a_tone_is_a_badge_in_the_first_column_too(row):
-    html = render("t", [], [Section("s", "S", (table("t", [Column("a"), Column("b")], [row]),))])
+    html = sheet(Section("s", "S", (table("t", [Column("a"), Column("b")], [row]),)))
     assert '<span class="badge good">it</span>' in html
 
 
@@ -144,7 +175,7 @@ def test_the_same_results_give_the_same_bytes(whole):
 
 def test_two_sections_cannot_have_one_anchor():
     with pytest.raises(ValueError, match="one anchor"):
-        render("t", [], [Section("a", "A"), Section("a", "B")])
+        sheet(Section("a", "A"), Section("a", "B"))
 
 
 def test_a_row_with_a_cell_too_few_is_refused():

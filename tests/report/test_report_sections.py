@@ -1,5 +1,6 @@
 """What the report says: the verdict first, and of everything else what there are results of."""
 
+import base64
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -22,11 +23,12 @@ from synthetic_results import (
     stored,
 )
 
-from walkerlab.report.blocks import Code, Findings, Paragraph, Player, Section, Shares, Table
+from walkerlab.report.blocks import PAPER, Code, Findings, Paragraph, Player, Section, Shares, Table
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.verdict import HEADLINES
+from walkerlab.report.tracks import Track, slip_since_touch
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
@@ -159,8 +161,8 @@ def test_the_papers_numbers_are_counted_by_verdict():
 
 def test_the_verdict_says_which_numbers_fared_how():
     said = {finding.about: finding.text for finding in blocks(sections()["verdict"], Findings)[1].items}
-    assert list(said) == ["Reproduced", "Explained", "Refuted"]
-    assert said["Refuted"].startswith("Table 3 (all 2). ")
+    assert list(said) == ["Reproduced:", "Explained:", "Refuted:"]
+    assert said["Refuted:"] == "Table 3 (all 2)."
 
 
 def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
@@ -174,11 +176,14 @@ def test_every_headline_is_of_an_erratum_that_is_looked_for():
     assert [start for start in HEADLINES if f'"{start}' not in places.read_text()] == []
 
 
-def test_a_scene_that_is_not_the_papers_is_said_before_its_numbers_are_judged():
+def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_on_a_page_of_its_own():
     other = stored("compare", compare().groups, {**compare().summary, "departures": ["slope_rad 0.05"]})
-    (said,) = blocks(sections([], compare=other)["verdict"], Paragraph)[:1]
+    found = sections(compare=other)
+    assert not blocks(found["verdict"], Shares)
+    assert "paper" not in texts(found["verdict"]).lower()
+    assert found["paper-numbers"].page == PAPER
+    (said,) = blocks(found["paper-numbers"], Paragraph)
     assert "slope_rad 0.05" in said.text
-    assert said.tone == "fair"
 
 
 def test_the_papers_tables_stand_beside_ours_without_empty_columns():
@@ -268,31 +273,58 @@ def test_provenance_names_key_digest_commit_and_command_of_each_result():
         assert part in said
 
 
+def channels(walker):
+    """The numbers of a player's walker, by their names."""
+    floats = np.frombuffer(base64.b64decode(walker.floats), "<f4").reshape(len(walker.channels), walker.samples)
+    return dict(zip(walker.channels, floats.astype(float), strict=True))
+
+
 def test_stick_figures_stand_where_the_walker_stood():
     (player,) = sections(["simulate"])["motion"].blocks
     assert isinstance(player, Player)
-    frames = np.array(player.walkers[0].frames) / 1000
-    instants = np.array(player.instants)
-    legs = frames.reshape(-1, 3, 2)
-    for foot in (0, 2):
-        assert np.allclose(np.hypot(*(legs[:, 1] - legs[:, foot]).T), 1.0, atol=2e-3)
+    found = channels(player.walkers[0])
+    for leg in "01":
+        reach = np.hypot(found["hx"] - found[f"fx{leg}"], found["hy"] - found[f"fy{leg}"])
+        assert np.allclose(reach, 1.0, atol=1e-6)
     # The first leg swings from a step behind the foothold to a step ahead, where it then stands.
-    assert legs[0, 0, 0] == pytest.approx(-LENGTH, abs=2e-3)
-    second = np.abs(instants - 1.5 * PERIOD).argmin()
-    assert legs[second, 0] == pytest.approx([LENGTH, 0.0], abs=4e-3)
-    assert legs[0, 2] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert found["fx0"][0] == pytest.approx(-LENGTH, abs=1e-6)
+    second = np.abs(found["t"] - 1.5 * PERIOD).argmin()
+    assert (found["fx0"][second], found["fy0"][second]) == pytest.approx((LENGTH, 0.0), abs=2e-3)
+    assert (found["fx1"][0], found["fy1"][0]) == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
-def test_the_picture_holds_the_whole_walk():
+def test_stills_hold_the_whole_walk():
     (player,) = sections()["motion"].blocks
     left, top, width, height = player.view
-    points = np.array([frame for walker in player.walkers for frame in walker.frames]).reshape(-1, 2)
-    x = points[:, 0] * np.cos(SLOPE) + points[:, 1] * np.sin(SLOPE)
-    y = points[:, 0] * np.sin(SLOPE) - points[:, 1] * np.cos(SLOPE)
+    points = np.array([joint for walker in player.walkers for still in walker.stills for joint in still])
+    x = points[:, 0] * np.cos(SLOPE) - points[:, 1] * np.sin(SLOPE)
+    y = points[:, 0] * np.sin(SLOPE) + points[:, 1] * np.cos(SLOPE)
     assert left <= x.min()
     assert x.max() <= left + width
     assert top <= y.min()
     assert y.max() <= top + height
+
+
+def test_thinning_keeps_jumps_and_the_largest_force():
+    time = np.concatenate((np.linspace(0.0, 1.0, 1001), np.linspace(1.0, 2.0, 1001)))
+    force = np.ones(time.size)
+    force[1234] = 9.0
+    angle = np.where(np.arange(time.size) <= 1000, 1.0, -1.0)
+    thin = Track({"t": time, "a0": angle, "n0": force, "n1": 0.0 * force}).thinned(0.05)
+    assert thin["t"].size < 100
+    assert thin["n0"].max() == 9.0
+    assert thin.end == 2.0
+    before, after = np.flatnonzero(thin["t"] == 1.0)[[0, -1]]
+    assert (thin["a0"][before], thin["a0"][after]) == (1.0, -1.0)
+
+
+def test_slip_counts_from_the_touch_and_is_nothing_in_the_air():
+    time = np.linspace(0.0, 4.0, 4001)
+    touching = (time < 1.0) | (time > 3.0)
+    slip = slip_since_touch(time, np.full(time.size, 0.5), touching)
+    assert slip[-1] == pytest.approx(0.5, abs=1e-3)
+    assert not slip[~touching].any()
+    assert slip[500] == pytest.approx(0.25, abs=1e-3)
 
 
 def test_a_walk_without_stored_states_has_no_picture():

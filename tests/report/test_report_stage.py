@@ -14,9 +14,12 @@ from walkerlab.stages import report
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.report import write_pages
 from walkerlab.store.index import broken_file, indexed_files
 
-SVG = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396"><script>alert(1)</script></svg>'
+SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>
+<foreignObject/><path d="M0 0L518 396" onclick="alert(1)" style="fill: url(https://elsewhere.example/x)"/>
+<image href="https://elsewhere.example/y"/></svg>"""
 READS = PIPELINE["report"].reads
 
 
@@ -36,28 +39,72 @@ def run(folder, *sets, inputs=None, left_out=()):
 def test_the_page_is_written_and_indexed(tmp_path):
     content = run(tmp_path)
     assert content.summary["html"] == "report.html"
-    written = (tmp_path / "report.html").read_bytes()
-    assert indexed_files(content) == {"report.html": hashlib.sha256(written).hexdigest()}
+    pages = sorted(tmp_path.iterdir())
+    assert [path.name for path in pages] == ["report-paper.html", "report.html"] == sorted(content.summary["pages"])
+    assert indexed_files(content) == {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in pages}
     assert broken_file(tmp_path, content) is None
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
 def test_the_summary_lists_figures_and_tables_as_they_stand_on_the_page(tmp_path):
     inputs = {name: make() for name, make in EVERYTHING.items()} | {"plot": plot(tmp_path)}
     content = run(tmp_path, inputs=inputs)
-    page = Page((tmp_path / "report.html").read_text())
-    assert content.summary["tables"] == page.said("caption")
+    pages = [Page((tmp_path / file).read_text()) for file in content.summary["pages"]]
+    assert content.summary["tables"] == [caption for page in pages for caption in page.said("caption")]
     assert content.summary["figures"] == ["Figure 7. Legs."]
-    assert "Figure 7. Legs." in page.said("b")
+    assert "Figure 7. Legs." in pages[0].said("b")
 
 
-def test_drawn_figures_are_embedded_whole_and_their_scripts_cannot_run(tmp_path):
+def test_drawn_figures_are_embedded_and_nothing_in_them_can_run_or_fetch(tmp_path):
     run(tmp_path, inputs={"plot": plot(tmp_path)})
     html = (tmp_path / "report.html").read_text()
-    (image,) = Page(html).all("img")
-    assert image["src"].startswith("data:image/svg+xml;base64,")
-    assert (image["width"], image["height"]) == ("518", "396")
-    assert "alert(1)" not in html
+    (drawn,) = [attrs for attrs in Page(html).all("svg") if attrs.get("viewbox") == "0 0 518.4 396"]
+    assert drawn["aria-label"].startswith("Legs.")
+    assert "M0 0L518 396" in html
+    for part in ("alert", "onload", "foreignObject", "elsewhere.example"):
+        assert part not in html
+
+
+def test_figures_have_the_papers_numbers_only_where_the_scene_is_the_papers(tmp_path):
+    departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
+    inputs = {"compare": EVERYTHING["compare"](), "plot": plot(tmp_path)}
+    assert run(tmp_path, inputs=inputs).summary["figures"] == ["Figure 7. Legs."]
+    assert run(tmp_path, inputs=inputs | {"compare": departs}).summary["figures"] == ["Legs."]
+
+
+def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
+    left_out = [LeftOut("compare", "not yet"), LeftOut("tune", "the config has no contact block")]
+    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out, ("compare", "accuracy"))
+    page = Page((tmp_path / "report.html").read_text())
+    assert any("Still being computed: compare, accuracy." in text for text in page.said("p"))
+    assert sum("Still being computed: " in text for text in page.said("p")) == 3
+    assert "not yet" not in page.text
+    assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
+
+
+def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):
+    run(tmp_path)
+    assert (tmp_path / "report-paper.html").exists()
+    run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()})
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [
+        ((), "A Modeling Framework for Rigid Legs Passive Dynamic Biped Walkers in MSC ADAMS"),
+        (
+            ("source={title: Wheels, authors: T. McGeer, published: 'IJRR, 1990', url: 'https://a.example/b'}",),
+            "Wheels",
+        ),
+    ],
+)
+def test_the_page_names_and_links_the_study_that_is_redone(tmp_path, sets, said):
+    run(tmp_path, *sets)
+    page = Page((tmp_path / "report.html").read_text())
+    assert said in page.text
+    if sets:
+        assert "T. McGeer," in page.text
+        assert {"href": "https://a.example/b", "rel": "noreferrer"} in page.all("a")
 
 
 def test_the_same_results_give_the_same_file(tmp_path):

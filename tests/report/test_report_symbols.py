@@ -20,7 +20,7 @@ def test_formulas(plain, signs):
 
 
 @pytest.mark.parametrize(
-    "text", ["eq. 9-2", "as-printed", "A.5 row 2, A.29", "t_left, v_com", "--set a.b=1", "less than 1%"]
+    "text", ["eq. 9-2", "as-printed", "A.5 row 2, A.29", "t_left, v_com", "--set a.b=1", "less than 1%", "k-1e8-linear"]
 )
 def test_prose(text):
     assert in_signs(text) == text

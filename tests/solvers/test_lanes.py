@@ -5,18 +5,19 @@ import math
 import numpy as np
 import pytest
 
-import walkerlab.mechanics.rigid_swing  # noqa: F401 (registers the equations)
 from walkerlab.ground.compliant import CompassParts, compass_assembly, contact_walker, pinned_walker
 from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.kernels import kernel
 from walkerlab.mechanics.fused import fused
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
+from walkerlab.mechanics.standing import Mode
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes
 from walkerlab.solvers.system import derivative
 
-WALKER = RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED)
+MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))
+WALKER = Mode(MODEL, MODEL.bent)
 PARTS = compass_assembly(CompassParts(1.0, 0.4, 5.0, 10.0, 0.1, 0.05))
 FREE = contact_walker(PARTS, NormalLaw(1e8, 2.2, 1e4, 1e-4), Frictionless(), 9.81, 0.05)
 HINGED = pinned_walker(PARTS, FREE, 1, 0.0)

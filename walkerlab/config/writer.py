@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config
+
+PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
+"""What YAML may read as more than text in an unquoted value."""
 
 
 def to_yaml(config: Config) -> str:
@@ -29,7 +33,7 @@ def _value(value: Any) -> str:
         return f"[{', '.join(_value(item) for item in value)}]"
     if isinstance(value, float):
         return _number(value)
-    if isinstance(value, str) and value_of(value) == value:
+    if isinstance(value, str) and value_of(value) == value and not PUNCTUATION.search(value):
         return value
     return json.dumps(value)
 

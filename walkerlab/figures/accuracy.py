@@ -172,10 +172,16 @@ def caption(scene: str, results: Results) -> str:
     )
 
 
+SEEN = (
+    "Two plots of error on logarithmic axes, against run time and against evaluations of the right-hand side: "
+    "a falling line for each method."
+)
+
+
 def figure_for(scene: str, title: str) -> Illustration:
     """The figure of one scene."""
     need = Need("accuracy", f"{scene}/rows", VARIABLES, f"it did not measure the scene {scene}")
-    return Illustration(f"accuracy-{scene}", title, (need,), partial(caption, scene), partial(plot, scene))
+    return Illustration(f"accuracy-{scene}", title, (need,), partial(caption, scene), partial(plot, scene), seen=SEEN)
 
 
 FIGURES = (

@@ -40,4 +40,8 @@ def caption(results: Results) -> str:
     return f"One gait cycle of the rigid model, to scale. {cycle_caption(sticks_of(results))}"
 
 
-FIGURE = paper_figure(2, "Stick diagram of the rigid model", (RIGID_STATES, STEPS_TAKEN_RIGID), caption, plot)
+SEEN = (
+    "Legs as straight lines from the hip to the feet, fanned out from one foothold to the next, down the "
+    "slope to the right."
+)
+FIGURE = paper_figure(2, "Stick diagram of the rigid model", (RIGID_STATES, STEPS_TAKEN_RIGID), caption, plot, SEEN)

@@ -58,4 +58,8 @@ def caption(results: Results) -> str:
     return f"Angular velocities of both links{extent}; the contact model begins at {start}, {walked}."
 
 
-FIGURE = paper_figure(5, "Angular velocities from the adjusted start", (ADJUSTED, FROM_RIGID), caption, plot)
+SEEN = (
+    "Two plots over time, one a link: each velocity rises to one hump while its leg swings and to a lower "
+    "one while it stands."
+)
+FIGURE = paper_figure(5, "Angular velocities from the adjusted start", (ADJUSTED, FROM_RIGID), caption, plot, SEEN)

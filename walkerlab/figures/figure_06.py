@@ -86,4 +86,10 @@ def caption(results: Results) -> str:
 
 CONTACT_JOINTS = Need(CONTACT_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES)
 
-FIGURE = paper_figure(6, "Stick diagram of the contact model", (CONTACT_JOINTS, STEPS_TAKEN_CONTACT), caption, plot)
+SEEN = (
+    "Legs as straight lines from the hip to the feet, fanned out from one foothold to the next, and the "
+    "ground under them."
+)
+FIGURE = paper_figure(
+    6, "Stick diagram of the contact model", (CONTACT_JOINTS, STEPS_TAKEN_CONTACT), caption, plot, SEEN
+)

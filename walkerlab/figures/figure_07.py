@@ -38,4 +38,8 @@ def caption(results: Results) -> str:
     return f"Angles from the vertical and angular velocities of both legs{extent}. {sentence(walks)}"
 
 
-FIGURE = paper_figure(7, "Angles and angular velocities of the legs", (RIGID_STATES,), caption, plot)
+SEEN = (
+    "Four plots over time below one another: angle of each leg, rising fast and falling slowly, and its "
+    "angular velocity."
+)
+FIGURE = paper_figure(7, "Angles and angular velocities of the legs", (RIGID_STATES,), caption, plot, SEEN)

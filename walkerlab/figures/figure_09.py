@@ -102,4 +102,8 @@ def caption(results: Results) -> str:
     )
 
 
-FIGURE = paper_figure(9, "Limit cycles of the legs", (RIGID_STATES,), caption, plot)
+SEEN = (
+    "Two phase portraits, one a leg: a closed loop, round above for the swing, notched below for the "
+    "stance, with jumps at the heel strikes."
+)
+FIGURE = paper_figure(9, "Limit cycles of the legs", (RIGID_STATES,), caption, plot, SEEN)

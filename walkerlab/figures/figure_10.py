@@ -73,4 +73,8 @@ def mean_energy(walk: Walk) -> float:
     return float(np.sum(0.5 * (energy[1:] + energy[:-1]) * np.diff(time))) / duration
 
 
-FIGURE = paper_figure(10, "Kinetic, potential and mechanical energy", (RIGID_ENERGIES,), caption, plot)
+SEEN = (
+    "Three plots over time: kinetic energy with a peak at each heel strike, potential energy with a dip "
+    "there, and their sum."
+)
+FIGURE = paper_figure(10, "Kinetic, potential and mechanical energy", (RIGID_ENERGIES,), caption, plot, SEEN)

@@ -30,6 +30,7 @@ class Illustration:
     caption  one or two sentences with numbers of the results
     plot     the figure; called within the common style
     number   the paper's; None if the paper has no such figure
+    seen     what one sees, in a sentence or two, for those who do not see it
     """
 
     name: str
@@ -38,6 +39,12 @@ class Illustration:
     caption: Callable[[Results], str]
     plot: Callable[[Results], Figure]
     number: int | None = None
+    seen: str = ""
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages whose results it cannot be drawn without."""
+        return tuple(dict.fromkeys(need.stage for need in self.needs))
 
     @property
     def called(self) -> str:
@@ -66,6 +73,7 @@ def paper_figure(
     needs: tuple[Need, ...],
     caption: Callable[[Results], str],
     plot: Callable[[Results], Figure],
+    seen: str,
 ) -> Illustration:
     """A figure of the paper, drawn anew."""
-    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number)
+    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number, seen)

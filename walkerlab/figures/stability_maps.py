@@ -181,6 +181,7 @@ FIGURES = (
         (Need(STAGE, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER),),
         caption_stiction,
         plot_stiction,
+        seen="A map of small squares, coloured by how each walk ended, and one of its error.",
     ),
     Illustration(
         "stability-step",
@@ -188,5 +189,6 @@ FIGURES = (
         (Need(STAGE, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER),),
         caption_step,
         plot_step,
+        seen="A map of small squares, coloured by what became of each walk with a fixed step, and one of its error.",
     ),
 )

@@ -35,6 +35,11 @@ PAPER_STRIDES = 5
 """Strides that the paper's figures in time show; a longer walk's figures show its first ones."""
 
 
+def redoes_the_paper(results: Results) -> bool:
+    """Whether the scene is the paper's own; of any other, figures say nothing of the paper."""
+    return COMPARE_STAGE in results and not results[COMPARE_STAGE].summary.get("departures")
+
+
 @dataclass(frozen=True, eq=False)
 class Walk:
     """A walk in time.

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import walkerlab.mechanics.rigid_swing  # noqa: F401 (the equations of a RigidWalker, found by its type)
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel
-from walkerlab.mechanics.heel_strike import feet_on_slope, impact
-from walkerlab.mechanics.rigid_compass import RigidWalker, accelerations
+from walkerlab.mechanics.impact import heel_strike
+from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing, rates
 from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
@@ -37,24 +36,48 @@ ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike t
 REFINEMENTS = 6
 MOST_TRIES = 20_000  # of steps in one swing
 SMALLEST_STEP = 1e-13  # pendulum times
-FALLEN_ANGLE = math.acos(FALLEN_HIP)  # rad between stance leg and normal of the slope
 NO_ERROR = 1e-300
 WALKED, FELL, REJECTED = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.REJECTED)
 NO_HEEL_STRIKE, BUDGET_EXHAUSTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.BUDGET_EXHAUSTED)
 SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
 
 
+class TwoLegs(NamedTuple):
+    """The rigid model of two straight legs, with what lanes need of it."""
+
+    model: Standing
+    slope: float  # rad
+    upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
+    fallen: float  # rad from there, beyond which the hip is too low
+    pendulum_time: float  # s
+
+
+def two_legs(model: Standing) -> TwoLegs | None:
+    """The model as that of two straight legs; None if it has more bodies."""
+    if len(model.tree.arm_x) != 2 or not isinstance(model.knee, NoKnee):
+        return None
+    x, y = model.hip_x[STANCE], model.hip_y[STANCE]
+    lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
+    return TwoLegs(
+        model,
+        model.slope,
+        math.atan2(x, y),
+        math.acos(max(-1.0, lowest)),
+        math.sqrt(model.leg_length / model.gravity),
+    )
+
+
 class Swings(NamedTuple):
     """The swing phases of one walker in all lanes."""
 
-    walker: RigidWalker
+    mode: Mode
 
 
 @derivative.case(Swings, woven=True)
 def swings_derivative(system: Swings, t: float, y: State) -> State:
-    """As that of the walker."""
-    alpha_1, alpha_2 = accelerations(system.walker, y[0], y[1], y[2], y[3])
-    return (y[2], y[3], alpha_1, alpha_2)
+    """As that of the walker alone."""
+    alpha = rates(system.mode.model, system.mode.links, y)
+    return (y[2], y[3], alpha[0], alpha[1])
 
 
 class LaneMemory(NamedTuple):
@@ -112,7 +135,7 @@ def keep_strike(observer: Strikes, walk: int, step: int, t: float, y: State) -> 
 
 
 @kernel
-def walk_lanes(walker: RigidWalker, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
+def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
     """Walk from every start, until the observer ends the walk or it ends by itself.
 
     starts  (n, 4) states, both feet on the slope
@@ -138,14 +161,14 @@ def walk_lanes(walker: RigidWalker, memory: LaneMemory, observer: Any, starts: A
 
 
 @inlined
-def refill(walker: RigidWalker, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
+def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
     """Give a lane the next start that is one; returns how many starts have been given out."""
     while waiting < starts.shape[0]:
         y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
         waiting += 1
-        if hip_above_fall(walker, y) >= 0.0:
+        if hip_above_fall(walker.model, y) >= 0.0:
             memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
-            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * math.sqrt(walker.leg_length / walker.gravity))
+            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * walker.pendulum_time)
             return waiting
         fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
     memory.slots[SLOT_OF_START, lane] = NOBODY
@@ -154,14 +177,14 @@ def refill(walker: RigidWalker, memory: LaneMemory, starts: Any, fates: Fates, l
 
 
 @inlined
-def begin_swing(walker: RigidWalker, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
+def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
     """Have a lane start a swing from state y at time t (s), with a step h."""
     rows = memory.rows
-    rate = derivative(walker, t, y)
+    rate = derivative(Mode(walker.model, walker.model.bent), t, y)
     for i in range(4):
         rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
     rows[STEP, lane], rows[TIME, lane] = h, t
-    rows[LEFT, lane] = LONGEST_SWING * math.sqrt(walker.leg_length / walker.gravity)
+    rows[LEFT, lane] = LONGEST_SWING * walker.pendulum_time
     rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
 
 
@@ -177,7 +200,7 @@ def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 
 @inlined
-def try_steps(walker: RigidWalker, memory: LaneMemory) -> bool:
+def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
 
     A lane needs one if an event may lie in its step, if it arrives at one, if its time is over or its steps are too
@@ -187,14 +210,14 @@ def try_steps(walker: RigidWalker, memory: LaneMemory) -> bool:
     y, k1 = four(rows, START), four(rows, START_RATE)
     left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
     h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(Swings(walker), 0.0, y, k1, h)
+    used, end, end_rate = stages_of(Swings(Mode(walker.model, walker.model.bent)), 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))
     accepted = 1.0 - error
     over = NO_ERROR - (left - h)
-    pendulum_time = math.sqrt(walker.leg_length / walker.gravity)
+    pendulum_time = walker.pendulum_time
     stuck = max(tries - MOST_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
@@ -216,21 +239,27 @@ def try_steps(walker: RigidWalker, memory: LaneMemory) -> bool:
 
 
 @inlined
-def may_end(walker: RigidWalker, y: Any, end: Any, h: Lanes) -> Lanes:
+def feet_on_slope(walker: TwoLegs, theta_1: Any, theta_2: Any) -> Any:
+    """See `standing.feet_on_slope`."""
+    return theta_1 + theta_2 + 2.0 * (walker.slope + walker.model.lean)
+
+
+@inlined
+def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
     """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
-    return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope) - FALLEN_ANGLE)
+    return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope - walker.upright) - walker.fallen)
 
 
 @inlined
-def look_at(walker: RigidWalker, memory: LaneMemory, observer: Any, lane: int) -> int:
+def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
     if rows[TRIES, lane] >= MOST_TRIES:
         return BUDGET_EXHAUSTED
-    if abs(rows[TRIED, lane]) < SMALLEST_STEP * math.sqrt(walker.leg_length / walker.gravity):
+    if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
         return SOLVER_FAILED
     if rows[ARRIVING, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
@@ -259,11 +288,11 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 
 @inlined
-def arrive(walker: RigidWalker, memory: LaneMemory, observer: Any, lane: int) -> int:
+def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Strike if the step has led to the slope, else take the rest of the way."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
-    pendulum_time = math.sqrt(walker.leg_length / walker.gravity)
+    pendulum_time = walker.pendulum_time
     rate = rows[START + 2, lane] + rows[START + 3, lane]
     guard = feet_on_slope(walker, rows[START, lane], rows[START + 1, lane])
     wait = -guard / rate if rate != 0.0 else 0.0
@@ -273,7 +302,7 @@ def arrive(walker: RigidWalker, memory: LaneMemory, observer: Any, lane: int) ->
         rows[STEP, lane] = max(-usual, min(usual, wait))
         return GOES_ON
     y = bridged(rows, lane, wait)
-    new = impact(walker, y[0], y[1], y[2], y[3])
+    new = heel_strike(walker.model, y)
     step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
@@ -315,9 +344,9 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 
 
 @inlined
-def strike_in_step(walker: RigidWalker, memory: LaneMemory, lane: int) -> float:
+def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
-    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * walker.slope)
+    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * (walker.slope + walker.model.lean))
     at_start = memory.rows[FIRST, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
     if strike > 1.0:
@@ -329,11 +358,12 @@ def strike_in_step(walker: RigidWalker, memory: LaneMemory, lane: int) -> float:
 
 
 @inlined
-def fall_in_step(walker: RigidWalker, memory: LaneMemory, lane: int) -> float:
+def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
-    angle = memory.rows[END + 1, lane] + walker.slope
-    if abs(angle) <= FALLEN_ANGLE:
+    from_upright = walker.slope - walker.upright
+    angle = memory.rows[END + 1, lane] + from_upright
+    if abs(angle) <= walker.fallen:
         return NO_CROSSING
     side = 1.0 if angle > 0.0 else -1.0
-    height = in_step(memory, lane, 0.0, -side, FALLEN_ANGLE - side * walker.slope)
+    height = in_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
     return first_fall(memory.finder, height, False, 0.0)

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, Fates, new_fates, new_lane_memory, struck, walk_lanes
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -106,13 +105,13 @@ class Arrivals:
     last: Floats  # (n, 3) where they were last
 
 
-def on_section(walker: RigidWalker, z: Floats) -> Floats:
+def on_section(walker: TwoLegs, z: Floats) -> Floats:
     """States (n, 4) of section coordinates (n, 3)."""
-    return np.column_stack([-2.0 * walker.slope - z[:, 0], z])
+    return np.column_stack([-2.0 * (walker.slope + walker.model.lean) - z[:, 0], z])
 
 
 def arrivals(
-    walker: RigidWalker,
+    walker: TwoLegs,
     attractors: Attractors,
     z: Floats,
     most: int,
@@ -126,7 +125,7 @@ def arrivals(
     return Arrivals(fates.outcome, fates.steps, capture.attractor, capture.last)
 
 
-def find_attractors(walker: RigidWalker, starts: Floats, seed: int) -> Attractors:
+def find_attractors(walker: TwoLegs, starts: Floats, seed: int) -> Attractors:
     """The attractors that walks from section coordinates `starts` (n, 3) come to.
 
     walker  the unit walker
@@ -157,7 +156,7 @@ def distinct_points(points: Floats) -> Floats:
     return np.asarray(points[np.sort(first)])
 
 
-def cycle_through(walker: RigidWalker, point: Floats) -> Floats | None:
+def cycle_through(walker: TwoLegs, point: Floats) -> Floats | None:
     """The cycle (period, 3) that a walk from a point (3,) is on, rotated to begin with its smallest angle."""
     orbit = [point]
     for _ in range(LONGEST_PERIOD):
@@ -176,7 +175,7 @@ def same_cycle(one: Floats, other: Floats) -> bool:
     return len(one) == len(other) and bool(np.abs(one - other).max() < 100.0 * REPEATS)
 
 
-def reach_of(walker: RigidWalker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
+def reach_of(walker: TwoLegs, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
     """Distance from a cycle within which walks from all sides came back to it; zero if not even the nearest did.
 
     It also stays clear of the other cycles.

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from markupsafe import Markup
+
 from walkerlab.report.numbers import NONE
 
 Tone = Literal["plain", "good", "fair", "bad"]
+
+MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
+"""The pages: the report itself, and what is one link away."""
 
 
 class Block:
@@ -32,6 +38,7 @@ class Findings(Block):
 
     template: ClassVar[str] = "findings"
     items: tuple[Finding, ...]
+    layout: Literal["list", "cards", "lines", "columns"] = "list"
 
 
 @dataclass(frozen=True)
@@ -119,19 +126,59 @@ class Table(Block):
 class Picture(Block):
     """A drawn figure, embedded.
 
-    title    'Figure 7', and what it shows, in a line
+    title    what it shows, in a line
     caption  how to read it
     alt      what one sees, for those who do not see it
-    uri      data: with the whole image
+    svg      the drawing, made safe; empty where it is too large
+    uri      data: with the image, for a drawing that is too large
+    name     of its files, without suffix
+    links    files beside the page that hold the drawing and its data, by what they are called
+    page     the file that it is on
     """
 
     template: ClassVar[str] = "picture"
     title: str
     caption: str
     alt: str
-    uri: str
+    svg: Markup | None = None
+    uri: str = ""
     width: int = 0
     height: int = 0
+    name: str = ""
+    links: tuple[tuple[str, str], ...] = ()
+    page: str = MAIN
+
+
+@dataclass(frozen=True)
+class Gallery(Block):
+    """Figures side by side, small until they are asked for."""
+
+    template: ClassVar[str] = "gallery"
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class Cards(Block):
+    """Pages that are one link away: file, title, and what is found there in a sentence."""
+
+    template: ClassVar[str] = "cards"
+    items: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Terms(Block):
+    """Words and what they mean."""
+
+    template: ClassVar[str] = "terms"
+    items: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Waiting(Block):
+    """That a result is still being computed."""
+
+    template: ClassVar[str] = "waiting"
+    text: str
 
 
 @dataclass(frozen=True)
@@ -143,44 +190,86 @@ class Code(Block):
     text: str
 
 
+Pad = tuple[float, float, int]
+"""Where a pad begins and ends along the slope (m), and the leg in whose lane it lies."""
+
+
 @dataclass(frozen=True)
 class Walker:
     """How one walker of a player moves, and how it is drawn.
 
-    frames  for each instant: foot of leg 0, hip, foot of leg 1, as x and y in mm along and above the slope
+    channels  what its numbers are, see `tracks.Track`
+    samples   of each channel
+    floats    all channels, float32 in base64
+    strikes   times of its heel strikes, s
+    stills    postures, each a line through its joints in mm along and below the slope
     """
 
     name: str
     style: str
-    frames: tuple[tuple[int, ...], ...]
-    stills: tuple[int, ...]
+    channels: tuple[str, ...]
+    samples: int
+    floats: str
+    strikes: tuple[float, ...]
+    stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
+
+    @property
+    def meta(self) -> dict[str, object]:
+        """What a script has to know to read the numbers."""
+        return {name: getattr(self, name) for name in ("name", "style", "channels", "samples", "strikes")}
 
 
 @dataclass(frozen=True)
 class Player(Block):
-    """The walk as stick figures: stills on paper and without scripts, moved by a slider with them.
+    """The walk, moving: stills on paper and without scripts.
 
-    instants  s, equally spaced
-    view      what is seen, mm: left, top, width, height, y downwards, after the slope is tilted
+    alt               what is seen
+    ordinary_force   a force whose arrow is of ordinary length
+    closeup_m  height of the ground seen in the close-up of a foot
+    view       what the stills show, mm: left, top, width, height, y downwards, after the slope is tilted
     """
 
     template: ClassVar[str] = "player"
     title: str
     caption: str
+    alt: str
     walkers: tuple[Walker, ...]
-    instants: tuple[float, ...]
-    slope_deg: float
+    slope_rad: float
+    leg_m: float
+    foot_radius_m: float
+    torso_m: float
+    ordinary_force: float
+    closeup_m: float
+    pads: tuple[Pad, ...]
     view: tuple[int, int, int, int]
+
+    @property
+    def slope_deg(self) -> float:
+        """The slope in degrees."""
+        return round(math.degrees(self.slope_rad), 3)
+
+    @property
+    def scene(self) -> dict[str, object]:
+        """What a script has to know of the scene."""
+        names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page under a heading; `anchor` is its id, unique on the page."""
+    """A part of a page under a heading.
+
+    anchor   its id, unique on the page
+    finding  what it comes to, in one sentence; a section that has one is folded to it
+    page     the file that it is on
+    """
 
     anchor: str
     title: str
     blocks: tuple[Block, ...] = field(default=())
+    finding: str = ""
+    page: str = MAIN
 
 
 def table(

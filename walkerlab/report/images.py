@@ -1,4 +1,4 @@
-"""Drawn figures as data: URIs, so that the page needs no other file."""
+"""Which form of a drawn figure goes into the page, and pixels as data: URIs, so that it needs no other file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-MOST_BYTES = 4_000_000
+MOST_BYTES = 1_400_000
 """Of all images together; the largest drawings are embedded as pixels until they fit."""
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.report.numbers import count, length, listed, number, quantity
+from walkerlab.report.numbers import count, length, number, quantity
 from walkerlab.report.results import Results
 
-CONTENTS = {
-    "fixedpoint": "the periodic gait of the rigid model",
-    "simulate": "its walk",
-    "contact-sim": "the walk of the assembled model on ground as ADAMS has it",
-    "compare": "both compared with each other and with every number of the paper",
-}
-"""What the result of a stage brings into the report."""
+"""Radius of a foot, in leg lengths, above which it is called round."""
 
 
 def title(run: str) -> str:
@@ -23,23 +18,40 @@ def title(run: str) -> str:
 
 
 def lead(results: Results, run: str) -> tuple[str, ...]:
-    """What was run and what is in the report."""
-    return (scene(results.config, run), contents(results))
+    """What was run."""
+    return (scene(results.config, run),)
 
 
 def scene(config: Config, run: str) -> str:
     """The walker, its slope and what it was to do."""
-    walker = config.walker
     _, _, change = run.partition("@")
     changed = f", changed by {change.replace(',', ', ')}" if change else ""
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: a compass walker with legs of {length(walker.leg_length_m)} and "
-        f"{quantity(walker.leg_mass_kg, 'kg')} and a hip of {quantity(walker.hip_mass_kg, 'kg')} on a slope of "
+        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of "
         f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
+
+
+WALKERS = {
+    "compass": "a compass walker",
+    "straight-legs": "a walker with straight legs",
+    "kneed": "a walker with knees",
+    "parts": "a walker described by its parts",
+}
+
+
+def walker_in_words(walker: Any) -> str:
+    """Kind, size and mass of a walker."""
+    torso = "" if walker.torso is None else f" and a torso of {quantity(walker.torso.mass_kg, 'kg')}"
+    if walker.type == "compass":
+        of_legs = f"{length(walker.leg_length_m)} and {quantity(walker.leg_mass_kg, 'kg')}"
+        return f"a compass walker with legs of {of_legs} and a hip of {quantity(walker.hip_mass_kg, 'kg')}{torso}"
+    feet = f"feet of radius {length(walker.foot_radius_m)}" if walker.foot_radius_m else "point feet"
+    whole = quantity(walker.total_mass_kg, "kg")
+    return f"{WALKERS[walker.type]} with legs of {length(walker.leg_length_m)}, {feet}, {whole} in all{torso}"
 
 
 def equations(config: Config) -> str:
@@ -52,12 +64,3 @@ def equations(config: Config) -> str:
 def state(start: tuple[float, ...]) -> str:
     """Four numbers of a state."""
     return f"({', '.join(number(value) for value in start)}) rad and rad/s"
-
-
-def contents(results: Results) -> str:
-    """What is in the report."""
-    there = [text for stage, text in CONTENTS.items() if stage in results.stored]
-    if not there:
-        return "There are no results to show; the verdict says why."
-    pictures = f" {count(len(results.pictures), 'figure')} show it." if results.pictures else ""
-    return f"In it: {listed(there)}.{pictures}"

@@ -33,10 +33,11 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def power_of_ten(value: float, digits: int = 3) -> str:
-    """A number as in 1.2 × 10⁻⁹."""
+    """A number as in 1.2 × 10⁻⁹ or 10⁻⁹."""
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    return f"{mantissa}{SPACE}×{SPACE}10{str(int(exponent)).translate(SUPERSCRIPTS)}".replace("-", MINUS, 1)
+    ten = f"10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+    return ten if mantissa == "1" else f"{mantissa}{SPACE}×{SPACE}{ten}".replace("-", MINUS, 1)
 
 
 def quantity(value: float | None, unit: str, digits: int = 5) -> str:

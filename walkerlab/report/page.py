@@ -1,53 +1,95 @@
-"""The page: sections set in the template, style and script included, so that the file needs nothing but itself."""
+"""A page: sections set in the template, style and script included, so that the file needs nothing but itself."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from walkerlab.report.blocks import Section
+from walkerlab.config.schema import Source
+from walkerlab.report.blocks import MAIN, Section
+from walkerlab.report.symbols import CARET, POWER, power, raised
 
 TEMPLATES = Path(__file__).parent / "templates"
+TYPED = re.compile(r"`([^`]*)`")
+"""What is to be typed, or stands in a file, as texts mark it."""
 
 
-def render(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
-    """The HTML of the whole page.
+@dataclass(frozen=True)
+class Page:
+    """One file of the report; texts are plain.
 
-    title  its heading; plain text, as all texts of the blocks
-    lead   paragraphs under the heading
+    title     its heading
+    lead      paragraphs under it
+    study     what is redone; None if that is not said
+    redone    how the scene stands to that study, in a word or two
+    pending   the results that are still being computed
+    """
+
+    title: str
+    sections: tuple[Section, ...]
+    lead: tuple[str, ...] = ()
+    file: str = MAIN
+    study: Source | None = None
+    redone: str = "Redoes"
+    pending: tuple[str, ...] = ()
+
+
+def render(page: Page) -> str:
+    """The HTML of a page.
 
     Raises ValueError if two sections have one anchor.
     """
+    refuse_twins(page.sections)
+    script = f"\n{source('page.js')}\n{source('player.js')}\n"
+    return (
+        environment()
+        .get_template("page.html.j2")
+        .render(
+            page=page,
+            home=MAIN,
+            # The only texts that are markup already: files of this package.
+            style=Markup(source("style.css")),
+            script=Markup(script),
+            script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        )
+    )
+
+
+def refuse_twins(sections: Sequence[Section]) -> None:
+    """Raise ValueError if two sections have one anchor."""
     anchors = [section.anchor for section in sections]
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report have one anchor: {anchors}")
-    script = f"\n{source('player.js')}\n"
-    template = environment().get_template("page.html.j2")
-    return template.render(
-        title=title,
-        lead=lead,
-        sections=sections,
-        # The only texts that are markup already: files of this package.
-        style=Markup(source("style.css")),
-        script=Markup(source("player.js")),
-        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-    )
 
 
 def environment() -> Environment:
     """Where templates are found, and that every text is escaped."""
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    made.filters["said"] = said
+    return made
+
+
+def said(text: str) -> Markup:
+    """A text with what is to be typed set as code, and powers of ten written in one way."""
+    parts = TYPED.split(text)
+    set_apart = [
+        Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(raised, POWER.sub(power, part)))
+        for index, part in enumerate(parts)
+    ]
+    return Markup("").join(set_apart)
 
 
 def source(name: str) -> str:

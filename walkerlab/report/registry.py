@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from walkerlab.report.blocks import Section
+from walkerlab.report.blocks import MAIN, Section
+from walkerlab.report.lead import lead, title
+from walkerlab.report.page import Page
 from walkerlab.report.results import Results
 from walkerlab.report.sections import (
     accuracy,
@@ -18,7 +20,9 @@ from walkerlab.report.sections import (
     contact_walk,
     errata,
     figures,
+    further,
     gaits,
+    glossary,
     left_out,
     models,
     motion,
@@ -43,14 +47,37 @@ SECTIONS: tuple[SectionMaker, ...] = (
     steps.section,
     basin.section,
     models.section,
-    accuracy.section,
-    paper_tables.section,
     paper_numbers.section,
+    paper_tables.section,
     errata.section,
     stability.section,
+    accuracy.section,
+    adjustment.limit,
+    glossary.section,
     left_out.section,
     provenance.section,
 )
+
+
+def pages_of(results: Results, run: str) -> tuple[Page, ...]:
+    """The report and the pages beside it that there is something for.
+
+    run  name of the run's folder
+    """
+    sections = sections_of(results)
+    main = list(further.on(MAIN, sections))
+    links = further.section(results, further.elsewhere(sections))
+    if links is not None:
+        place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
+        main.insert(place, links)
+    redone = "A variation on" if results.departures else "Redoes"
+    report = Page(title(run), tuple(main), lead(results, run), MAIN, results.config.source, redone, results.pending)
+    beside = (
+        Page(f"{name} · {run}", found, file=file)
+        for file, name in further.TITLES.items()
+        if (found := further.on(file, sections))
+    )
+    return (report, *beside)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

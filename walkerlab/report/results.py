@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,12 +30,25 @@ class Results:
     stored    results by stage: those that are there and current
     pictures  the figures that `plot` drew, embedded
     absent    what there is no result of
+    pending   the stages whose results are still being computed
     """
 
     config: Config
     stored: Mapping[str, Stored] = field(default_factory=dict)
     pictures: tuple[Picture, ...] = ()
     absent: tuple[Absent, ...] = ()
+    pending: tuple[str, ...] = ()
+
+    @property
+    def departures(self) -> Sequence[str] | None:
+        """How the scene departs from the paper's: not at all if empty; None if nobody compared them."""
+        found: Sequence[str] | None = (self.summary("compare") or {}).get("departures")
+        return found
+
+    @property
+    def of_the_paper(self) -> bool:
+        """Whether the scene is the paper's own, so that the paper's numbers are what a reader wants first."""
+        return "compare" in self.stored and not self.departures
 
     def summary(self, stage: str) -> Mapping[str, Any] | None:
         """The summary of a stage's result; None if there is none."""

@@ -9,6 +9,25 @@ SUBSCRIPTS = str.maketrans("0123456789+-aehijklmnoprstuvx", "₀₁₂₃₄₅�
 SUPERSCRIPTS = str.maketrans("0123456789+-en", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ᵉⁿ")
 DOT = "\u0307"
 
+POWER = re.compile(r"(?<![\w.])(?<!\w-)(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b")
+"""A number as programs print it, such as 1.1e-09; not the end of a name such as k-1e8."""
+
+
+CARET = re.compile(r"(?<=\d)\^(-?\d+)\b")
+"""A power as it is typed, such as 10^-4."""
+
+
+def raised(found: re.Match[str]) -> str:
+    """An exponent set high."""
+    return found[1].translate(SUPERSCRIPTS)
+
+
+def power(found: re.Match[str]) -> str:
+    """A power of ten as it is written by hand: 10⁻⁴, or 1.1 × 10⁻⁹."""
+    ten = f"10{exponent(found[2], found[3])}"
+    return ten if found[1] == "1" else f"{found[1]} × {ten}"
+
+
 RULES = (
     (
         re.compile(r"\bd(theta|omega|phi)_(\d)\b"),
@@ -17,7 +36,7 @@ RULES = (
     (re.compile(r"\b(theta|omega|phi|mu|lambda)(?:_(\d))?\b"), lambda found: letter(found[1], found[2])),
     (re.compile(r"\b([A-Za-z])_(\d+|[ape])\b"), lambda found: found[1] + found[2].translate(SUBSCRIPTS)),
     (re.compile(r"\^(-?\d+|[en])\b"), lambda found: found[1].translate(SUPERSCRIPTS)),
-    (re.compile(r"\b(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b"), lambda found: f"{found[1]} × 10{exponent(found[2], found[3])}"),
+    (POWER, power),
     (re.compile(r"\+-"), lambda _: "±"),
     (re.compile(r"(?<![\w)\]-])-(?=[\w.(])|(?<= )-(?= )"), lambda _: "−"),
 )

@@ -14,6 +14,7 @@ from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.orbits.basin import NONE, Attractors, Floats, Window, edge_cells, find_attractors
 from walkerlab.orbits.scaled_starts import scaled_starts
 from walkerlab.orbits.similarity import unit_walker
@@ -53,6 +54,11 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
     there is not.
     """
     gait = inputs["fixedpoint"].summary
+    if len(gait["state"]) != 1 + len(COORDINATES):
+        raise ConfigError(
+            "basin takes walkers of two straight legs: this one has more coordinates just after heel strike.",
+            "Take a walker of type compass or straight-legs without a torso.",
+        )
     window = window_of(config, [float(number) for number in gait["state"][1:]])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window)
@@ -117,7 +123,13 @@ def question_of(config: Config, inputs: Mapping[str, Content], window: Window) -
     """What is walked."""
     if config.basin.model == "contact":
         return contact_question(config, inputs)
-    walker, units = unit_walker(rigid_walker(config, config.equations))
+    unit, units = unit_walker(rigid_walker(config, config.equations))
+    walker = two_legs(unit)
+    if walker is None:
+        raise ConfigError(
+            "basin.model: rigid walks in lanes, which have room for two straight legs; this walker has more bodies.",
+            "Ask the contact model: --set basin.model=contact.",
+        )
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
     drawn = np.concatenate([np.array([window.rest]), window.drawn(DRAWN, generator)])
@@ -142,7 +154,8 @@ def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQu
     settings = config.solver.contact
     starts = replace(starts, rtol=settings.rtol, atol=settings.atol)
     usual = starts.walk(1.0, 1.0).evaluations
-    return ContactQuestion(scene, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
+    rigid = rigid_walker(config, config.equations)
+    return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
 
 
 def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str, Any]]:

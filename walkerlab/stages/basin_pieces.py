@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.hybrid.rigid_lanes import TwoLegs
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.basin import NONE, Attractors, Window, arrivals, inside_cell
 from walkerlab.orbits.scaled_starts import ScaledStarts
+from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import ContactScene, start_state
 
 Floats = NDArray[np.float64]
@@ -50,7 +52,7 @@ class RigidQuestion:
     scale   (3) units of the section's coordinates: unit walker's over SI
     """
 
-    walker: RigidWalker
+    walker: TwoLegs
     scale: tuple[float, float, float]
     attractors: Attractors
     steps: int
@@ -69,6 +71,7 @@ class ContactQuestion:
     """Starts of the contact model: those of the rigid one with the stance foot just touching, at rest and rolling."""
 
     scene: ContactScene
+    rigid: Standing
     starts: ScaledStarts
     cells_at_once: int = 100
     edges_at_once: int = 10
@@ -81,8 +84,8 @@ class ContactQuestion:
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
         """Outcome, attractor and steps of one walk."""
-        theta_1 = -2.0 * self.scene.walker.slope - z[0]
-        walk = self.starts.walked_from(start_state(self.scene, (theta_1, *z)))
+        state = on_section(self.rigid, z)
+        walk = self.starts.walked_from(start_state(self.scene, state))
         settled = self.settled_after(walk.touch_time, walk.touch_along) if walk.outcome == Outcome.WALKED else None
         if settled is None:
             return walk.outcome, NONE, walk.touch_time.size

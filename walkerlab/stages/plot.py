@@ -51,14 +51,15 @@ def run(
     )
 
 
-def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int]:
+def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
     """Draw a figure and store its files; its words and its files' paths in the run's folder."""
     drawing = figure.drawn(results)
     paths = paths_of(figure)
     write_atomically(folder / paths["svg"], drawing.svg)
     write_atomically(folder / paths["png"], drawing.png)
     number = {} if figure.number is None else {"number": figure.number}
-    return {**number, "title": figure.title, **paths, "caption": drawing.caption}
+    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.seen}
+    return {**number, **words, **paths, "results": list(figure.stages)}
 
 
 def remove(figure: Illustration, folder: Path) -> None:

@@ -1,26 +1,25 @@
-"""The report: one HTML page of everything that there is a result of."""
+"""The report: HTML pages of everything that there is a result of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.config.schema import Config
-from walkerlab.report.blocks import Section, Table
-from walkerlab.report.lead import lead, title
-from walkerlab.report.page import render
+from walkerlab.report.blocks import MAIN, Section, Table
+from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
-from walkerlab.report.registry import sections_of
+from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections.further import TITLES
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
-from walkerlab.store.files import write_atomically
-
-PAGE = "report.html"
+from walkerlab.store.files import storing, write_atomically
 
 
 def run(
@@ -30,27 +29,53 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Write the page into the run's folder.
+    """Write the report's pages into the run's folder.
 
     inputs    results by stage: those that there are
     left_out  the stages without a result, and why
 
-    Raises StorageError if the page cannot be stored.
+    Raises StorageError if a page cannot be stored.
     """
     progress.start("report", 1)
-    results = Results(whole(config), inputs, pictures(inputs, folder), absent(config, left_out))
-    sections = sections_of(results)
-    page = folder / PAGE
-    write_atomically(page, render(title(folder.name), lead(results, folder.name), sections).encode())
+    written, results = write_pages(whole(config), inputs, folder, left_out)
     progress.advance()
+    tables = [block for page in written for block in blocks_of(page.sections) if isinstance(block, Table)]
     return Content(
-        {index.GROUP: index.index(folder, [page])},
+        {index.GROUP: index.index(folder, [folder / page.file for page in written])},
         {
-            "html": PAGE,
+            "html": MAIN,
+            "pages": [page.file for page in written],
             "figures": [picture.title for picture in results.pictures],
-            "tables": [block.caption for block in blocks_of(sections) if isinstance(block, Table)],
+            "tables": [block.caption for block in tables],
         },
     )
+
+
+def write_pages(
+    config: Config,
+    inputs: Mapping[str, Stored],
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
+    pending: Sequence[str] = (),
+) -> tuple[tuple[Page, ...], Results]:
+    """Write the pages of whatever results there are, also while others are being computed.
+
+    inputs    results by stage: those that there are
+    left_out  the stages without a result, and why
+    pending   the stages whose results are still being computed; the report says so in their place
+
+    Pages of an earlier run that there is nothing for any more are removed. Raises StorageError if one cannot be stored.
+    """
+    waited = [entry for entry in left_out if entry.what not in pending]
+    plain = Results(config, inputs, (), absent(config, waited), tuple(pending))
+    results = replace(plain, pictures=pictures(inputs, folder, numbered=plain.of_the_paper))
+    pages = pages_of(results, folder.name)
+    for page in pages:
+        write_atomically(folder / page.file, render(page).encode())
+    for file in set(TITLES) - {page.file for page in pages}:
+        with storing(folder / file):
+            (folder / file).unlink(missing_ok=True)
+    return pages, results
 
 
 def whole(config: Config) -> Config:

@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import Body, Cell, Column, Finding, Findings, Paragraph, Section, Table, body, table
+from walkerlab.report.blocks import (
+    COSTS,
+    Body,
+    Cell,
+    Column,
+    Finding,
+    Findings,
+    Gallery,
+    Paragraph,
+    Section,
+    Table,
+    body,
+    table,
+)
 from walkerlab.report.numbers import count, listed, number, power_of_ten, whole
 from walkerlab.report.results import Results
 
@@ -25,7 +38,18 @@ def section(results: Results) -> Section | None:
     bodies = tuple(methods_of(summary, scene, levels) for scene in scenes)
     costs = Table("Least run time for an error, method by method", columns(levels), bodies, note=note(summary))
     blocks = (Paragraph(introduction(summary)), Findings(tuple(findings)), costs, references(summary))
-    return Section("accuracy", "Error against run time", (*blocks, *not_run(summary)))
+    drawn = [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")]
+    tables = (*blocks, *drawn, *not_run(summary))
+    return Section("accuracy", "Error against run time", tables, fastest(summary), COSTS)
+
+
+def fastest(summary: Mapping[str, Any]) -> str:
+    """The fastest methods of each scene, in one sentence."""
+    scenes: dict[str, list[str]] = {}
+    for scene, best in summary["best"].items():
+        scenes.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
+    said = "; ".join(f"{methods} on {listed(found)}" for methods, found in scenes.items() if methods)
+    return f"Fastest: {said}." if said else ""
 
 
 def levels_of(summary: Mapping[str, Any]) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.report.blocks import Block, Cell, Column, Paragraph, Section, Table, table
+from walkerlab.report.blocks import COSTS, Block, Cell, Column, Paragraph, Section, Table, table
 from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
@@ -29,22 +29,30 @@ def section(results: Results) -> Section | None:
     summary = results.summary(STAGE)
     if summary is None or "adjustment" not in summary:
         return None
-    blocks: list[Block] = [Paragraph(verdict(summary)), starts_table(summary)]
+    blocks: list[Block] = [Paragraph(verdict(results, summary)), starts_table(results, summary)]
     if summary["gait"]["found"]:
         blocks.append(gait_table(summary, results.summary("fixedpoint")))
     if summary["adjustment"].get("margins"):
         blocks.append(margins_table(summary))
-    blocks.append(walks_table(summary))
-    if summary.get("reaches"):
-        blocks += [limit_table(name, found) for name, found in summary["reaches"].items() if found["settings"]]
+    blocks.append(walks_table(results, summary))
+    return Section("adjustment", "The parameter adjustment", tuple(blocks), needed(summary))
+
+
+def limit(results: Results) -> Section | None:
+    """What takes the contact model to the rigid one; None if nobody asked."""
+    summary = results.summary(STAGE)
+    if summary is None or not (summary.get("reaches") or summary.get("orders")):
+        return None
+    reaches = summary.get("reaches") or {}
+    blocks: list[Block] = [limit_table(name, found) for name, found in reaches.items() if found["settings"]]
     if summary.get("orders"):
         blocks.append(orders_table(summary["orders"]))
-    return Section("adjustment", "The parameter adjustment", tuple(blocks))
+    return Section("limit", "Towards the rigid limit", tuple(blocks), reached(summary), COSTS)
 
 
-def verdict(summary: Summary) -> str:
-    """Whether the adjustment was needed, and what explains it, in one paragraph."""
-    parts = (needed(summary), explained(summary), caused(summary), reached(summary), papers_start(summary))
+def verdict(results: Results, summary: Summary) -> str:
+    """What explains the gait that it settles on, in one paragraph."""
+    parts = [explained(summary), caused(summary), *([papers_start(summary)] if results.of_the_paper else [])]
     return " ".join(part for part in parts if part)
 
 
@@ -133,8 +141,15 @@ def papers_start(summary: Summary) -> str:
     return f"The start that the paper arrived at is not a gait's: {start['reason']}."
 
 
-def starts_table(summary: Summary) -> Table:
-    """Table 2 with the adjusted start."""
+def starts_table(results: Results, summary: Summary) -> Table:
+    """The start before and after; beside Table 2 if the paper is what is redone."""
+    if not results.of_the_paper:
+        rows = [
+            [in_signs(f"{name} ({row['unit']})"), *(number(row[key], 6) for key in ("ours_rigid", "ours_adjusted"))]
+            for name, row in summary["table2"].items()
+        ]
+        heads = [Column("coordinate"), Column("rigid gait", numeric=True), Column("adjusted", numeric=True)]
+        return table("The start before and after the adjustment", heads, rows)
     columns = [
         Column("row"),
         Column("paper, MATLAB", numeric=True),
@@ -212,7 +227,7 @@ def margins_table(summary: Summary) -> Table:
     return table("How far the start's velocities may change", columns, rows)
 
 
-def walks_table(summary: Summary) -> Table:
+def walks_table(results: Results, summary: Summary) -> Table:
     """The procedure, walk by walk."""
     names = {
         "hinged": "first step with a revolute joint, from the rigid state",
@@ -224,8 +239,10 @@ def walks_table(summary: Summary) -> Table:
         for name, walk in summary["procedure"].items()
         if walk is not None
     ]
-    start = summary["paper_start"]
-    rows.append(["from the paper's ADAMS start", Cell(start["outcome"], tone(start["outcome"])), str(start["steps"])])
+    if results.of_the_paper:
+        start = summary["paper_start"]
+        ended = Cell(start["outcome"], tone(start["outcome"]))
+        rows.append(["from the paper's ADAMS start", ended, str(start["steps"])])
     return table(
         "The procedure, walk by walk", [Column("walk"), Column("outcome"), Column("steps", numeric=True)], rows
     )

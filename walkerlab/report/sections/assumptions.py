@@ -20,9 +20,23 @@ def section(results: Results) -> Section | None:
     if summary is None:
         return None
     rows = [row for row in (pull(summary), grip(results, summary), scuff(summary), energy(summary)) if row]
+    if not rows:
+        return None
     columns = [Column("assumption"), Column("measured", wide=True), Column("value", numeric=True), Column("verdict")]
     caption = "What the rigid model assumes (sections 3.1 and 3.2), and what its walk says"
-    return Section("assumptions", "Assumptions, checked", (table(caption, columns, rows, wordy=True),))
+    return Section("assumptions", "Assumptions, checked", (table(caption, columns, rows, wordy=True),), finding(rows))
+
+
+def finding(rows: list[list[str | Cell]]) -> str:
+    """How many assumptions hold, and which do not."""
+    holding = sum(row[-1] is HOLDS for row in rows)
+    others = "; ".join(f"{row[0]}: {said(row[-1])} ({row[-2]})" for row in rows if row[-1] is not HOLDS)
+    return f"{holding} of {len(rows)} hold along the rigid walk. {others}{'.' if others else ''}".strip()
+
+
+def said(cell: str | Cell) -> str:
+    """A cell's text."""
+    return cell.text if isinstance(cell, Cell) else cell
 
 
 def pull(summary: Mapping[str, Any]) -> list[str | Cell] | None:

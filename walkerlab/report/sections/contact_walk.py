@@ -20,8 +20,6 @@ def section(results: Results) -> Section | None:
         return None
     rows: list[Row] = [
         ["outcome", Cell(summary["outcome"], tone(summary["outcome"])), "how the walk ended"],
-        ["steps", str(summary["steps"]), f"of {2 * results.config.strides} asked for"],
-        *gait(summary),
         *standing(summary),
         *slipping(summary),
         *energies(summary),
@@ -29,7 +27,18 @@ def section(results: Results) -> Section | None:
     ]
     columns = [Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True)]
     numbers = table("The contact model's walk", columns, rows, wordy=True)
-    return Section("contact", "The contact walk", (Paragraph(ground_in_words(results, summary)), numbers))
+    blocks = (Paragraph(ground_in_words(results, summary)), numbers)
+    return Section("contact", "The contact walk", blocks, finding(results, summary))
+
+
+def finding(results: Results, summary: Mapping[str, Any]) -> str:
+    """How far it walked and slipped, and how well its energy balances."""
+    asked = 2 * results.config.strides
+    residual = residual_in_words(summary["energy_balance_residual_J"])
+    return (
+        f"{summary['steps']} of {asked} steps; the stance foot slips {length(summary.get('slip_per_step_m'))} a step, "
+        f"and the energy balances to {residual} J."
+    )
 
 
 def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
@@ -49,22 +58,12 @@ def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
     terrain = {
         "checkerboard": f"a checkerboard of pads{pitch}",
         "after-mid-swing": "a plane that a swing foot touches only once it has passed the stance foot",
-    }[contact.terrain]
+    }.get(contact.terrain, "a plane")
     return (
         f"The normal force is k dᵉ + c(d) ḋ with k = {quantity(si.stiffness_N_per_m_e, 'N/mᵉ')}, "
         f"e = {number(si.exponent)} and c rising to {quantity(si.damping_N_s_m, 'N s/m')} at "
         f"{length(si.full_damping_penetration_m)}; there is {friction}. The walker walks on {terrain}."
     )
-
-
-def gait(summary: Mapping[str, Any]) -> list[Row]:
-    """Periods and lengths."""
-    if not summary["step_periods_s"]:
-        return []
-    return [
-        ["step period", span(summary["step_periods_s"], "s"), "from touch to touch"],
-        ["step length", span(summary["step_lengths_m"], "m"), "along the slope, from touch to touch"],
-    ]
 
 
 def standing(summary: Mapping[str, Any]) -> list[Row]:
@@ -85,7 +84,11 @@ def slipping(summary: Mapping[str, Any]) -> list[Row]:
     rows: list[Row] = [["slip a step", mean, "net, downhill positive, mean over the steps"]]
     if summary.get("slips_m"):
         slips = [1e3 * slip for slip in summary["slips_m"]]
-        rows.append(["slip, step by step", span(slips, "mm", 3), "of the stance foot, from its touch to its lift"])
+        rows.append(
+            ["slip, step by step", span(slips, "mm", 3), "of the stance foot's material, from its touch to its lift"]
+        )
+    if summary.get("rolling_per_step_m"):
+        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the ball foot, which is no slip"])
     return rows
 
 

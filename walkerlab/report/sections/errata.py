@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from walkerlab.report.blocks import Column, Section, table
+from walkerlab.report.blocks import PAPER, Column, Section, table
+from walkerlab.report.numbers import count
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 
@@ -23,7 +24,8 @@ def section(results: Results) -> Section | None:
         return None
     columns = [Column(head, wide=index > 0) for index, head in enumerate(COLUMNS.values())]
     found = table("What is printed, and what is right", columns, rows, wordy=True)
-    return Section("errata", "Errata of the paper", (found,))
+    finding = f"{count(len(rows), 'place')} where the paper does not say what is right."
+    return Section("errata", "Errata of the paper", (found,), finding, PAPER)
 
 
 def errata(results: Results) -> list[dict[str, str]]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from walkerlab.report.blocks import Section
+from walkerlab.report.blocks import MAIN, Block, Gallery, Paragraph, Section
 from walkerlab.report.results import Results
 
 
 def section(results: Results) -> Section | None:
-    """All figures that were drawn."""
-    if not results.pictures:
+    """The figures of the walks and gaits."""
+    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    if not shown:
         return None
-    return Section("figures", "Figures", results.pictures)
+    blocks: list[Block] = [Gallery(shown)]
+    if results.of_the_paper:
+        blocks.insert(0, Paragraph("Figures have the numbers that they have in the paper. A click enlarges one."))
+    return Section("figures", "Figures", tuple(blocks))

@@ -27,7 +27,7 @@ def section(results: Results) -> Section | None:
     every = found_gaits(results)
     if every is not None:
         blocks.append(every)
-    return Section("gait", "The gait", tuple(blocks))
+    return Section("gait", "The gait", tuple(blocks), finding(summary))
 
 
 def set_of(summary: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
@@ -37,14 +37,19 @@ def set_of(summary: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     return found if found and found.get("state") else None
 
 
+def finding(summary: Mapping[str, Any]) -> str:
+    """The gait in a sentence."""
+    size = f"{quantity(summary['period_s'], 's', 6)} over {quantity(summary['step_length_m'], 'm', 6)}"
+    way = "stable" if summary["stable"] else "unstable"
+    return f"A step takes {size}; it is {way}, the largest multiplier being {number(summary['spectral_radius'], 4)}."
+
+
 def in_words(summary: Mapping[str, Any]) -> str:
-    """The gait in a sentence or two."""
-    stable = "stable: small disturbances die out" if summary["stable"] else "unstable: small disturbances grow"
+    """What the multipliers say, and how a state is given."""
+    way = "die out" if summary["stable"] else "grow"
     return (
-        f"With the {SETS[summary['equations']]} equations the rigid model repeats its step every "
-        f"{quantity(summary['period_s'], 's', 6)} over {quantity(summary['step_length_m'], 'm', 6)}. The gait is "
-        f"{stable}, by a factor of {number(summary['spectral_radius'], 4)} a step at the slowest. A state is given "
-        "just after the heel strike, angles absolute, from the vertical."
+        f"With the {SETS[summary['equations']]} equations small disturbances {way} by the largest multiplier a step. "
+        "A state is given just after the heel strike, angles absolute, from the vertical."
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from walkerlab.report.blocks import Column, Paragraph, Section, table
-from walkerlab.report.numbers import listed
+from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Absent, Results
 
 
@@ -14,10 +14,10 @@ def section(results: Results) -> Section:
     rows = rows_of(everything_absent(results))
     if not rows:
         said = Paragraph("Nothing: every result that the pipeline has is there.")
-        return Section("left-out", "Left out", (said,))
+        return Section("left-out", "Left out", (said,), "Nothing.")
     columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
     missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
-    return Section("left-out", "Left out", (missing,))
+    return Section("left-out", "Left out", (missing,), f"{count(len(rows), 'thing')}, each with its reason.")
 
 
 def rows_of(missing: Sequence[Absent]) -> list[list[str]]:

@@ -32,9 +32,11 @@ def section(results: Results) -> Section | None:
     orbit = summary.get(ORBIT)
     if orbit is not None:
         note += f" Their limit cycles lie at most {quantity(100 * orbit, '%', 2)} of the rigid one’s size apart."
-    return Section(
-        "models", "The models compared", (table("Largest differences of the legs’ motions", columns, rows, note=note),)
-    )
+    differences = table("Largest differences of the legs’ motions", columns, rows, note=note)
+    found = f"Their legs’ angles differ by at most {printed(angle, 'raw')} rad at the same time"
+    if "aligned" in angle:
+        found += f", and by {printed(angle, 'aligned')} rad at the same phase of each step"
+    return Section("models", "The models compared", (differences,), f"{found}.")
 
 
 def printed(differences: Mapping[str, Any], key: str) -> str:

@@ -1,4 +1,4 @@
-"""The walk as stick figures, of all models that walked, in one picture."""
+"""The walk, moving: all models that walked on their ground, with a foot in close-up and three views on one clock."""
 
 from __future__ import annotations
 
@@ -6,126 +6,159 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from walkerlab.config.schema import Config
-from walkerlab.report.blocks import Player, Section, Walker
+from walkerlab.report.blocks import Block, Pad, Player, Section, Walker
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
 from walkerlab.report.results import Results
-from walkerlab.store.content import Content, Group
+from walkerlab.report.tracks import Array, Track, leg_length, sampling_gap, track_of
 
-FRAMES_A_SECOND = 40
-MOST_FRAMES = 400
 MOST_STEPS = 10
-
-Array = NDArray[np.float64]
+STYLES = {RIGID: "rigid", CONTACT: "contact"}
+DEEPEST_IN_VIEW = 5.0
+"""Height of the close-up in largest penetrations that are not an impact's."""
+STILL_VIEW_OF_RIGID = 4e-3
+"""Height of the close-up of a foot that does not sink in, leg lengths."""
 
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
-    tracks = {stage: track for stage in (RIGID, CONTACT) if (track := track_of(results, stage)) is not None}
+    tracks: dict[str, Track] = {}
+    for stage in MODELS:
+        result = results.stored.get(stage)
+        track = None if result is None else track_of(results.config, result)
+        if track is not None:
+            tracks[stage] = track
     if not tracks:
         return None
-    end = min(max(track[0][-1] for track in tracks.values()), first_steps(results))
-    frames = min(MOST_FRAMES, max(2, math.ceil(end * frame_rate(results.config)) + 1))
-    instants = np.linspace(0.0, end, frames)
-    walkers = tuple(walker(results, stage, track, instants) for stage, track in tracks.items())
-    player = Player(
+    end = first_steps(results)
+    tracks = {stage: track.until(end) for stage, track in tracks.items()}
+    return Section("motion", "The walk", (player(results, tracks),))
+
+
+def player(results: Results, tracks: dict[str, Track]) -> Block:
+    """The walkers on their ground."""
+    config, gap = results.config, sampling_gap(results.config)
+    length = leg_length(config.walker)
+    torso = getattr(config.walker, "torso", None)
+    return Player(
         title="The walk.",
         caption=caption(results, tuple(tracks)),
-        walkers=walkers,
-        instants=tuple(round(float(instant), 3) for instant in instants),
-        slope_deg=round(math.degrees(results.config.slope_rad), 3),
-        view=view(walkers, results.config.slope_rad, margin=round(100 * results.config.walker.leg_length_m)),
+        alt=alt(results, tuple(tracks)),
+        walkers=tuple(walker(results, stage, track, gap) for stage, track in tracks.items()),
+        slope_rad=config.slope_rad,
+        leg_m=length,
+        foot_radius_m=float(getattr(config.walker, "foot_radius_m", 0.0)),
+        torso_m=0.0 if torso is None else float(torso.above_hip_m),
+        ordinary_force=weight(tracks),
+        closeup_m=closeup(tracks, length),
+        pads=pads(results),
+        view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
     )
-    return Section("motion", "The walk", (player,))
-
-
-def frame_rate(config: Config) -> float:
-    """Frames a second: as many a pendulum time for every size of walker."""
-    return FRAMES_A_SECOND * math.sqrt(config.gravity_m_s2 / 9.81 / config.walker.leg_length_m)
 
 
 def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
     ends = []
-    for stage in (RIGID, CONTACT):
-        summary = results.summary(stage)
-        periods = [] if summary is None else summary["step_periods_s"]
+    for stage in MODELS:
+        periods = (results.summary(stage) or {}).get("step_periods_s", [])
         if len(periods) >= MOST_STEPS:
             ends.append(sum(periods[:MOST_STEPS]))
     return max(ends) if ends else math.inf
 
 
-def track_of(results: Results, stage: str) -> tuple[Array, Array] | None:
-    """Times (s) and, for each, foot of leg 0, hip and foot of leg 1 along and above the slope (m); None if unknown."""
-    result = results.stored.get(stage)
-    trajectory = results.group(stage, "trajectory")
-    if result is None or trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < 2:
-        return None
-    if "hip_along_m" in trajectory.variables:
-        points = seen_points(trajectory)
-    else:
-        points = points_from_angles(results.config, result, trajectory)
-    return trajectory["time"], points
-
-
-def seen_points(trajectory: Group) -> Array:
-    """Hip and feet as they were stored."""
-    feet, heights = trajectory["foot_along_m"], trajectory["foot_height_m"]
-    hip = (trajectory["hip_along_m"], trajectory["hip_height_m"])
-    return np.column_stack((feet[:, 0], heights[:, 0], *hip, feet[:, 1], heights[:, 1]))
-
-
-def points_from_angles(config: Config, result: Content, trajectory: Group) -> Array:
-    """Hip and feet of legs that stand on points, from their angles and the steps' lengths (eqs. A.1 to A.3)."""
-    length, slope = config.walker.leg_length_m, config.slope_rad
-    steps: Any = np.concatenate(([0.0], np.cumsum(result.summary["step_lengths_m"])))
-    tilted = trajectory["angle"] + slope
-    row = np.arange(tilted.shape[0])
-    stance = tilted[row, trajectory["stance_leg"]]
-    foothold = steps[np.minimum(trajectory["step"], steps.size - 1)]
-    hip = (foothold - length * np.sin(stance), length * np.cos(stance))
-    feet = [(hip[0] + length * np.sin(tilted[:, leg]), hip[1] - length * np.cos(tilted[:, leg])) for leg in (0, 1)]
-    return np.column_stack((*feet[0], *hip, *feet[1]))
-
-
-def walker(results: Results, stage: str, track: tuple[Array, Array], instants: Array) -> Walker:
-    """A model's motion at the instants of the player, up to where it ended."""
-    times, points = track
-    walked = instants[instants <= times[-1] + 1e-9]
-    columns = [np.interp(walked, times, column) for column in points.T]
-    frames = tuple(tuple(round(1000 * value) for value in frame) for frame in np.column_stack(columns).tolist())
+def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
+    """A model's motion and how it ended."""
     summary = results.stored[stage].summary
-    stills = still_frames(summary["step_periods_s"], walked)
+    thin = track.thinned(gap)
+    strikes = [float(time) for time in np.cumsum(summary["step_periods_s"]) if time <= track.end + 1e-9]
     ended = "" if summary["outcome"] == "walked" else f"ends as {summary['outcome']}"
-    return Walker(MODELS[stage], "rigid" if stage == RIGID else "contact", frames, stills, ended)
+    return Walker(
+        name=MODELS[stage],
+        style=STYLES[stage],
+        channels=tuple(thin.channels),
+        samples=int(thin["t"].size),
+        floats=thin.packed(),
+        strikes=tuple(round(time, 6) for time in strikes),
+        stills=stills(track, strikes),
+        ends=ended,
+    )
 
 
-def view(walkers: tuple[Walker, ...], slope: float, margin: int) -> tuple[int, int, int, int]:
+def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """Postures to be seen at once, each a line from foot over hip to foot (mm): both feet down, and mid-step."""
+    times: Any = np.array([0.0, *strikes])
+    wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
+    rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
+    names = [
+        "f0",
+        *(["k0"] if "kx0" in track.channels else []),
+        "h",
+        *(["k1"] if "kx1" in track.channels else []),
+        "f1",
+    ]
+    return tuple(tuple(point(track, name, int(row)) for name in names) for row in rows)
+
+
+def point(track: Track, name: str, row: int) -> tuple[int, int]:
+    """A joint in mm, y downwards."""
+    joint, leg = name[0], name[1:]
+    return round(1000 * float(track[f"{joint}x{leg}"][row])), -round(1000 * float(track[f"{joint}y{leg}"][row]))
+
+
+def weight(tracks: dict[str, Track]) -> float:
+    """A force to scale arrows by (N): what the ground carries most of the time; any number if forces are unknown."""
+    loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
+    return max((load for load in loads if load > 0.0), default=1.0)
+
+
+def closeup(tracks: dict[str, Track], length: float) -> float:
+    """Height of the close-up (m): some penetrations of a foot that stands."""
+    track = tracks.get(CONTACT)
+    if track is None or "p0" not in track.channels:
+        return STILL_VIEW_OF_RIGID * length
+    depths = np.concatenate((track["p0"], track["p1"]))
+    loaded = depths[depths > 0.0]
+    return DEEPEST_IN_VIEW * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
+
+
+def pads(results: Results) -> tuple[Pad, ...]:
+    """The pads that the contact model walks on; none on a plane."""
+    terrain = results.group(CONTACT, "terrain")
+    if terrain is None or "left_m" not in terrain.variables:
+        return ()
+    columns = (terrain["left_m"].tolist(), terrain["right_m"].tolist(), terrain["leg"].tolist())
+    return tuple((round(left, 4), round(right, 4), int(leg)) for left, right, leg in zip(*columns, strict=True))
+
+
+def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:
     """Left, top, width and height (mm, y downwards) of what the walkers pass through on the tilted slope."""
-    points = np.array([frame for one in walkers for frame in one.frames], dtype=np.float64).reshape(-1, 2)
-    along, above = points.T
+    along: Array = np.concatenate([track[name] for track in tracks for name in ("fx0", "hx", "fx1")])
+    above: Array = np.concatenate([track[name] for track in tracks for name in ("fy0", "hy", "fy1")])
     right = along * math.cos(slope) + above * math.sin(slope)
     down = along * math.sin(slope) - above * math.cos(slope)
-    left, top = math.floor(right.min()) - margin, math.floor(down.min()) - margin
-    return left, top, math.ceil(right.max()) + margin - left, math.ceil(down.max()) + margin - top
-
-
-def still_frames(periods: list[float], instants: Array) -> tuple[int, ...]:
-    """The frames that are shown at once: both feet down, and the middle of each step; the end in any case."""
-    strikes = np.concatenate(([0.0], np.cumsum(periods)))
-    middles = 0.5 * (strikes[:-1] + strikes[1:])
-    wanted = np.append(np.concatenate((strikes, middles)), instants[-1])
-    nearest = {int(np.abs(instants - time).argmin()) for time in wanted if time <= instants[-1] + 1e-9}
-    return tuple(sorted(nearest))
+    left, top = right.min() - margin, down.min() - margin
+    width, height = right.max() + margin - left, down.max() + margin - top
+    return math.floor(1000 * left), math.floor(1000 * top), math.ceil(1000 * width), math.ceil(1000 * height)
 
 
 def caption(results: Results, stages: tuple[str, ...]) -> str:
     """What one looks at."""
     steps = max(len(results.stored[stage].summary["step_periods_s"]) for stage in stages)
-    shown = f"The first {MOST_STEPS} steps" if steps > MOST_STEPS else "All of the walk"
+    shown = f"The first {MOST_STEPS} steps" if steps > MOST_STEPS else "The whole walk"
     return (
-        f"{shown}, to scale, at the start, in the middle and at the end of each step; the walker goes downhill, "
-        "to the right. The leg that swings first is drawn solid in the moving picture, the other dashed."
+        f"{shown}, to scale, downhill to the right. The leg that swings first is drawn full, the other hollow; arrows "
+        "are the ground's forces. In the close-up the slope is drawn level, and a foot slips from the mark where it "
+        "came down."
+    )
+
+
+def alt(results: Results, stages: tuple[str, ...]) -> str:
+    """What is seen, for those who do not see it."""
+    walked = [
+        f"the {MODELS[stage].lower()} takes {len(results.stored[stage].summary['step_periods_s'])} steps"
+        for stage in stages
+    ]
+    return (
+        f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: "
+        + "; ".join(walked)
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import Cell, Column, Section, Table, Tone, body
-from walkerlab.report.numbers import NONE, number
+from walkerlab.report.blocks import PAPER, Cell, Column, Finding, Findings, Paragraph, Section, Table, Tone, body
+from walkerlab.report.numbers import NONE, count, listed, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 
@@ -15,6 +16,14 @@ TONES: dict[str, Tone] = {"reproduced": "good", "explained": "fair", "refuted": 
 
 MODELS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
 """What a number of the paper is compared with."""
+
+
+MEANINGS = {
+    "reproduced": "They come out to the printed digits; parameters that are used as printed are among them.",
+    "explained": "They do not come out, or not by themselves, and what was measured says why.",
+    "refuted": "They contradict what was measured, or the paper’s own numbers.",
+}
+"""What a verdict says."""
 
 
 def section(results: Results) -> Section | None:
@@ -35,7 +44,22 @@ def section(results: Results) -> Section | None:
     )
     bodies = tuple(body([row_of(row, tuple(models)) for row in found], where) for where, found in places.items())
     numbers = Table("What the paper prints, and what its equations give", columns, bodies, wordy=True)
-    return Section("paper-numbers", "The paper’s numbers", (numbers,))
+    verdicts = Counter(str(row["verdict"]) for row in rows)
+    counts = listed(f"{verdicts[name]} {name}" for name in TONES if verdicts[name])
+    finding = f"Of {count(len(rows), 'number')} that the paper prints: {counts}."
+    told = Findings(
+        tuple(Finding(f"{name.capitalize()}:", MEANINGS[name], tone=TONES[name]) for name in MEANINGS), "lines"
+    )
+    return Section("paper-numbers", "The paper’s numbers", (*departures(results), told, numbers), finding, PAPER)
+
+
+def departures(results: Results) -> tuple[Paragraph, ...]:
+    """How the scene differs from the paper's; nothing if it does not."""
+    if not results.departures:
+        return ()
+    differs = in_signs("; ".join(str(departure) for departure in results.departures))
+    said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
+    return (Paragraph(said, "fair"),)
 
 
 def paper_numbers(results: Results) -> Sequence[Mapping[str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.report.blocks import Block, Column, Section, Table, table
+from walkerlab.report.blocks import PAPER, Block, Column, Section, Table, table
 from walkerlab.report.numbers import NONE, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
@@ -48,7 +48,7 @@ def section(results: Results) -> Section | None:
     """The tables that there are."""
     summary = results.summary("compare") or {}
     tables: list[Block] = [paper_table(caption, summary[key]) for key, caption in CAPTIONS.items() if summary.get(key)]
-    return Section("tables", "The paper’s tables", tuple(tables)) if tables else None
+    return Section("tables", "The paper’s tables", tuple(tables), page=PAPER) if tables else None
 
 
 def paper_table(caption: str, rows: Rows) -> Table:

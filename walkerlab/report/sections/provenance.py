@@ -6,6 +6,7 @@ import datetime
 
 from walkerlab.config.writer import to_yaml
 from walkerlab.report.blocks import Block, Code, Column, Section, Table, table
+from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.store.artifact import Stored
 
@@ -16,7 +17,18 @@ def section(results: Results) -> Section:
     if results.stored:
         blocks += [results_table(results), software_table(results), digests_table(results)]
         blocks.append(Code("Command lines", "\n".join(command_lines(results))))
-    return Section("provenance", "Where this comes from", tuple(blocks))
+    return Section("provenance", "Where this comes from", tuple(blocks), finding(results))
+
+
+def finding(results: Results) -> str:
+    """Which version made the results, and how many there are."""
+    if not results.stored:
+        return "The config of this run."
+    versions = listed(dict.fromkeys(result.provenance.package_version for result in results.stored.values()))
+    commits = dict.fromkeys(result.provenance.git_commit for result in results.stored.values())
+    made_from = listed(commit[:9] for commit in commits if commit)
+    at = f", commit {made_from}" if made_from else ""
+    return f"{count(len(results.stored), 'result')} of walkerlab {versions}{at}; config, machine, keys and digests."
 
 
 def results_table(results: Results) -> Table:
@@ -26,7 +38,6 @@ def results_table(results: Results) -> Table:
         Column("begun (UTC)"),
         Column("took (s)", numeric=True),
         Column("seed", numeric=True),
-        Column("commit"),
         Column("complete"),
     ]
     rows = [
@@ -35,12 +46,11 @@ def results_table(results: Results) -> Table:
             result.provenance.started_utc.partition(".")[0].replace("T", " "),
             f"{took_s(result):.2f}",
             str(result.provenance.seed),
-            result.provenance.git_commit or "not from a checkout",
             "yes" if result.complete else "no",
         ]
         for name, result in results.stored.items()
     ]
-    return table("When each result was made", columns, rows, wordy=True)
+    return table("When each result was made", columns, rows)
 
 
 def took_s(result: Stored) -> float:
@@ -60,14 +70,15 @@ def software_table(results: Results) -> Table:
     heads = [", ".join(stages) for stages in used.values()] if len(used) > 1 else ["version"]
     columns = [Column("software"), *(Column(head) for head in heads)]
     rows = [[name, *(dict(versions).get(name, "") for versions in used)] for name in names]
-    return table("Software and machine", columns, rows, wordy=True)
+    return table("Software and machine", columns, rows)
 
 
 def software(result: Stored) -> tuple[tuple[str, str], ...]:
     """What a result was made with."""
     made = result.provenance
     libraries = sorted(made.library_versions.items())
-    return (("walkerlab", made.package_version), *libraries, ("platform", made.platform))
+    commit = made.git_commit or "not from a checkout"
+    return (("walkerlab", made.package_version), ("commit", commit), *libraries, ("platform", made.platform))
 
 
 def digests_table(results: Results) -> Table:
@@ -78,7 +89,6 @@ def digests_table(results: Results) -> Table:
         "What determines each result, and what it holds",
         columns,
         rows,
-        wordy=True,
         note="A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither.",
     )
 

@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import Block, Body, Cell, Column, Paragraph, Section, Table, Tone, body, table
+from walkerlab.report.blocks import (
+    CASES,
+    Block,
+    Body,
+    Cell,
+    Column,
+    Gallery,
+    Paragraph,
+    Section,
+    Table,
+    Tone,
+    body,
+    table,
+)
 from walkerlab.report.numbers import count, listed, number, whole
 from walkerlab.report.results import Results
 from walkerlab.verification.verdict import BUDGET_USED
@@ -21,11 +34,14 @@ def section(results: Results) -> Section | None:
     if summary is None:
         return None
     cases, known = summary["cases"], summary["known"]
-    blocks: list[Block] = [*failures(cases, known), passed(summary), case_table(cases), known_table(known)]
+    blocks: list[Block] = [*failures(cases, known), judgement(), case_table(cases), known_table(known)]
     if summary["ordinary"]:
         blocks.append(ordinary_table(summary))
     blocks.append(maps(results))
-    return Section("stability", "Stiff and extreme cases", tuple(blocks))
+    blocks += [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")]
+    total = summary["passed"] + summary["failed"]
+    finding = f"{summary['passed']} of {count(total, 'extreme case')} and known problems came out right."
+    return Section("stability", "Stiff and extreme cases", tuple(blocks), finding, CASES)
 
 
 def failures(cases: Rows, known: Rows) -> list[Block]:
@@ -47,16 +63,15 @@ def failures(cases: Rows, known: Rows) -> list[Block]:
     return found
 
 
-def passed(summary: Mapping[str, Any]) -> Paragraph:
-    """How many there are and how they are judged."""
-    total = summary["passed"] + summary["failed"]
+def judgement() -> Paragraph:
+    """How cases are judged."""
     judged = (
         "A case passes if it ends as expected, within its budget of right-hand sides, with finite numbers, its energy "
         "balanced, nothing won back from friction or damping, momentum kept at rigid heel strikes and elsewhere given "
-        "by ground and gravity, and the same times at a tenfold tolerance and by another method; walkers of other "
-        "sizes also agree with a twin of ordinary size."
+        "by ground and gravity, and the same times at a tolerance ten times tighter and by another method; walkers of "
+        "other sizes also agree with a twin of ordinary size."
     )
-    return Paragraph(f"{summary['passed']} of {count(total, 'case')} and known problems came out right. {judged}")
+    return Paragraph(judged)
 
 
 def maps(results: Results) -> Paragraph:
@@ -71,9 +86,9 @@ def maps(results: Results) -> Paragraph:
     fixed = listed(f"{many} {name}" for name, many in summary["fixed_step"].items())
     return Paragraph(
         f"Two of the figures map whole planes. Over stiffness and stiction velocity the default method’s walks ended: "
-        f"{ends}; {summary['ends_otherwise_sharper']} end otherwise at a tenfold tolerance, the others differ by "
-        f"{number(summary['median_error'], 2)} in the median and {number(summary['largest_error'], 2)} at most. Over "
-        f"stiffness and step size a game engine’s method was: {fixed}."
+        f"{ends}; {summary['ends_otherwise_sharper']} end otherwise at a tolerance ten times tighter, the others "
+        f"differ by {number(summary['median_error'], 2)} in the median and {number(summary['largest_error'], 2)} at "
+        f"most. Over stiffness and step size a game engine’s method was: {fixed}."
     )
 
 
@@ -96,21 +111,31 @@ def case_table(cases: Rows) -> Table:
     note = (
         "Other method: that gives the same times, as far as tolerances promise. Worst measure: the largest of all "
         "measures of a case but its use of the budget, each divided by the most that is allowed."
-        f"{without_answer(cases)}"
+        f"{without_answer(cases)}{not_measured(cases)}"
     )
     return Table("Extreme cases", columns, bodies, wordy=True, note=note)
 
 
 def without_answer(cases: Rows) -> str:
     """Which other methods gave no answer, or why none was asked: each reason once, with its cases."""
-    by_reason: dict[str, list[str]] = {}
-    for row in cases:
-        if row["second_tried"]:
-            by_reason.setdefault(str(row["second_tried"]), []).append(str(row["name"]))
-    if not by_reason:
-        return ""
-    said = "; ".join(f"{reason} ({', '.join(names)})" for reason, names in by_reason.items())
-    return f" Other methods that gave no answer, or why none was asked: {said}."
+    reasons = [(str(row["second_tried"]), row) for row in cases if row["second_tried"]]
+    said = by_reason(reasons)
+    return f" Other methods that gave no answer, or why none was asked: {said}." if said else ""
+
+
+def not_measured(cases: Rows) -> str:
+    """Which measures could not be taken: each with its reason once, and its cases."""
+    missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
+    said = by_reason(missed)
+    return f" Not measured: {said}." if said else ""
+
+
+def by_reason(reasons: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
+    """Each reason once, with the cases that it holds for."""
+    names: dict[str, list[str]] = {}
+    for reason, row in reasons:
+        names.setdefault(reason, []).append(str(row["name"]))
+    return "; ".join(f"{reason} ({', '.join(cases)})" for reason, cases in names.items())
 
 
 def case_row(row: Mapping[str, Any]) -> list[str | Cell]:

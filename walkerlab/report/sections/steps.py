@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from walkerlab.report.blocks import Column, Section, table
-from walkerlab.report.numbers import NONE, fixed
-from walkerlab.report.outcomes import CONTACT, RIGID
+from walkerlab.report.numbers import NONE, fixed, span
+from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
 from walkerlab.report.results import Results
 
 FIRST, LAST = 20, 4
@@ -47,7 +47,14 @@ def section(results: Results) -> Section | None:
     rows = [[str(step + 1), *(at(found, step, one.printed) for found, one in pairs)] for step in shown]
     left_away = "" if len(shown) == steps else f"Steps {FIRST + 1} to {steps - LAST} are in the artifacts. "
     note = left_away + "T: from one heel strike or touch to the next; S: along the slope, from foothold to foothold."
-    return Section("steps", "Step by step", (table("Periods and lengths of the steps", columns, rows, note=note),))
+    steps_table = table("Periods and lengths of the steps", columns, rows, note=note)
+    return Section("steps", "Step by step", (steps_table,), finding(results))
+
+
+def finding(results: Results) -> str:
+    """How long the steps of each model take."""
+    periods = {stage: (results.summary(stage) or {}).get("step_periods_s") for stage in (RIGID, CONTACT)}
+    return "; ".join(f"{MODELS[stage]}: steps of {span(found, 's')}" for stage, found in periods.items() if found) + "."
 
 
 def values_of(summary: Mapping[str, Any], key: str) -> Sequence[float]:

@@ -34,9 +34,9 @@ def section(results: Results) -> Section:
     told = (*(finding(results, stage) for stage in MODELS), gait(results), adjustment(results))
     fared = [found for found in told if found is not None]
     if fared:
-        blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad"))))
+        blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
     rows = paper_numbers(results)
-    if rows:
+    if rows and results.of_the_paper:
         blocks += of_the_paper(results, rows)
     elif not blocks:
         blocks.append(Paragraph("There are no results to judge."))
@@ -80,17 +80,15 @@ def adjustment(results: Results) -> Finding | None:
 
 def of_the_paper(results: Results, rows: Rows) -> list[Block]:
     """How the paper's numbers fared, and its gravest errors."""
-    summary = results.summary("compare") or {}
-    blocks: list[Block] = []
-    departures = summary.get("departures")
-    if departures:
-        differs = in_signs("; ".join(str(departure) for departure in departures))
-        said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
-        blocks.append(Paragraph(said, "fair"))
-    blocks += [shares(rows), Findings(by_verdict(rows))]
+    blocks: list[Block] = [shares(rows), Findings(by_verdict(rows), "lines")]
     gravest = headlines(results)
     if gravest:
-        blocks += [Paragraph("What is behind it, measured on the paper’s own walker:"), Findings(gravest)]
+        blocks += [
+            Paragraph(
+                "What is behind it; printed, right and measured stand side by side on the page of the paper’s numbers."
+            ),
+            Findings(gravest, "columns"),
+        ]
     return blocks
 
 
@@ -110,16 +108,8 @@ def by_verdict(rows: Rows) -> tuple[Finding, ...]:
         here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
         if here:
             said = "; ".join(share(where, here[where], all_there[where]) for where in here)
-            found.append(Finding(verdict.capitalize(), f"{said[:1].upper()}{said[1:]}. {MEANINGS[verdict]}", tone=tone))
+            found.append(Finding(f"{verdict.capitalize()}:", f"{said}.", tone=tone))
     return tuple(found)
-
-
-MEANINGS = {
-    "reproduced": "They come out to the printed digits; parameters that are used as printed are among them.",
-    "explained": "They do not come out, or not by themselves, and what was measured says why.",
-    "refuted": "They contradict what was measured, or the paper’s own numbers.",
-}
-"""What a verdict says."""
 
 
 def share(where: str, some: int, every: int) -> str:
@@ -141,7 +131,6 @@ def headlines(results: Results) -> tuple[Finding, ...]:
 
 
 def headline(words: str, erratum: Mapping[str, str]) -> Finding:
-    """An erratum in sentences."""
-    parts = {"Printed": "printed", "Right": "right", "Why": "evidence", "Measured": "measured"}
-    text = " ".join(f"{label}: {erratum[name]}." for label, name in parts.items())
-    return Finding(in_signs(f"{words} ({erratum['where']})"), in_signs(text), tone="fair")
+    """An erratum in a line: what it comes to, and what was measured."""
+    first, _, _ = erratum["measured"].partition("; ")
+    return Finding(in_signs(f"{words} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")

@@ -1,53 +1,552 @@
-"use strict";
-for (const player of document.querySelectorAll("[data-player]")) {
-  const controls = player.querySelector(".controls");
-  const [button, slider, clock] = controls.children;
-  const instants = JSON.parse(clock.dataset.instants);
-  const walkers = [...player.querySelectorAll("[data-frames]")].map((group) => ({
-    frames: JSON.parse(group.dataset.frames),
-    legs: group.querySelectorAll(".leg"),
-    hip: group.querySelector(".hip"),
-    group,
-  }));
-  let startedAt = null;
+const TAU = 2 * Math.PI;
+const UNITS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
+const minus = (text) => text.replace("-", "−");
+const digits = (value, count = 4) => (value === undefined ? "–" : minus(Math.abs(value) < 1e-12 ? "0" : Number(value.toPrecision(count)).toString()));
+const metres = (value, count = 3) => {
+  const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? UNITS[value === 0 ? 0 : 3];
+  return `${digits(value / scale, count)} ${unit}`;
+};
+const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 
-  const show = (index) => {
-    for (const { frames, legs, hip } of walkers) {
-      const [x0, y0, x1, y1, x2, y2] = frames[Math.min(index, frames.length - 1)];
-      legs[0].setAttribute("points", `${x0},${-y0} ${x1},${-y1}`);
-      legs[1].setAttribute("points", `${x2},${-y2} ${x1},${-y1}`);
-      hip.setAttribute("cx", x1);
-      hip.setAttribute("cy", -y1);
+// The numbers of a walker, and their values at an instant.
+class Track {
+  constructor(element) {
+    Object.assign(this, JSON.parse(element.dataset.meta));
+    const bytes = Uint8Array.from(atob(element.dataset.floats), (letter) => letter.charCodeAt(0));
+    const floats = new Float32Array(bytes.buffer);
+    this.all = {};
+    this.channels.forEach((name, index) => (this.all[name] = floats.subarray(index * this.samples, (index + 1) * this.samples)));
+    this.end = this.all.t[this.samples - 1];
+    this.seek(0);
+  }
+  has(name) {
+    return name in this.all;
+  }
+  seek(time) {
+    const t = this.all.t;
+    let [low, high] = [0, this.samples - 1];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (t[middle] <= time) low = middle;
+      else high = middle;
     }
-    slider.value = index;
-    clock.textContent = `${instants[index].toFixed(2)} s`;
-    slider.setAttribute("aria-valuetext", clock.textContent);
+    this.row = low;
+    this.share = t[high] > t[low] ? clamp((time - t[low]) / (t[high] - t[low]), 0, 1) : 0;
+    this.over = time > this.end + 1e-6;
+  }
+  at(name) {
+    const values = this.all[name];
+    return values && values[this.row] + this.share * (values[Math.min(this.row + 1, this.samples - 1)] - values[this.row]);
+  }
+  get stance() {
+    if (this.has("s")) return this.all.s[this.row + (this.share === 1 ? 1 : 0)];
+    return this.at("n0") >= this.at("n1") ? 0 : 1;
+  }
+}
+
+// A canvas as wide as its place, sharp on every screen.
+class Picture {
+  constructor(canvas, shape) {
+    Object.assign(this, { canvas, shape, context: canvas.getContext("2d") });
+  }
+  fit() {
+    const dots = Math.min(devicePixelRatio || 1, 2);
+    this.width = Math.max(200, this.canvas.parentElement.clientWidth);
+    this.height = Math.round(this.width * this.shape(this.width));
+    this.canvas.width = this.width * dots;
+    this.canvas.height = this.height * dots;
+    this.canvas.style.height = `${this.height}px`;
+    this.context.setTransform(dots, 0, 0, dots, 0, 0);
+  }
+}
+
+function arrow(c, x, y, dx, dy) {
+  const length = Math.hypot(dx, dy);
+  if (length < 2) return;
+  const head = Math.min(9, 0.5 * length);
+  const [ux, uy] = [dx / length, dy / length];
+  c.beginPath();
+  c.moveTo(x, y);
+  c.lineTo(x + dx, y + dy);
+  c.moveTo(x + dx - head * (ux + 0.5 * uy), y + dy - head * (uy - 0.5 * ux));
+  c.lineTo(x + dx, y + dy);
+  c.lineTo(x + dx - head * (ux - 0.5 * uy), y + dy - head * (uy + 0.5 * ux));
+  c.stroke();
+}
+
+// The force on a foot as an arrow, an ordinary one `unit` long, none longer than `most`.
+function force(c, scene, track, leg, x, y, unit, most) {
+  const [normal, along] = [track.at(`n${leg}`), track.at(`d${leg}`) ?? 0];
+  if (!normal || normal < 0) return;
+  const scale = Math.min(unit / scene.ordinary_force, most / Math.hypot(normal, along));
+  arrow(c, x, y, along * scale, -normal * scale);
+}
+
+function drawWalk(picture, scene, tracks, colours) {
+  const { context: c, width, height } = picture;
+  const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
+  const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
+  const hip = tracks.reduce((sum, track) => sum + track.at("hx"), 0) / tracks.length;
+  const place = picture.place = (x, y) => [
+    width / 2 + scale * (cos * (x - hip) + sin * y),
+    0.83 * height + scale * (sin * (x - hip) - cos * y),
+  ];
+  const across = (0.75 * width) / scale;
+  const slab = (from, to, top, bottom, fill) => {
+    const corners = [[from, top], [to, top], [to, bottom], [from, bottom]].map(([x, y]) => place(x, y));
+    c.fillStyle = fill;
+    c.beginPath();
+    for (const [x, y] of corners) c.lineTo(x, y);
+    c.fill();
+  };
+  c.clearRect(0, 0, width, height);
+  const under = scene.pads.length ? -0.04 * scene.leg_m : 0;
+  slab(hip - across, hip + across, under, -scene.leg_m, colours.ground);
+  c.globalAlpha = 0.55;
+  for (const [from, to, leg] of scene.pads) {
+    if (to > hip - across && from < hip + across) slab(from, to, 0, under, colours[`leg-${leg + 1}`]);
+  }
+  c.globalAlpha = 1;
+  c.strokeStyle = colours.soft;
+  c.lineWidth = 1;
+  c.beginPath();
+  c.moveTo(...place(hip - across, 0));
+  c.lineTo(...place(hip + across, 0));
+  const tick = 0.5 * scene.leg_m;
+  for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
+    c.moveTo(...place(i * tick, under));
+    c.lineTo(...place(i * tick, under - 0.03 * scene.leg_m));
+  }
+  c.stroke();
+  c.fillStyle = colours.soft;
+  c.font = "12px system-ui, sans-serif";
+  c.textAlign = "center";
+  for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
+    const [x, y] = place(i * tick, under - 0.1 * scene.leg_m);
+    c.fillText(`${digits(i * tick)} m`, x, y);
+  }
+  picture.points = [];
+  tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
+}
+
+function drawWalker(picture, scene, track, colours, scale, index) {
+  const { context: c, place, points } = picture;
+  const broad = index === 0 ? 10 : 5;
+  const joint = (name) => place(track.at(name[0] + "x" + name.slice(1)), track.at(name[0] + "y" + name.slice(1)));
+  c.lineCap = c.lineJoin = "round";
+  c.globalAlpha = track.over ? 0.35 : index === 0 && !track.alone ? 0.75 : 1;
+  for (const leg of [1, 0]) {
+    const bent = track.has(`kx${leg}`);
+    c.strokeStyle = c.fillStyle = colours[track.style];
+    const path = new Path2D();
+    for (const name of bent ? ["h", `k${leg}`] : ["h"]) path.lineTo(...joint(name));
+    // The sole is where the leg's own direction meets the foot's arc.
+    const [x, y] = place(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
+    const radius = scale * scene.foot_radius_m;
+    const down = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
+    path.lineTo(x + radius * Math.cos(down), y + radius * Math.sin(down));
+    if (scene.foot_radius_m > 0.01 * scene.leg_m) {
+      path.moveTo(x + radius * Math.cos(down - 0.6), y + radius * Math.sin(down - 0.6));
+      path.arc(x, y, radius, down - 0.6, down + 0.6);
+    }
+    c.lineWidth = broad;
+    c.stroke(path);
+    if (leg === 1) {
+      c.strokeStyle = colours.paper;
+      c.lineWidth = 0.4 * broad;
+      c.stroke(path);
+    }
+    if (bent) dot(c, joint(`k${leg}`), 0.7 * broad, colours[track.style]);
+    points.push({ at: joint(`f${leg}`), said: `${track.name}, foot of leg ${leg + 1}: ${metres(track.at(`fx${leg}`), 4)} along, ${metres(track.at(`fy${leg}`))} above` });
+  }
+  if (track.has("u") && scene.torso_m) {
+    const tilted = track.at("u") + scene.slope_rad;
+    c.strokeStyle = colours[track.style];
+    c.lineWidth = broad;
+    c.beginPath();
+    c.moveTo(...joint("h"));
+    c.lineTo(...place(track.at("hx") + scene.torso_m * Math.sin(tilted), track.at("hy") + scene.torso_m * Math.cos(tilted)));
+    c.stroke();
+  }
+  dot(c, joint("h"), broad, colours[track.style]);
+  points.push({ at: joint("h"), said: `${track.name}, hip: ${metres(track.at("hx"), 4)} along, ${metres(track.at("hy"), 4)} above` });
+  c.strokeStyle = colours.force;
+  c.lineWidth = 2;
+  for (const leg of [0, 1]) {
+    c.save();
+    c.translate(...joint(`f${leg}`));
+    c.rotate(scene.slope_rad);
+    force(c, scene, track, leg, 0, 0, 0.3 * scale * scene.leg_m, 0.8 * scale * scene.leg_m);
+    c.restore();
+  }
+  c.globalAlpha = 1;
+}
+
+function dot(c, [x, y], radius, fill) {
+  c.fillStyle = fill;
+  c.beginPath();
+  c.arc(x, y, radius, 0, TAU);
+  c.fill();
+}
+
+// One foot, the slope drawn level: how deep it is in the ground, how far it slipped, and the forces.
+function drawFoot(picture, scene, track, leg, colours) {
+  const { context: c, width, height } = picture;
+  const scale = height / scene.closeup_m;
+  const ground = 0.68 * height;
+  const mark = 0.5 * width;
+  const slip = track.at(`q${leg}`) ?? 0;
+  const x = mark + clamp(scale * slip, -0.42 * width, 0.42 * width);
+  const sole = ground - scale * track.at(`fy${leg}`);
+  const radius = Math.max(scale * scene.foot_radius_m, 0.02 * height);
+  c.clearRect(0, 0, width, height);
+  c.fillStyle = colours.ground;
+  c.fillRect(0, ground, width, height - ground);
+  const foot = new Path2D();
+  if (scene.foot_radius_m > 0) foot.arc(x, sole - radius, radius, 0, TAU);
+  else [[x, sole], [x - 0.3 * height, sole - height], [x + 0.3 * height, sole - height]].forEach((corner) => foot.lineTo(...corner));
+  const seen = sole > 0;
+  if (seen) {
+    c.globalAlpha = 0.8;
+    c.fillStyle = colours[track.style];
+    c.fill(foot);
+    c.globalAlpha = 1;
+    c.save();
+    c.beginPath();
+    c.rect(0, ground, width, height);
+    c.clip();
+    c.fillStyle = colours.bad;
+    c.fill(foot);
+    c.restore();
+  }
+  c.strokeStyle = c.fillStyle = colours.ink;
+  c.lineWidth = 1;
+  c.beginPath();
+  c.moveTo(0, ground);
+  c.lineTo(width, ground);
+  c.moveTo(mark, ground - 7);
+  c.lineTo(mark, ground + 7);
+  c.stroke();
+  c.font = "12px system-ui, sans-serif";
+  c.textAlign = "left";
+  const bar = niceStep(scene.closeup_m / 3);
+  c.fillText(metres(bar, 1), 8, height - 14);
+  c.fillRect(8, height - 9, scale * bar, 2);
+  if (!seen) {
+    c.textAlign = "center";
+    c.fillText(`${metres(track.at(`fy${leg}`))} above the ground`, width / 2, 0.3 * height);
+    arrow(c, width / 2, 0.25 * height, 0, -0.15 * height);
+  }
+  c.lineWidth = 2;
+  if (Math.abs(x - mark) > 3) arrow(c, mark, ground + 16, x - mark, 0);
+  c.strokeStyle = colours.force;
+  c.lineWidth = 3;
+  force(c, scene, track, leg, x, Math.min(sole, ground + 0.2 * height), 0.4 * height, 0.62 * height);
+}
+
+function footSaid(track, leg) {
+  const parts = [`leg ${leg + 1}`];
+  if (track.has("p0")) parts.push(`penetration ${metres(track.at(`p${leg}`))}`);
+  if (track.has("q0")) parts.push(`slip ${metres(track.at(`q${leg}`))}`);
+  if (track.has("n0")) parts.push(`normal ${digits(track.at(`n${leg}`), 3)} N`);
+  if (track.has("d0")) parts.push(`friction ${digits(track.at(`d${leg}`), 3)} N`);
+  return parts.join(", ");
+}
+
+const niceStep = (rough) => {
+  const ten = 10 ** Math.floor(Math.log10(rough));
+  return ten * ([5, 2, 1].find((step) => step * ten <= rough) ?? 1);
+};
+
+// A plot: its curves are drawn once, its cursor lies in a layer above them.
+class Plot {
+  static WIDTH = 340;
+  static HEIGHT = 230;
+  static FRAME = [46, 8, 8, 36];
+
+  constructor(place, titles, unit, inTime, seek) {
+    Object.assign(this, { place, titles, unit, inTime });
+    const sheet = document.createElement("div");
+    sheet.className = "sheet";
+    this.curves = element("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, role: "img" });
+    this.cursor = element("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, class: "cursor", "aria-hidden": "true" });
+    this.tip = document.createElement("output");
+    this.tip.className = "tip";
+    sheet.append(this.curves, this.cursor, this.tip);
+    place.append(sheet);
+    const look = (event) => this.look(event, seek);
+    this.cursor.addEventListener("pointermove", look);
+    this.cursor.addEventListener("pointerdown", (event) => {
+      this.cursor.setPointerCapture(event.pointerId);
+      look(event);
+    });
+    this.cursor.addEventListener("pointerleave", () => (this.tip.textContent = ""));
+  }
+
+  draw(series, said) {
+    this.series = series;
+    const [left, top, right, bottom] = Plot.FRAME;
+    const limits = (key) => {
+      const all = series.flatMap((one) => [one[key].reduce((a, b) => Math.min(a, b)), one[key].reduce((a, b) => Math.max(a, b))]);
+      const [low, high] = [Math.min(...all), Math.max(...all)];
+      const pad = key === "x" && this.inTime ? 0 : 0.05 * (high - low || 1);
+      return [low - pad, high + pad];
+    };
+    const [x, y] = [limits("x"), limits("y")];
+    this.toX = (value) => left + ((value - x[0]) / (x[1] - x[0])) * (Plot.WIDTH - left - right);
+    this.toY = (value) => Plot.HEIGHT - bottom - ((value - y[0]) / (y[1] - y[0])) * (Plot.HEIGHT - top - bottom);
+    this.fromX = (place) => x[0] + ((place - left) / (Plot.WIDTH - left - right)) * (x[1] - x[0]);
+    this.curves.setAttribute("aria-label", said);
+    this.curves.replaceChildren(...this.axis(x, true), ...this.axis(y, false), ...series.map((one) => this.curve(one)));
+    this.line = element("line", { class: "now", y1: top, y2: Plot.HEIGHT - bottom });
+    this.dots = series.map((one) => element("circle", { r: 4.5, class: one.style }));
+    this.cursor.replaceChildren(...(this.inTime ? [this.line] : []), ...this.dots);
+  }
+
+  axis([low, high], horizontal) {
+    const [left, top, right, bottom] = Plot.FRAME;
+    const step = niceStep((high - low) / (horizontal ? 4 : 3));
+    const parts = [];
+    for (let i = Math.ceil(low / step); i * step <= high; i++) {
+      const at = horizontal ? this.toX(i * step) : this.toY(i * step);
+      const ends = horizontal ? { x1: at, x2: at, y1: top, y2: Plot.HEIGHT - bottom } : { y1: at, y2: at, x1: left, x2: Plot.WIDTH - right };
+      const label = horizontal ? { x: at, y: Plot.HEIGHT - bottom + 15, class: "middle" } : { x: left - 5, y: at + 4, class: "last" };
+      parts.push(element("line", { class: "grid", ...ends }), element("text", label, digits(Number((i * step).toPrecision(6)))));
+    }
+    const title = horizontal
+      ? { x: (left + Plot.WIDTH - right) / 2, y: Plot.HEIGHT - 4, class: "middle" }
+      : { transform: `translate(11 ${(top + Plot.HEIGHT - bottom) / 2}) rotate(-90)`, class: "middle" };
+    parts.push(element("text", title, this.titles[horizontal ? 0 : 1]));
+    return parts;
+  }
+
+  curve(one) {
+    const every = Math.max(1, Math.floor(one.x.length / 900));
+    let path = "";
+    for (let i = 0; i < one.x.length; i += every) path += `${path ? "L" : "M"}${this.toX(one.x[i]).toFixed(1)} ${this.toY(one.y[i]).toFixed(1)}`;
+    return element("path", { d: path, class: `${one.style} ${one.dash ?? ""}` });
+  }
+
+  show(time) {
+    if (this.inTime) {
+      const at = this.toX(time).toFixed(2);
+      this.line.setAttribute("x1", at);
+      this.line.setAttribute("x2", at);
+    }
+    this.series.forEach(({ track, x, y }, index) => {
+      const value = (values) => values[track.row] + track.share * (values[Math.min(track.row + 1, values.length - 1)] - values[track.row]);
+      this.dots[index].setAttribute("cx", this.toX(value(x)).toFixed(2));
+      this.dots[index].setAttribute("cy", this.toY(value(y)).toFixed(2));
+    });
+  }
+
+  look(event, seek) {
+    const box = this.cursor.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * Plot.WIDTH;
+    const y = ((event.clientY - box.top) / box.height) * Plot.HEIGHT;
+    const found = this.inTime ? this.series.map((one) => nearest(one, (i) => Math.abs(this.toX(one.x[i]) - x))) : [this.nearestCurve(x, y)];
+    const time = this.inTime ? Math.max(0, this.fromX(x)) : found[0].time;
+    const values = found.map(({ one, row }) => `${one.said} ${this.inTime ? "" : `${digits(one.x[row])} rad, `}${digits(one.y[row])} ${this.unit}`);
+    this.tip.textContent = [`${time.toFixed(3)} s`, ...values].join("\n");
+    this.tip.style.left = x < Plot.WIDTH / 2 ? "auto" : "3.2rem";
+    this.tip.style.right = x < Plot.WIDTH / 2 ? ".6rem" : "auto";
+    if (event.buttons) seek(time);
+  }
+
+  nearestCurve(x, y) {
+    const all = this.series.map((one) => nearest(one, (i) => (this.toX(one.x[i]) - x) ** 2 + (this.toY(one.y[i]) - y) ** 2));
+    return all.reduce((best, next) => (next.far < best.far ? next : best));
+  }
+}
+
+function nearest(one, distance) {
+  let [row, far] = [0, Infinity];
+  for (let i = 0; i < one.x.length; i++) {
+    const next = distance(i);
+    if (next < far) [row, far] = [i, next];
+  }
+  return { one, row, far, time: one.track.all.t[row] };
+}
+
+function element(name, attributes, text) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== undefined) made.textContent = text;
+  return made;
+}
+
+// The player: one clock, and everything that follows it.
+function play(root) {
+  const find = (selector) => root.querySelector(selector);
+  const scene = JSON.parse(root.dataset.player);
+  const tracks = [...root.querySelectorAll(".track")].map((place) => new Track(place));
+  tracks.forEach((track) => (track.alone = tracks.length === 1));
+  const end = Math.max(...tracks.map((track) => track.end));
+  const strikes = [0, ...tracks[tracks.length - 1].strikes, end];
+  const [walk, foot] = [
+    new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
+    new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
+  ];
+  const [slider, clock, button] = [find(".time"), find(".clock"), find(".play")];
+  const close = tracks[tracks.length - 1];
+  let [time, playing, last, frame, colours] = [0, false, 0, 0, {}];
+
+  const seek = (next, still = true) => {
+    if (still) stop();
+    time = clamp(next, 0, end);
+    for (const track of tracks) track.seek(time);
+    show();
+  };
+  const plots = makePlots(root, tracks, seek);
+  const readout = makeReadout(find(".readout"), tracks);
+
+  const show = () => {
+    const leg = find(".which").value === "-1" ? close.stance : Number(find(".which").value);
+    drawWalk(walk, scene, tracks, colours);
+    drawFoot(foot, scene, close, leg, colours);
+    for (const plot of plots) plot.show(time);
+    slider.value = time;
+    clock.textContent = `${time.toFixed(2)} s`;
+    root.dataset.time = time.toFixed(4);
+    if (playing && frame++ % 6) return;
+    slider.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${end.toFixed(2)} seconds`);
+    find(".foot-said").textContent = footSaid(close, leg);
+    readout();
   };
   const stop = () => {
-    startedAt = null;
+    playing = false;
     button.textContent = "Play";
   };
   const tick = (now) => {
-    if (startedAt === null) return;
-    const time = (now - startedAt) / 1000;
-    const next = instants.findIndex((instant) => instant >= time);
-    show(next < 0 ? instants.length - 1 : next);
-    if (next < 0) stop();
-    else requestAnimationFrame(tick);
+    if (!playing) return;
+    const next = time + (Math.min(now - last, 100) / 1000) * Number(find(".speed").value);
+    last = now;
+    if (next < end) seek(next, false);
+    else if (find(".loop").checked) seek(0, false);
+    else return seek(end);
+    requestAnimationFrame(tick);
   };
-  button.addEventListener("click", () => {
-    if (startedAt !== null) return stop();
-    const from = Number(slider.value) >= instants.length - 1 ? 0 : instants[slider.value];
-    startedAt = performance.now() - 1000 * from;
+  const start = () => {
+    if (time >= end) seek(0);
+    playing = true;
+    last = performance.now();
     button.textContent = "Pause";
     requestAnimationFrame(tick);
+  };
+  const actions = {
+    play: () => (playing ? seek(time) : start()),
+    "frame-back": () => seek(time - 0.01),
+    "frame-on": () => seek(time + 0.01),
+    "step-back": () => seek(strikes.findLast((strike) => strike < time - 1e-6) ?? 0),
+    "step-on": () => seek(strikes.find((strike) => strike > time + 1e-6) ?? end),
+    first: () => seek(0),
+    last: () => seek(end),
+  };
+  const keys = { " ": "play", ArrowLeft: "frame-back", ArrowRight: "frame-on", PageUp: "step-back", PageDown: "step-on", Home: "first", End: "last" };
+  root.addEventListener("keydown", (event) => {
+    const own = event.key === " " ? "BUTTON INPUT SELECT" : "SELECT";
+    const action = keys[event.key];
+    if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (own.includes(event.target.tagName) && event.target !== slider) return;
+    event.preventDefault();
+    actions[action]();
   });
-  slider.addEventListener("input", () => {
-    stop();
-    show(Number(slider.value));
+  for (const one of root.querySelectorAll("[data-do]")) one.addEventListener("click", actions[one.dataset.do]);
+  slider.max = end;
+  slider.addEventListener("input", () => seek(Number(slider.value)));
+  find(".which").addEventListener("change", () => show());
+  find(".walk").addEventListener("pointermove", (event) => {
+    const box = walk.canvas.getBoundingClientRect();
+    const far = ({ at: [x, y] }) => Math.hypot(x - event.clientX + box.left, y - event.clientY + box.top);
+    const near = walk.points.filter((point) => far(point) < 24);
+    find(".scene .tip").textContent = near.map((point) => point.said).join("\n");
   });
-  for (const { group } of walkers) group.removeAttribute("hidden");
-  controls.hidden = false;
-  player.classList.add("live");
-  show(0);
+  find(".walk").addEventListener("pointerleave", () => (find(".scene .tip").textContent = ""));
+
+  const paint = () => {
+    const style = getComputedStyle(root);
+    for (const name of ["rigid", "contact", "leg-1", "leg-2", "ground", "ink", "soft", "paper", "force", "bad"]) {
+      colours[name] = style.getPropertyValue(`--${name}`).trim();
+    }
+    show();
+  };
+  const fit = () => {
+    walk.fit();
+    foot.fit();
+    paint();
+  };
+  find(".live").hidden = false;
+  root.classList.add("scripted");
+  new ResizeObserver(fit).observe(root);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+  // Whoever asked for less motion starts at a quarter of the speed, and nothing ever moves by itself.
+  if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
+  fit();
 }
+
+function makePlots(root, tracks, seek) {
+  const place = (name) => root.querySelector(`[data-view=${name}]`);
+  const start = (track, name) => Float32Array.from(track.all[name], (value, _, all) => value - track.all[name][0]);
+  const series = (track, x, y, said, dash) => ({ track, x, y, said: `${track.name.split(" ")[0].toLowerCase()} ${said}`, style: track.style, dash });
+  const made = [];
+  const phase = new Plot(place("phase"), ["angle (rad)", "angular velocity (rad/s)"], "rad/s", false, seek);
+  const choice = root.querySelector(".leg");
+  const turn = () => {
+    const leg = choice.value;
+    phase.draw(tracks.map((track) => series(track, track.all[`a${leg}`], track.all[`v${leg}`], "")), `Angular velocity of leg ${Number(leg) + 1} over its angle: closed loops, one for each model`);
+  };
+  if (tracks.every((track) => track.has("v0"))) {
+    turn();
+    choice.addEventListener("change", () => {
+      turn();
+      seek(Number(root.dataset.time));
+    });
+    made.push(phase);
+  } else place("phase").remove();
+  const angles = new Plot(place("angles"), ["time (s)", "angle (rad)"], "rad", true, seek);
+  angles.draw(
+    tracks.flatMap((track) => [0, 1].map((leg) => series(track, track.all.t, track.all[`a${leg}`], `leg ${leg + 1}`, leg ? "dashed" : ""))),
+    "Angles of both legs over time, for each model",
+  );
+  made.push(angles);
+  const parts = [["ke", "kinetic", ""], ["pe", "potential", "dashed"], ["me", "sum", "dotted"]];
+  const with_energy = tracks.filter((track) => track.has("me"));
+  if (with_energy.length) {
+    const energies = new Plot(place("energies"), ["time (s)", "change since the start (J)"], "J", true, seek);
+    energies.draw(
+      with_energy.flatMap((track) => parts.map(([name, said, dash]) => series(track, track.all.t, start(track, name), said, dash))),
+      "Changes of kinetic and potential energy and of their sum over time, for each model",
+    );
+    made.push(energies);
+  } else place("energies").remove();
+  return made;
+}
+
+// A table of what each model has at the instant; returns the function that fills it in.
+function makeReadout(table, tracks) {
+  const rows = [["a0", "angle of leg 1 (rad)"], ["a1", "angle of leg 2 (rad)"], ["v0", "velocity of leg 1 (rad/s)"], ["v1", "velocity of leg 2 (rad/s)"], ["ke", "kinetic energy (J)"], ["pe", "potential energy (J)"], ["me", "their sum (J)"]].filter(([name]) => tracks.some((track) => track.has(name)));
+  const head = table.tHead.insertRow();
+  for (const [index, text] of ["", ...tracks.map((track) => track.name)].entries()) {
+    const cell = document.createElement(index ? "th" : "td");
+    if (index) cell.scope = "col";
+    cell.textContent = text;
+    head.append(cell);
+  }
+  const cells = rows.map(([name, said]) => {
+    const row = table.tBodies[0].insertRow();
+    const heading = document.createElement("th");
+    heading.scope = "row";
+    heading.textContent = said;
+    row.append(heading);
+    return tracks.map((track) => {
+      const cell = row.insertCell();
+      cell.className = track.style;
+      return [track, name, cell];
+    });
+  });
+  return () => {
+    for (const [track, name, cell] of cells.flat()) cell.textContent = track.has(name) ? minus(track.at(name).toFixed(4)) : "–";
+  };
+}
+
+for (const root of document.querySelectorAll("[data-player]")) play(root);

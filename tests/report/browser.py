@@ -1,0 +1,140 @@
+"""A headless Chromium, spoken to over a pipe in its own protocol: nothing to install but the browser."""
+
+import base64
+import contextlib
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-extensions",
+    "--hide-scrollbars",
+    "--remote-debugging-pipe",
+)
+PATIENCE = 60.0
+
+
+def executable():
+    """Where a Chromium is; None if there is none. `CHROMIUM` names one that is elsewhere."""
+    named = os.environ.get("CHROMIUM")
+    return named or next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+class Browser:
+    """One browser with one tab."""
+
+    def __init__(self, path):
+        self.folder = tempfile.mkdtemp(prefix="walkerlab-chromium-")
+        to_browser, self.write_end = os.pipe()
+        self.read_end, from_browser = os.pipe()
+        # The protocol is spoken on the descriptors 3 and 4.
+        shell = f'exec "$@" 3<&{to_browser} 4>&{from_browser}'
+        command = ["bash", "-c", shell, "bash", path, *FLAGS, f"--user-data-dir={self.folder}", "about:blank"]
+        self.process = subprocess.Popen(
+            command, pass_fds=(to_browser, from_browser), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self.numbers, self.buffer, self.events, self.session = itertools.count(1), b"", [], None
+        target = next(one for one in self.call("Target.getTargets")["targetInfos"] if one["type"] == "page")
+        attached = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
+        self.session = attached["sessionId"]
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method, **parameters):
+        """Ask the browser for something, and keep what it tells meanwhile."""
+        number = next(self.numbers)
+        message = {"id": number, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.write_end, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self.message()
+            if answer.get("id") == number:
+                assert "error" not in answer, answer
+                return answer["result"]
+            self.events.append(answer)
+
+    def message(self):
+        while b"\0" not in self.buffer:
+            part = os.read(self.read_end, 1 << 16)
+            assert part, "the browser has ended"
+            self.buffer += part
+        line, _, self.buffer = self.buffer.partition(b"\0")
+        return json.loads(line)
+
+    def open(self, file, width=1200, height=900, *, dark=False, calm=False):
+        """Show a file, and wait until it stands."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        features = [
+            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
+            {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"},
+        ]
+        self.call("Emulation.setEmulatedMedia", features=features)
+        self.events.clear()
+        self.call("Page.navigate", url=file.as_uri())
+        self.until("document.readyState === 'complete'")
+
+    def evaluate(self, expression):
+        """The value of an expression on the page."""
+        answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def until(self, expression):
+        """Wait until an expression holds."""
+        deadline = time.monotonic() + PATIENCE
+        while not self.evaluate(expression):
+            assert time.monotonic() < deadline, expression
+            time.sleep(0.02)
+
+    def press(self, key, code=0):
+        """Press a key and let it go."""
+        text = {"text": key} if len(key) == 1 else {}
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **text)
+
+    def screenshot(self):
+        """What is seen, as PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def requests(self):
+        """Every address that was asked for since the page was opened."""
+        sent = [
+            event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"
+        ]
+        return [url for url in sent if not url.startswith("data:")]
+
+    def complaints(self):
+        """What scripts and the browser said on its console."""
+        kinds = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
+        return [event["params"] for event in self.events if event["method"] in kinds]
+
+    def close(self):
+        """End the browser and forget its profile."""
+        with contextlib.suppress(AssertionError, OSError):
+            self.session = None
+            self.call("Browser.close")
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        os.close(self.write_end)
+        os.close(self.read_end)
+        shutil.rmtree(self.folder, ignore_errors=True)

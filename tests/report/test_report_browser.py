@@ -1,0 +1,174 @@
+"""The report in a real browser: it asks for nothing, its player plays, every view follows, and no table overflows."""
+
+import pytest
+from browser import Browser, executable
+from synthetic_results import EVERYTHING, config, contact_sim, simulate, stored, with_motion
+
+from walkerlab.stages.report import write_pages
+
+PATH = executable()
+pytestmark = pytest.mark.skipif(PATH is None, reason="no Chromium is installed; `CHROMIUM` may name one")
+
+WIDTHS = (360, 768, 1440)
+SEEN = {
+    "walk": "document.querySelector('.walk').toDataURL()",
+    "close-up": "document.querySelector('.foot').toDataURL()",
+    "phase portrait": "document.querySelector('[data-view=phase] circle').getAttribute('cx')",
+    "angles": "document.querySelector('[data-view=angles] .now').getAttribute('x1')",
+    "energies": "document.querySelector('[data-view=energies] .now').getAttribute('x1')",
+    "numbers": "document.querySelector('.readout').textContent",
+    "clock": "document.querySelector('.clock').textContent",
+}
+TIME = "Number(document.querySelector('[data-player]').dataset.time)"
+SCRUB = "(() => {{ const s = document.querySelector('.time'); s.value = {}; s.dispatchEvent(new Event('input')); }})()"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("paper")
+    made = {name: make() for name, make in EVERYTHING.items()}
+    made |= {"simulate": with_motion(simulate()), "contact-sim": with_motion(contact_sim())}
+    figure = {"title": "Legs", "caption": "Both.", "number": 7, "alt": "Two lines.", "svg": "a.svg", "png": "a.png"}
+    (folder / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0L9 9"/></svg>'
+    )
+    (folder / "a.png").write_bytes(b"\x89PNG")
+    made["plot"] = stored("plot", {}, {"figures": [figure]})
+    write_pages(config(), made, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser():
+    browser = Browser(PATH)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(browser, folder):
+    browser.open(folder / "report.html")
+    return browser
+
+
+def test_the_page_asks_for_nothing_and_complains_of_nothing(page, folder):
+    page.evaluate("document.querySelector('.play').click()")
+    page.until(f"{TIME} > 0.1")
+    assert page.requests() == [(folder / "report.html").as_uri()]
+    assert page.complaints() == []
+
+
+def test_pages_beside_it_complain_of_nothing_either(browser, folder):
+    for file in sorted(folder.glob("report-*.html")):
+        browser.open(file)
+        assert browser.complaints() == []
+        assert browser.requests() == [file.as_uri()]
+
+
+def test_the_player_plays_and_pauses(page):
+    assert page.evaluate(TIME) == 0
+    page.evaluate("document.querySelector('.play').click()")
+    page.until(f"{TIME} > 0.2")
+    page.evaluate("document.querySelector('.play').click()")
+    stopped = page.evaluate(TIME)
+    page.evaluate("new Promise((done) => setTimeout(done, 150))")
+    assert page.evaluate(TIME) == stopped
+
+
+def test_nothing_moves_by_itself(page):
+    page.evaluate("new Promise((done) => setTimeout(done, 150))")
+    assert page.evaluate(TIME) == 0
+
+
+@pytest.mark.parametrize("view", SEEN)
+def test_scrubbing_moves_every_view(page, view):
+    page.evaluate(SCRUB.format(0.3))
+    before = page.evaluate(SEEN[view])
+    page.evaluate(SCRUB.format(0.62))
+    assert page.evaluate(SEEN[view]) != before
+
+
+def test_looping_begins_again_and_otherwise_the_walk_ends(page):
+    end = page.evaluate("Number(document.querySelector('.time').max)")
+    page.evaluate(SCRUB.format(end - 0.05))
+    page.evaluate("document.querySelector('.play').click()")
+    page.until("document.querySelector('.play').textContent === 'Play'")
+    assert page.evaluate(TIME) == pytest.approx(end, abs=1e-3)
+    page.evaluate("document.querySelector('.loop').click()")
+    page.evaluate(SCRUB.format(end - 0.05))
+    page.evaluate("document.querySelector('.play').click()")
+    page.until(f"{TIME} > 0.01 && {TIME} < 0.5 * {end}")
+
+
+def test_keys_move_through_the_walk(page):
+    page.evaluate("document.querySelector('.time').focus()")
+    page.press("PageDown", 34)
+    assert page.evaluate(TIME) == pytest.approx(0.7, abs=1e-3)
+    page.press("ArrowRight", 39)
+    assert page.evaluate(TIME) == pytest.approx(0.71, abs=1e-3)
+    page.press("Home", 36)
+    assert page.evaluate(TIME) == 0
+    page.press(" ", 32)
+    page.until(f"{TIME} > 0.05")
+
+
+def test_the_values_under_the_pointer_are_told(page):
+    page.evaluate("document.querySelector('[data-view=angles] .cursor').scrollIntoView()")
+    page.evaluate(
+        "(() => { const at = document.querySelector('[data-view=angles] .cursor'), box = at.getBoundingClientRect();"
+        "at.dispatchEvent(new PointerEvent('pointermove', {clientX: box.x + box.width / 2, clientY: box.y + 50})); })()"
+    )
+    told = page.evaluate("document.querySelector('[data-view=angles] .tip').textContent")
+    assert "rigid leg 1" in told
+    assert "contact leg 2" in told
+
+
+def test_a_figure_grows_on_a_click_and_escape_closes_it(page):
+    page.evaluate("document.querySelector('[data-large]').click()")
+    assert page.evaluate("document.getElementById('large').open")
+    assert page.evaluate("document.querySelector('#large svg').getBoundingClientRect().height") > 600
+    page.press("Escape", 27)
+    page.until("!document.getElementById('large').open")
+
+
+def test_a_link_to_a_folded_section_unfolds_it(page):
+    assert not page.evaluate("document.querySelector('#gait details').open")
+    page.evaluate("document.querySelector('nav a[href=\"#gait\"]').click()")
+    page.until("document.querySelector('#gait details').open")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_overflows_the_width(browser, folder, width):
+    for file in sorted(folder.glob("report*.html")):
+        browser.open(file, width)
+        browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        assert browser.evaluate("document.documentElement.scrollWidth") <= width
+        sticking_out = (
+            "[...document.querySelectorAll('table')].filter((one) => !one.closest('.scroll, .player')"
+            " || one.closest('.scroll, .player').getBoundingClientRect().right > innerWidth + 1).length"
+        )
+        assert browser.evaluate(sticking_out) == 0
+
+
+def test_colours_follow_the_system_in_the_dark(browser, folder):
+    seen = []
+    for dark in (False, True):
+        browser.open(folder / "report.html", dark=dark)
+        seen.append(browser.evaluate("getComputedStyle(document.querySelector('button.drawn')).backgroundColor"))
+        seen.append(browser.evaluate(SEEN["walk"]))
+    assert seen[0] != seen[2]
+    assert seen[1] != seen[3]
+
+
+def test_less_motion_is_slower_motion(browser, folder):
+    browser.open(folder / "report.html", calm=True)
+    assert float(browser.evaluate("document.querySelector('.speed').value")) < 1.0
+
+
+def test_on_paper_the_player_is_stills_and_everything_is_unfolded(page):
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.call("Emulation.setEmulatedMedia", media="print")
+    assert page.evaluate("getComputedStyle(document.querySelector('.stills')).display") == "block"
+    assert page.evaluate("getComputedStyle(document.querySelector('.scenes')).display") == "none"
+    assert page.evaluate("document.querySelectorAll('details:not([open])').length") == 0
+    page.call("Emulation.setEmulatedMedia", media="")

@@ -1,0 +1,56 @@
+"""What is one link away, and what is still being computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from walkerlab.report.blocks import MAIN, Block, Cards, Section, Waiting
+from walkerlab.report.results import Results
+
+TITLES = {
+    "report-paper.html": "Number by number: the paper and what is found here",
+    "report-stability.html": "Extreme cases and known problems",
+    "report-accuracy.html": "Accuracy: what an error costs, and the rigid limit",
+}
+"""The pages beside the report, in their order."""
+
+WAITED_FOR = {
+    "contact-sim": "the walk of the contact model",
+    "compare": "both models compared, with each other and with the paper",
+    "tune": "the parameter adjustment",
+    "accuracy": "error against run time",
+    "stability": "extreme cases and known problems",
+    "continuation": "the family of gaits",
+    "basin": "which starts walk",
+    "plot": "the figures",
+    "simulate": "the walk of the rigid model",
+    "fixedpoint": "the periodic gait",
+}
+"""What a stage brings into the report."""
+
+
+def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
+    """Links to the other pages, each with what it comes to, and what will be there."""
+    items = tuple(
+        (file, title, brief(on(file, elsewhere)))
+        for file, title in TITLES.items()
+        if any(one.page == file for one in elsewhere)
+    )
+    blocks: list[Block] = [Cards(items)] if items else []
+    blocks += [Waiting(f"Still being computed: {WAITED_FOR.get(name, name)}.") for name in results.pending]
+    return Section("further", "Further pages", tuple(blocks)) if blocks else None
+
+
+def brief(sections: Iterable[Section]) -> str:
+    """What a page comes to, in a sentence for each of its sections."""
+    return " ".join(section.finding for section in sections if section.finding)
+
+
+def on(page: str, sections: Sequence[Section]) -> tuple[Section, ...]:
+    """The sections of a page."""
+    return tuple(section for section in sections if section.page == page)
+
+
+def elsewhere(sections: Sequence[Section]) -> tuple[Section, ...]:
+    """The sections of all other pages."""
+    return tuple(section for section in sections if section.page != MAIN)

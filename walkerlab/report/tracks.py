@@ -1,0 +1,168 @@
+"""A walk as the page's player moves it: joints, the ground's forces, slip and energies, thinned in time."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Group
+
+SAMPLES_A_SECOND = 150
+LEGS = (0, 1)
+
+Array = NDArray[np.float64]
+Channels = dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The motion of one walker, a column of numbers for each of its channels.
+
+    channels  by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each
+              with x along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s),
+              'b' of the shanks; 'n', 'd' normal force and friction (N), 'p' penetration and 'q' slip since the touch
+              (m); 'ke', 'pe', 'me' energies (J); a last digit is the leg
+    """
+
+    channels: Channels
+
+    def __getitem__(self, name: str) -> Array:
+        """A channel."""
+        return self.channels[name]
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample, s."""
+        return float(self["t"][-1])
+
+    def until(self, time: float) -> Track:
+        """The part up to a time (s)."""
+        inside = self["t"] <= time + 1e-9
+        return Track({name: values[inside] for name, values in self.channels.items()})
+
+    def thinned(self, gap: float) -> Track:
+        """At most a few samples in each gap (s): its first, the one of the largest force, and both sides of a jump."""
+        time = self["t"]
+        bins = np.floor(time / gap).astype(np.int64)
+        first = np.flatnonzero(np.diff(bins, prepend=-1))
+        jumps = np.flatnonzero(np.diff(time) <= 0.0)
+        kept = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
+        if "n0" in self.channels:
+            load = self["n0"] + self["n1"]
+            ends = [*first[1:].tolist(), time.size]
+            kept |= {begin + int(load[begin:end].argmax()) for begin, end in zip(first.tolist(), ends, strict=True)}
+        chosen = sorted(kept)
+        return Track({name: values[chosen] for name, values in self.channels.items()})
+
+    def packed(self) -> str:
+        """All channels, one after another, as little-endian float32 in base64."""
+        return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
+
+
+def track_of(config: Config, result: Stored) -> Track | None:
+    """The motion that a stage stored; None if it stored none, or none that tells where the joints are."""
+    trajectory = result.groups.get("trajectory")
+    if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < 2:
+        return None
+    channels = {"t": trajectory["time"]} | joints(config, result.summary, trajectory)
+    if "hx" not in channels:
+        return None
+    channels |= pairs(trajectory, {"angle": "a", "velocity": "v", "shank_angle": "b"})
+    channels |= forces(trajectory)
+    channels |= singles(trajectory, {"kinetic_J": "ke", "potential_J": "pe", "mechanical_J": "me"})
+    channels |= singles(trajectory, {"torso_angle": "u", "stance_leg": "s"})
+    return Track({name: np.asarray(values, dtype=np.float64) for name, values in channels.items()})
+
+
+def joints(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Channels:
+    """Hip, feet and knees as they were stored, or of a walker on points from its angles; nothing if unknown."""
+    if "hip_along_m" in trajectory.variables:
+        names = {"foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky"}
+        return singles(trajectory, {"hip_along_m": "hx", "hip_height_m": "hy"}) | pairs(trajectory, names)
+    if config.walker.type == "compass" and {"stance_leg", "step"} <= trajectory.variables.keys():
+        return from_angles(config, summary, trajectory)
+    return {}
+
+
+def from_angles(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Channels:
+    """Hip and feet of legs that stand on points, from their angles and the steps' lengths (eqs. A.1 to A.3)."""
+    length = config.walker.leg_length_m
+    footholds: Any = np.concatenate(([0.0], np.cumsum(summary["step_lengths_m"])))
+    tilted = trajectory["angle"] + config.slope_rad
+    row = np.arange(tilted.shape[0])
+    stance = tilted[row, trajectory["stance_leg"].astype(np.int64)]
+    foothold = footholds[np.minimum(trajectory["step"], footholds.size - 1)]
+    hip = {"hx": foothold - length * np.sin(stance), "hy": length * np.cos(stance)}
+    feet: Channels = {}
+    for leg in LEGS:
+        feet[f"fx{leg}"] = hip["hx"] + length * np.sin(tilted[:, leg])
+        feet[f"fy{leg}"] = hip["hy"] - length * np.cos(tilted[:, leg])
+    return hip | feet
+
+
+def singles(trajectory: Group, names: Mapping[str, str]) -> Channels:
+    """Variables with one value an instant, under the names of their channels; those that there are."""
+    return {channel: trajectory[name] for name, channel in names.items() if name in trajectory.variables}
+
+
+def pairs(trajectory: Group, names: Mapping[str, str]) -> Channels:
+    """Variables with a value for each leg, a channel a leg; those that there are."""
+    there = {name: channel for name, channel in names.items() if name in trajectory.variables}
+    return {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in there.items() for leg in LEGS}
+
+
+def forces(trajectory: Group) -> Channels:
+    """Forces of the ground on each foot, and how deep and how far each has gone since its touch."""
+    variables = trajectory.variables
+    if "normal_force_N" not in variables:
+        return {}
+    if trajectory["normal_force_N"].ndim == 1:
+        return forces_on_stance(trajectory)
+    found = pairs(trajectory, {"normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p"})
+    if {"penetration_m", "slip_velocity_m_s"} <= variables.keys():
+        for leg in LEGS:
+            touching = trajectory["penetration_m"][:, leg] > 0.0
+            found[f"q{leg}"] = slip_since_touch(trajectory["time"], trajectory["slip_velocity_m_s"][:, leg], touching)
+    return found
+
+
+def forces_on_stance(trajectory: Group) -> Channels:
+    """The one force of a rigid walk, given to the foot that stands."""
+    found: Channels = {}
+    for leg in LEGS:
+        stands = trajectory["stance_leg"] == leg
+        for name, channel in (("normal_force_N", "n"), ("tangential_force_N", "d")):
+            if name in trajectory.variables:
+                found[f"{channel}{leg}"] = np.where(stands, trajectory[name], 0.0)
+    return found
+
+
+def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
+    """How far a foot has slipped since it last came down (m); zero in the air."""
+    sliding = np.where(touching, velocity, 0.0)
+    way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
+    begins = touching & ~np.concatenate(([False], touching[:-1]))
+    last_begin = np.maximum.accumulate(np.where(begins, np.arange(time.size), 0))
+    return np.where(touching, way - way[last_begin], 0.0)
+
+
+def sampling_gap(config: Config) -> float:
+    """Time between samples (s): as many a pendulum time for every size of walker."""
+    return math.sqrt(9.81 / config.gravity_m_s2 * leg_length(config.walker)) / SAMPLES_A_SECOND
+
+
+def leg_length(walker: Any) -> float:
+    """Hip to sole, m, of any type of walker."""
+    if hasattr(walker, "leg_length_m"):
+        return float(walker.leg_length_m)
+    if hasattr(walker, "thigh") and hasattr(walker, "shank"):
+        return float(walker.thigh.length_m + walker.shank.length_m)
+    return 1.0
