@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import Path
 
 from walkerlab.cli.console import Console
-from walkerlab.config.loader import LoadedConfig, Template, template
+from walkerlab.cli.options import typed_options
+from walkerlab.config.loader import EarlierRun, LoadedConfig, Template, template
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
 
@@ -29,16 +30,32 @@ class Request:
     as_json: bool = False
     quiet: bool = False
     verbose: bool = False
+    open_page: bool = False
 
     @cached_property
     def console(self) -> Console:
         """Where messages go."""
-        return Console(self.quiet, self.verbose)
+        return Console(self.quiet, self.verbose, self.open_page)
+
+    @property
+    def typed(self) -> str:
+        """The options that say which run it is, as they can be typed again."""
+        return typed_options(self.config, self.sets, self.strides, self.runs)
+
+    @cached_property
+    def earlier(self) -> EarlierRun | None:
+        """The run that `--config` names, if it is a run's folder or one of its artifacts."""
+        if self.config is None or not (self.config.is_dir() or self.config.suffix == ".h5"):
+            return None
+        # Imported here: reading a config from a file needs no HDF5.
+        from walkerlab.cli.earlier import run_at
+
+        return run_at(self.config)
 
     @cached_property
     def template(self) -> Template:
         """The config, ready to be varied, its warnings said; ConfigError if it is not usable."""
-        read = template(self.config, self.sets, self.strides)
+        read = template(self.config, self.sets, self.strides, self.earlier)
         loaded = read.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged

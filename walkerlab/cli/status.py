@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
+from walkerlab.cli.differences import rows_of_runs, run_object
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
-from walkerlab.cli.runs import rows_of_runs, run_object
 from walkerlab.cli.text import aligned
 from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError
@@ -71,7 +71,7 @@ def show(
         if listed:
             print("\n".join([f"\nall runs in {request.runs}:", *aligned(rows_of_runs(listed))]))
     if check and error is not None:
-        say(error)
+        say(error, request.typed)
         raise typer.Exit(error.exit_code)
 
 

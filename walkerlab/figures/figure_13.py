@@ -119,4 +119,8 @@ def caption(results: Results) -> str:
     return " ".join(said)
 
 
-FIGURE = paper_figure(13, "Families of gaits over a parameter", (NEED,), caption, plot)
+SEEN = (
+    "Step period and stance angle of gaits over the parameter: stable branches solid, unstable ones "
+    "dashed, bifurcations marked; both models where both were followed."
+)
+FIGURE = paper_figure(13, "Families of gaits over a parameter", (NEED,), caption, plot, SEEN)

@@ -76,4 +76,5 @@ def caption(results: Results) -> str:
     return " ".join(said)
 
 
-FIGURE = paper_figure(14, "Multipliers over a parameter", (NEED,), caption, plot)
+SEEN = "Multipliers of the gaits, in the complex plane with the unit circle and as magnitudes over the parameter."
+FIGURE = paper_figure(14, "Multipliers over a parameter", (NEED,), caption, plot, SEEN)

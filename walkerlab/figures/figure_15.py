@@ -76,8 +76,8 @@ def slice_of(values: NDArray[Any]) -> NDArray[Any]:
 
 def draw(axes: Axes, cells: Group, plane: tuple[str, str], values: NDArray[Any], **how: Any) -> Any:
     """Values of cells, the first coordinate across."""
-    sides = (*sides_of(cells[plane[0]]), *sides_of(cells[plane[1]]))
-    return axes.imshow(values.T, extent=sides, origin="lower", aspect="auto", interpolation="nearest", **how)
+    extent = (*sides_of(cells[plane[0]]), *sides_of(cells[plane[1]]))
+    return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
 
 def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
@@ -159,4 +159,5 @@ def caption(results: Results) -> str:
     return " ".join(said)
 
 
-FIGURE = paper_figure(15, "Basins of attraction", (NEED,), caption, plot)
+SEEN = "The window of starts, each cell coloured by what becomes of its walk."
+FIGURE = paper_figure(15, "Basins of attraction", (NEED,), caption, plot, SEEN)

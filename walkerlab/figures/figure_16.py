@@ -67,4 +67,5 @@ def caption(results: Results) -> str:
     )
 
 
-FIGURE = paper_figure(16, "Where gaits change, over two parameters", NEEDS, caption, plot)
+SEEN = "Curves of flips and folds over a plane of two parameters, with the regions between them."
+FIGURE = paper_figure(16, "Where gaits change, over two parameters", NEEDS, caption, plot, SEEN)

@@ -218,7 +218,8 @@ class Window:
     def along(self, axis: int) -> Floats:
         """Middles of the cells along an axis, by its place in `axes`."""
         width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
-        return np.asarray(self.lower[axis] + width * (np.arange(self.cells[axis]) + 0.5))
+        middles: Floats = np.arange(self.cells[axis], dtype=np.float64) + 0.5
+        return self.lower[axis] + width * middles
 
     def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
         """Section coordinates (n, 3) of cells by their number, the last axis running fastest.

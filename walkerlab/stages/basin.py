@@ -174,8 +174,8 @@ def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str,
 
 def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> Group:
     """The grid."""
-    dims: tuple[str, ...] = settings.plane
-    variables = {
+    dims: tuple[str, ...] = tuple(settings.plane)
+    variables: dict[str, Variable] = {
         name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
         for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }

@@ -139,7 +139,7 @@ class EdgeCells:
     @property
     def walks(self) -> int:
         """How many."""
-        return len(self.cells) * len(inside_cell(self.refine, len(self.window.axes)))
+        return len(self.cells) * int(self.refine ** len(self.window.axes))
 
     def run(self) -> list[float]:
         """The share of each cell that walks."""

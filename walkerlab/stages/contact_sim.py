@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ from walkerlab.scene.contact import (
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.thinning import thinned
 from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
@@ -70,6 +72,9 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
         interval,
     )
     progress.advance()
+    if result.samples is not None:
+        stored = thinned(result.samples, result.samples.time_s, result.touch_time_s, progress)
+        result = replace(result, samples=stored)
     content = Content(groups(config, scene, result), summary(config, scene, result))
     if not result.outcome.answered:
         raise NoAnswer(

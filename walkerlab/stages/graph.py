@@ -57,6 +57,8 @@ class Stage:
     on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
+    alone          whether it measures times, and so runs with nothing beside it
+    early_with     the results with which it is worth drawing while others are still being computed
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -76,6 +78,8 @@ class Stage:
     on_demand: bool = False
     keeps_parts: bool = False
     follows: bool = False
+    alone: bool = False
+    early_with: tuple[str, ...] = ()
     does_without: Lacks = nothing
 
     @property
@@ -166,6 +170,7 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         has_cells=True,
+        alone=True,
     ),
     Stage(
         "stability",
@@ -219,6 +224,7 @@ PIPELINE = Graph(
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
         if_current=("stability-maps", "continuation", "basin"),
         draws=True,
+        early_with=("fixedpoint", "simulate", "contact-sim"),
     ),
 )
 STAGES = PIPELINE.stages

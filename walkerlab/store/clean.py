@@ -47,3 +47,12 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
     for emptied in (folder.figures, folder.path / "sweep-chunks"):
         with contextlib.suppress(OSError):
             emptied.rmdir()
+
+
+def remove_if_empty(folder: RunFolder) -> None:
+    """Remove a run folder that has nothing in it but its lock; to be called after its lock was given back."""
+    lock = folder.path / ".lock"
+    if list(folder.path.iterdir()) == [lock]:
+        with contextlib.suppress(OSError):
+            lock.unlink()
+            folder.path.rmdir()

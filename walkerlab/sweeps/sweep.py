@@ -14,7 +14,7 @@ from walkerlab.config.loader import Template
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.stages.graph import PIPELINE, Graph
-from walkerlab.stages.progress import Reporter, Silent
+from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.store import artifact, provenance
 from walkerlab.store.content import Content
 from walkerlab.store.files import make_folder
@@ -157,10 +157,13 @@ class Sweep:
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
             begun = provenance.begin(self.points.template.base.config, {})
+            progress = reporter.begin(
+                "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
+            )
             try:
-                self._compute(merge, work, reporter, begun)
+                self._compute(merge, work, progress, begun)
             finally:
-                reporter.finish()
+                progress.end("")
             content = merge.content(self.question, self.points, self.inverse)
             identity = Identity("sweep", self.slice, {}, self.points.code_digest)
             complete = content.summary["failed"] == 0
@@ -181,17 +184,17 @@ class Sweep:
         for chunk in self._stored():
             merge.put_all(chunk, self.places)
 
-    def _compute(self, merge: Merge, work: Work, reporter: Reporter, begun: provenance.Provenance) -> None:
+    def _compute(self, merge: Merge, work: Work, progress: Progress, begun: provenance.Provenance) -> None:
         missing = np.sort(self.first[~merge.there])
         if not missing.size:
             return
-        reporter.start("sweep", int(missing.size))
+        progress.start("sweep", int(missing.size))
         stage, digest = self.question.stage, self.points.code_digest
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
             merge.put_all(chunk, self.places)
-            reporter.advance(len(chunk.rows))
+            progress.advance(len(chunk.rows))
 
         chunk_s = work.chunk_s or work.engine.chunk_s
         todo = self._configs(missing.tolist())
