@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import platform
 import re
+import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +30,8 @@ from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
 from walkerlab.config.loader import load
+from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, walk_lanes
+from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.orbits.slope_branch import Branch
@@ -38,6 +41,8 @@ from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.runner import execute
+from walkerlab.store.runfolder import RunFolder
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
@@ -194,6 +199,40 @@ def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     yield at_most(work, hinged / rigid, "x", 3, 1)
 
 
+def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
+    """Walks in lanes on one core, and basins of attraction on two."""
+    walker = rigid_walker(ONE_DEGREE, "corrected")
+    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    trial = RigidTrial(walker, start, STEPS)
+    reference = reference_for(trial)
+    many = 2_000
+    strikes, fates = Strikes(np.zeros((many, STEPS)), np.zeros((many, STEPS, 4))), new_fates(many)
+    memory = new_lane_memory(RTOL, ATOL)
+    seconds = watch(lambda: walk_lanes(walker, memory, strikes, np.array([start] * many), fates))
+    error = float(np.max(np.abs(strikes.after[:, -1] - reference.state)))
+    alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
+    script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)
+    rate = many * STEPS / seconds
+    others = [f"{name} {STEPS / run.seconds:.3g}" for name, run in (("one by one", alone), ("SciPy", script)) if run]
+    bar = MET if rate >= 1e6 and error <= 1e-6 else MISSED
+    said = f"{rate:.3g} steps/s at {error:.1e} ({', '.join(others)})"
+    yield Line("rigid steps in lanes, one core, at 1e-6", said, "1e+06 steps/s", bar)
+    yield basin_line("basin, rigid, 1,000 x 1,000", 20.0, "basin.cells=[1000,1000]")
+    if not quick:
+        yield basin_line("basin, contact, 200 x 200", 120.0, "basin.model=contact", "basin.cells=[200,200]")
+
+
+def basin_line(work: str, bar: float, *sets: str) -> Line:
+    """A basin of the paper's walker at one degree, as the command computes it with two processes."""
+    with tempfile.TemporaryDirectory() as folder:
+        loaded = load(None, ["slope_deg=1", *sets])
+        place = RunFolder(Path(folder), loaded.run_name)
+        execute(loaded.config, "fixedpoint", place)
+        report = execute(loaded.config, "basin", place, jobs=2)
+    line = at_most(f"{work}, two processes", report.wall_s, "s", bar, bar / 2.0)
+    return replace(line, measured=f"{line.measured}, {report.summary['trajectories_per_s']:.3g} walks/s")
+
+
 def memory_line() -> Line:
     """What 10,000 strides take more than 100."""
     walker = rigid_walker(ONE_DEGREE, "corrected")
@@ -269,6 +308,7 @@ def main() -> None:
     trial = contact_trial_at_one_degree()
     reference = reference_for(trial)
     lines += contact_lines(trial, reference, watch)
+    lines += batch_lines(watch, options.quick)
     repeats = 5 if options.quick else 15
     sides = times_ns(repeats)
     lines += [*rhs_lines(sides), memory_line(), process_line(repeats)]

@@ -55,6 +55,11 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
     there is not.
     """
     gait = inputs["fixedpoint"].summary
+    if len(gait["state"]) != 1 + len(COORDINATES):
+        raise ConfigError(
+            "basin takes walkers of two straight legs: this one has more coordinates just after heel strike.",
+            "Take a walker of type compass or straight-legs without a torso.",
+        )
     window = window_of(config, [float(number) for number in gait["state"][1:]])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window)
