@@ -110,12 +110,12 @@ def test_arrays_at_the_root_are_one_dataset_with_text_in_any_shape(tmp_path, ide
         {"coordinates": "slope"},
     )
     content = Content({"": group}, {"done": 6})
-    write(tmp_path / "a.h5", content, identity, origin)
-    assert read(tmp_path / "a.h5").digest() == content.digest()
+    artifact.write(tmp_path / "a.h5", content, identity, origin)
+    assert artifact.read(tmp_path / "a.h5").digest() == content.digest()
     with xarray.open_dataset(tmp_path / "a.h5", engine="h5netcdf") as dataset:
         assert dataset.outcome.values.tolist() == words.tolist()
     with pytest.raises(ValueError, match="say something else"):
-        write(tmp_path / "a.h5", Content({"": Group({}, {"stage_key": "x"})}), identity, origin)
+        artifact.write(tmp_path / "a.h5", Content({"": Group({}, {"stage_key": "x"})}), identity, origin)
 
 
 def test_every_array_has_unit_name_and_dimension_scales(tmp_path, content, identity, origin):
