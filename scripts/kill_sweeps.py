@@ -1,4 +1,4 @@
-"""Kill a sweep, parent or worker, again and again at random moments of its work, and compare what comes out with a quiet one.
+"""Kill a sweep at work, parent or worker, again and again at random moments, and compare it with a quiet one.
 
     python scripts/kill_sweeps.py [--kills 50] [--seed 0]
 
