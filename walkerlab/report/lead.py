@@ -8,10 +8,6 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.report.numbers import count, length, number, quantity
 from walkerlab.report.results import Results
-from walkerlab.report.tracks import leg_length
-
-ROUND = 0.01
-"""Radius of a foot, in leg lengths, above which it is called round."""
 
 
 def title(run: str) -> str:
@@ -31,24 +27,29 @@ def scene(config: Config, run: str) -> str:
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: {walker(config.walker)} on a slope of {number(config.slope_rad)} rad "
+        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of {number(config.slope_rad)} rad "
         f"({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
 
 
-def walker(config: Any) -> str:
-    """The walker of any type: its legs, its feet and its hip."""
-    feet = getattr(config, "foot_radius_m", 0.0)
-    round_feet = f" and round feet of {length(feet)}" if feet > ROUND * leg_length(config) else ""
-    hip = getattr(config, "hip_mass_kg", None)
-    at_hip = "" if hip is None else f" and a hip of {quantity(hip, 'kg')}"
-    torso = "" if getattr(config, "torso", None) is None else ", with a torso"
-    mass = getattr(config, "leg_mass_kg", None)
-    legs = f"legs of {length(leg_length(config))}{round_feet}" + (
-        "" if mass is None else f" and {quantity(mass, 'kg')}"
-    )
-    return f"a {config.type.replace('-', ' ')} walker with {legs}{at_hip}{torso}"
+WALKERS = {
+    "compass": "a compass walker",
+    "straight-legs": "a walker with straight legs",
+    "kneed": "a walker with knees",
+    "parts": "a walker described by its parts",
+}
+
+
+def walker_in_words(walker: Any) -> str:
+    """Kind, size and mass of a walker."""
+    torso = "" if walker.torso is None else f" and a torso of {quantity(walker.torso.mass_kg, 'kg')}"
+    if walker.type == "compass":
+        of_legs = f"{length(walker.leg_length_m)} and {quantity(walker.leg_mass_kg, 'kg')}"
+        return f"a compass walker with legs of {of_legs} and a hip of {quantity(walker.hip_mass_kg, 'kg')}{torso}"
+    feet = f"feet of radius {length(walker.foot_radius_m)}" if walker.foot_radius_m else "point feet"
+    whole = quantity(walker.total_mass_kg, "kg")
+    return f"{WALKERS[walker.type]} with legs of {length(walker.leg_length_m)}, {feet}, {whole} in all{torso}"
 
 
 def equations(config: Config) -> str:

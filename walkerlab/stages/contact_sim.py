@@ -16,11 +16,19 @@ from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
     MethodSettings,
+    by_channel,
     sampled_energies,
     sampled_feet,
     walk_contact,
 )
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
+from walkerlab.scene.contact import (
+    ContactScene,
+    contact_gait,
+    contact_scene,
+    scene_measures,
+    start_state,
+    wants_own_pitch,
+)
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
@@ -104,7 +112,7 @@ def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, t
 def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
     """Step length (m) of the contact gait, if the pads are laid for it; raises NoAnswer if there is no such gait."""
     contact = config.contact
-    if contact is None or contact.pad_pitch != "own" or contact.terrain != "checkerboard":
+    if contact is None or not wants_own_pitch(contact):
         return None
     answer = contact_gait(config, rigid_step, rigid_state)
     if answer.gait is None:
@@ -125,8 +133,10 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
         "slips_m": slips.tolist(),
+        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else 0.0,
+        "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
-        "dissipated_J": dict(zip(("damping", "friction", "edges"), result.dissipated_J.tolist(), strict=True)),
+        "dissipated_J": by_channel(scene.walker, result.dissipated_J),
         "rhs_evaluations": int(result.work[0]),
         "accepted_steps": int(result.work[1]),
         "rejected_steps": int(result.work[2]),
@@ -154,7 +164,8 @@ def steps_group(result: ContactWalkResult) -> Group:
         ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
         ("touch_time_s", result.touch_time_s, "s", "time of the touch that ends the step"),
         ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
-        ("slip_m", result.slip_m, "m", "net slip of the stance foot from its touch to its lift"),
+        ("slip_m", result.slip_m, "m", "net slip of the stance foot's material from its touch to its lift"),
+        ("rolling_m", result.rolling_m, "m", "how far the stance foot rolled from its touch to its lift"),
     )
     variables = {"step": Variable(np.arange(result.touch_time_s.size), ("step",), "1", "step number")}
     variables |= {name: Variable(values, ("step",), units, text) for name, values, units, text in rows}
@@ -207,13 +218,15 @@ def trajectory_group(config: Config, scene: ContactScene, samples: ContactSample
 def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Angles and velocities of the legs, and where hip and feet are."""
     y, frame = samples.states, scene.frame
-    tilted = y[:, 2:4] + scene.walker.slope
+    n = len(frame.hip_x)
+    upper = [leg[0] for leg in scene.walker.legs]
+    tilted = y[:, 2 : 2 + n] + scene.walker.slope
     hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
     along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
     height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
     return {
-        "angle": Variable(y[:, 2:4], (TIME, LEG), "rad", "angle of the leg from the vertical"),
-        "velocity": Variable(y[:, 6:8], (TIME, LEG), "rad/s", "angular velocity of the leg"),
+        "angle": Variable(y[:, 2 : 2 + n][:, upper], (TIME, LEG), "rad", "angle of the leg from the vertical"),
+        "velocity": Variable(y[:, 4 + n :][:, upper], (TIME, LEG), "rad/s", "angular velocity of the leg"),
         "hip_along_m": Variable(along, (TIME,), "m", "position of the hip along the slope"),
         "hip_height_m": Variable(height, (TIME,), "m", "height of the hip over the slope"),
         "foot_along_m": Variable(feet[:, :, 0], (TIME, LEG), "m", "position of the foot along the slope"),
@@ -224,7 +237,7 @@ def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> 
 def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Energies as the paper plots them, from the current stance foot, and the books from a fixed origin."""
     energies = np.zeros((samples.time_s.size, 3))
-    sampled_energies(scene.walker, samples.states, samples.carried, energies)
+    sampled_energies(scene.walker, samples.states, samples.carried, samples.knees, energies)
     walker = scene.walker
     row = np.arange(samples.time_s.size)
     foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]

@@ -45,6 +45,7 @@ class Stage:
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
     reads          keys of the config that its result depends on; it is shown no others
+    reads_of_paper keys of the built-in paper config on which its own cases stand
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
@@ -61,6 +62,7 @@ class Stage:
     module: str
     purpose: str
     reads: tuple[str, ...]
+    reads_of_paper: tuple[str, ...] = ()
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
@@ -101,6 +103,7 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
+PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
 EVERYTHING = ("name", "source", *MODEL, "contact", "solver", "tune", "stability", "seed")
 
 PIPELINE = Graph(
@@ -160,6 +163,7 @@ PIPELINE = Graph(
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
+        reads_of_paper=PAPERS_WALK,
         has_cells=True,
     ),
     Stage(
@@ -167,6 +171,7 @@ PIPELINE = Graph(
         "walkerlab.stages.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; goes on where it was interrupted.",
         reads=("stability.map_cells",),
+        reads_of_paper=PAPERS_WALK,
         has_cells=True,
         campaign_of="stability",
         keeps_parts=True,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from walkerlab.config.canonical import slice_of
+from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.store import artifact
@@ -124,7 +125,7 @@ class Planner:
             return Step(stage, "leave out", why)
         identity = Identity(
             stage=stage.name,
-            config_slice=slice_of(self.config, stage.reads),
+            config_slice=config_slice(self.config, stage),
             input_keys=self._input_keys(stage),
             code_digest=self._sources.code_digest(stage.module),
         )
@@ -169,6 +170,12 @@ class Planner:
             if found.provenance.input_digests.get(name) != input_digest(stage, result):
                 return f"input {name} was made anew"
         return None
+
+
+def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
+    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on."""
+    own = slice_of(config, stage.reads)
+    return own | {"paper": slice_of(paper_config(), stage.reads_of_paper)} if stage.reads_of_paper else own
 
 
 def input_digest(stage: Stage, result: Stored) -> str:
