@@ -38,7 +38,8 @@ def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
     )
     blocks: list[Block] = [Cards(items)] if items else []
     blocks += [Waiting(f"Still being computed: {WAITED_FOR.get(name, name)}.") for name in results.pending]
-    return Section("further", "Further pages", tuple(blocks)) if blocks else None
+    title = "Further pages" if items else "Still to come"
+    return Section("further", title, tuple(blocks)) if blocks else None
 
 
 def brief(sections: Iterable[Section]) -> str:
