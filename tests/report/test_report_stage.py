@@ -71,6 +71,18 @@ def test_figures_have_the_papers_numbers_only_where_the_scene_is_the_papers(tmp_
     assert run(tmp_path, inputs=inputs | {"compare": departs}).summary["figures"] == ["Legs."]
 
 
+def test_the_report_of_another_scene_only_links_the_paper(tmp_path):
+    departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
+    inputs = {"fixedpoint": EVERYTHING["fixedpoint"](), "compare": departs, "plot": plot(tmp_path)}
+    run(tmp_path, "source=null", inputs=inputs)
+    page = Page((tmp_path / "report.html").read_text())
+    words = " ".join(
+        text for tag in page.words if tag not in ("style", "script", "code", "a") for text in page.said(tag)
+    )
+    assert "the paper" not in words.replace("config paper", "").lower()
+    assert {"href": "report-paper.html"} in page.all("a")
+
+
 def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     left_out = [LeftOut("compare", "not yet"), LeftOut("tune", "the config has no contact block")]
     write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out, ("compare", "accuracy"))
