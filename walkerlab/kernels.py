@@ -5,6 +5,7 @@ a digest of all sources that kernels can be made of: an edited function can neve
 package's kernels alone: what another program compiles with Numba stays where that program has it.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -25,6 +26,8 @@ from numba.core.caching import (
     IPythonCacheLocator,
     UserProvidedCacheLocator,
 )
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.extending import overload, register_jitable
 
 # the only packages in which compiled functions may stand (a test says so)
@@ -38,6 +41,9 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": Fa
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+watchers: list[Callable[[str], None]] = []
+"""Told the name of the kernel that this process begins to compile, or waits for, and '' once it is there."""
 
 
 PACKAGE = Path(__file__).parent
@@ -169,7 +175,7 @@ class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]
-    """A kernel's machine code on disk."""
+    """A kernel's machine code on disk: of several processes that call one at once, one compiles it and all load it."""
 
     _impl_class = KernelCacheImpl
 
@@ -178,6 +184,58 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         super().__init__(py_func)
         locator = self._impl.locator
         self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+        self._kernel = py_func.__name__
+        self._held: dict[str, Any] = {}
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The stored code; None if this process is to compile it, once no other does."""
+        found = super().load_overload(signature, context)
+        if found is not None or str(signature) in self._held:
+            return found
+        for tell in watchers:
+            tell(self._kernel)
+        lock = _lock(f"{self._kernel} {signature}")
+        lock.acquire()
+        found = super().load_overload(signature, context)
+        if found is None:
+            self._held[str(signature)] = lock
+        else:
+            _finished(lock)
+        return found
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Store what was compiled."""
+        try:
+            with _lock(self._kernel):  # one index for all signatures
+                super().save_overload(signature, data)
+        finally:
+            _finished(self._held.pop(str(signature), None))
+
+
+def _lock(name: str) -> Any:
+    """A lock between processes in the folder of compiled code."""
+    # Imported here: a process that finds everything compiled takes no lock.
+    from filelock import FileLock
+
+    return FileLock(CACHE_FOLDER / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
+
+
+def _finished(lock: Any) -> None:
+    """Give a kernel's lock back, if it was held, and say that it is there."""
+    if lock is not None:
+        lock.release()
+    for tell in watchers:
+        tell("")
+
+
+@contextlib.contextmanager
+def watched(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have `tell` among the watchers of what is compiled meanwhile."""
+    watchers.append(tell)
+    try:
+        yield
+    finally:
+        watchers.remove(tell)
 
 
 def kernel(function: F) -> F:
@@ -186,6 +244,54 @@ def kernel(function: F) -> F:
     # what enable_caching does, with the kernels' own folder
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
+
+
+class _WithoutEnvironment:
+    """A code generator that has no place for the environment of a function whose machine code nobody asks for."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing."""
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a part: linked into kernels, which are optimised as wholes, and no machine code of its own.
+
+    To optimise and emit every part for itself too, as numba does, takes a third of the time that compiling takes.
+    """
+
+    @property
+    def codegen(self) -> Any:
+        return _WithoutEnvironment(self._codegen)
+
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _PartCompiler(CompilerBase):  # type: ignore[misc]
+    """Numba's own passes, into a library of parts."""
+
+    def define_pipelines(self) -> list[Any]:
+        state = self.state
+        if state.library is None:
+            state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+PART_FLAGS["pipeline_class"] = _PartCompiler
 
 
 def inlined(function: F) -> F:

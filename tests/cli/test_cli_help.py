@@ -52,13 +52,9 @@ def test_help_names_every_command(walker):
 def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
     words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())
     assert set(OPTIONS) <= words
-    assert ("--strides" in words) == (stage.name in ("simulate", "contact-sim"))
-
-
-def test_stages_with_cells_take_jobs(toy):
-    assert "--jobs" in toy("survey", "--help").stdout
-    assert "--jobs" in toy("page", "--help").stdout
-    assert "--jobs" not in toy("drop", "--help").stdout
+    assert "--jobs" in words
+    assert ("--strides" in words) == (stage.name in ("simulate", "contact-sim", "report"))
+    assert ("--open" in words) == (stage.name == "report")
 
 
 def test_version(walker):

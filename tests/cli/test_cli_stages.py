@@ -22,7 +22,10 @@ def test_results_go_to_stdout_and_messages_to_stderr(toy):
     assert first.returncode == 0
     assert "duration_s" in first.stdout
     assert "ran" not in first.stdout
-    assert [line.split()[:2] for line in first.stderr.splitlines()] == [["drop:", "ran"], ["roll:", "ran"]]
+    told = [line.split()[:2] for line in first.stderr.splitlines()]
+    assert told == [["drop:", "starts"], ["drop:", "ran"], ["roll:", "starts"], ["roll:", "ran"]]
+    assert "(1 of 2, not there yet)" in first.stderr
+    assert "left: roll" in first.stderr
     second = toy("roll")
     assert second.stdout == first.stdout
     assert [line.split()[:2] for line in second.stderr.splitlines()] == [["drop:", "reused"], ["roll:", "reused"]]

@@ -26,7 +26,8 @@ def name_of(*sets: str, path: Path | None = None, strides: int | None = None) ->
         (["outputs=[]"], "paper@outputs=none"),
         (["outputs=[forces, states]"], "paper@outputs=states_forces"),
         (["start=[-0.2022, 0.1674, -1.02, -3.2]"], "paper@start=-0.2022_0.1674_-1.02_-3.2"),
-        (["name=other"], "paper@name=other"),
+        (["name=other"], "other"),
+        (["name=other", "strides=9"], "other@strides=9"),
         (["strides=9", "slope_deg=3"], "paper@slope_deg=3,strides=9"),
     ],
 )

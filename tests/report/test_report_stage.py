@@ -12,7 +12,7 @@ from walkerlab.errors import StorageError
 from walkerlab.report.images import fitting
 from walkerlab.stages import report
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import LeftOut
+from walkerlab.stages.plan import STILL_COMPUTED, LeftOut
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.report import write_pages
 from walkerlab.store.index import broken_file, indexed_files
@@ -91,6 +91,11 @@ def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     assert sum("Still being computed: " in text for text in page.said("p")) == 3
     assert "not yet" not in page.text
     assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
+
+
+def test_a_drawing_made_early_says_what_it_waits_for(tmp_path):
+    run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("compare", STILL_COMPUTED)])
+    assert "Still being computed: compare." in Page((tmp_path / "report.html").read_text()).text
 
 
 def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):

@@ -62,10 +62,23 @@ def toy(tmp_path, monkeypatch):
 
 
 class Listener:
-    """A reporter that remembers."""
+    """A reporter that remembers, of all stages alike."""
 
     def __init__(self):
-        self.notes, self.warnings, self.started = [], [], []
+        self.notes, self.warnings, self.started, self.begun, self.ended, self.pages = [], [], [], [], [], []
+
+    def begin(self, stage, place, expected_s=None):
+        self.begun.append((stage, place, expected_s))
+        return self
+
+    def end(self, said):
+        self.ended.append(said)
+
+    def compiling(self, kernel):
+        pass
+
+    def drawn(self, summary, folder):
+        self.pages.append((folder / summary["html"]).read_text())
 
     def start(self, label, total=None):
         self.started.append((label, total))
@@ -78,9 +91,6 @@ class Listener:
 
     def warn(self, text):
         self.warnings.append(text)
-
-    def finish(self):
-        pass
 
 
 @pytest.fixture

@@ -10,7 +10,8 @@ import typer
 
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
-from walkerlab.store.clean import files_of, remove
+from walkerlab.store.clean import files_of, remove, remove_if_empty
+from walkerlab.store.runfolder import RunFolder
 
 
 def clean_run(request: Request, stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool) -> None:
@@ -18,19 +19,37 @@ def clean_run(request: Request, stages: Sequence[str], *, yes: bool, dry_run: bo
 
     Raises typer.BadParameter if nobody can be asked, LockedError (only without `wait`) and StorageError.
     """
-    folder = request.folder
-    files = files_of(folder, stages)
-    if files and not (yes or dry_run) and not agreed(folder.path, files):
-        files = []
-    if files and not dry_run:
-        with folder.locked(wait, request.console.note):
-            remove(folder, files)
+    clean_folders(request, [request.folder], stages, yes=yes, dry_run=dry_run, wait=wait)
+
+
+def clean_all(request: Request, stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool) -> None:
+    """The same of every run in the folder of all runs."""
+    there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
+    folders = [RunFolder(request.runs, name) for name in there]
+    clean_folders(request, folders, stages, yes=yes, dry_run=dry_run, wait=wait)
+
+
+def clean_folders(
+    request: Request, folders: Sequence[RunFolder], stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool
+) -> None:
+    """Remove the files of these stages from run folders, and folders that have nothing else in them."""
+    found = {folder: files_of(folder, stages) for folder in folders}
+    files = [path for paths in found.values() for path in paths]
+    where = folders[0].path if len(folders) == 1 else request.runs
+    if files and not (yes or dry_run) and not agreed(where, files):
+        found, files = {}, []
+    if not dry_run:
+        for folder, paths in found.items():
+            if paths:
+                with folder.locked(wait, request.console.note):
+                    remove(folder, paths)
+                remove_if_empty(folder)
     names = [str(path) for path in files]
     if request.as_json:
-        print_json({"run_dir": str(folder.path), "removed": names, "dry_run": dry_run})
+        print_json({"run_dir": str(where), "removed": names, "dry_run": dry_run})
     else:
         said = "would be removed" if dry_run else "removed"
-        print("\n".join([f"{said}: {name}" for name in names] or [f"{folder.path}: nothing {said}"]))
+        print("\n".join([f"{said}: {name}" for name in names] or [f"{where}: nothing {said}"]))
 
 
 def agreed(folder: Path, files: Sequence[Path]) -> bool:

@@ -1,25 +1,49 @@
 """Failures at the edge: one message, one advice, one exit code; a bug keeps its traceback."""
 
 import contextlib
+import errno
 import json
+import os
+import re
+import signal
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import typer
 
-from walkerlab.errors import StoppedError, WalkerlabError
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError
+
+ADVISED = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
+"""A command in a text, unless it is about no run."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+@dataclass
+class Command:
+    """A command that runs: its name, and its run's folder once that is known."""
+
+    name: str
+    run_dir: Path | None = None
 
 
 @contextlib.contextmanager
-def exit_on_failure(command: str, as_json: bool) -> Iterator[None]:
-    """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too."""
+def exit_on_failure(name: str, as_json: bool, typed: str = "") -> Iterator[Command]:
+    """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too.
+
+    typed  the options of the command that say which run it is about: advice has them too
+    """
+    command = Command(name)
+    signal.signal(signal.SIGTERM, interrupt)
     try:
-        yield
+        yield command
+        sys.stdout.flush()
     except WalkerlabError as error:
         if as_json:
             print_json(failed(command, error))
-        say(error)
+        say(error, typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "Stages that were finished are kept; the same command does the rest.")
@@ -27,20 +51,46 @@ def exit_on_failure(command: str, as_json: bool) -> Iterator[None]:
             print_json(failed(command, stopped))
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
+    except BrokenPipeError:
+        nobody_listens()
+        raise typer.Exit(0) from None
+    except OSError as error:
+        if error.errno not in FULL or error.filename is not None:
+            raise
+        nobody_listens()
+        say(StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored."))
+        raise typer.Exit(StorageError.exit_code) from None
 
 
-def say(error: WalkerlabError) -> None:
+def interrupt(*_: object) -> None:
+    """Treat a request to end as Ctrl-C."""
+    raise KeyboardInterrupt
+
+
+def nobody_listens() -> None:
+    """Have what is still to be printed go nowhere, instead of failing once more when the process ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def say(error: WalkerlabError, typed: str = "") -> None:
     """Print a failure and what to do about it on stderr."""
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
-        print(f"advice: {error.advice}", file=sys.stderr)
+        print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
 
 
-def failed(command: str, error: WalkerlabError) -> dict[str, Any]:
+def to_type_back(text: str, typed: str) -> str:
+    """A text with the options that say which run it is about in the commands that it advises."""
+    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
+
+
+def failed(command: Command, error: WalkerlabError) -> dict[str, Any]:
     """The JSON object of a command that came to nothing: the keys there always are, and the error."""
     return {
-        "stage": command,
-        "run_dir": None,
+        "stage": command.name,
+        "run_dir": None if command.run_dir is None else str(command.run_dir),
         "artifact": None,
         "reused": False,
         "wall_s": 0.0,

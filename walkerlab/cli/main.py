@@ -1,13 +1,14 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
 import inspect
+import os
 from collections.abc import Callable
 from typing import Annotated
 
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import housekeeping
+from walkerlab.cli import around, differences, housekeeping, sweep
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -15,14 +16,21 @@ from walkerlab.cli.options import (
     ConfigFile,
     DryRun,
     Force,
+    From,
     Full,
     Jobs,
+    Model,
     NoWait,
+    Open,
+    Over,
+    Periods,
     Quiet,
     Runs,
     Sets,
     Strides,
+    To,
     Verbose,
+    typed_options,
 )
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
@@ -37,7 +45,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     app = typer.Typer(
         name="walkerlab",
         help="Passive-dynamic walking as a reproducible experiment. Without --config, the paper's walker.",
-        add_completion=False,
+        add_completion=True,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -46,6 +54,9 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     for stage in graph.stages:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
+    around.add_to(app, graph)
+    sweep.add_to(app, graph)
+    differences.add_to(app, graph)
     return app
 
 
@@ -71,25 +82,41 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         config: ConfigFile = None,
         sets: Sets = None,
         strides: Strides = None,
+        over: Over = None,
+        begin: From = None,
+        end: To = None,
+        model: Model = None,
+        periods: Periods = None,
         runs: Runs = RUNS,
-        jobs: Jobs = 1,
+        jobs: Jobs = None,
         full: Full = False,
         force: Force = False,
         dry_run: DryRun = False,
         no_wait: NoWait = False,
+        open_page: Open = False,
         as_json: AsJson = False,
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> None:
-        with exit_on_failure(stage.name, as_json):
+        with exit_on_failure(stage.name, as_json, typed_options(config, sets, strides, runs)) as asked:
             # Imported here: help loads neither a config nor an array.
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
-            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=jobs, full=full)
+            following = options_of_span(over, begin, end, model, periods)
+            settings = (*(sets or ()), *following)
+            request = Request(config, settings, strides, runs, as_json, quiet, verbose, open_page)
+            asked.run_dir = request.folder.path
+            cores = jobs or all_cores()
+            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=cores, full=full)
 
-    meant = {"strides": stage.walks, "jobs": uses_jobs(stage, graph), "full": bool(graph.campaigns_of(stage.name))}
+    last = stage is graph.stages[-1]
+    meant = {
+        "strides": stage.walks or last,
+        "full": bool(graph.campaigns_of(stage.name)),
+        "open_page": last,
+    }
+    meant |= dict.fromkeys(("over", "begin", "end", "model", "periods"), stage.follows)
     meaningless = {name for name, has in meant.items() if not has}
     signature = inspect.signature(command)
     options = [option for name, option in signature.parameters.items() if name not in meaningless]
@@ -97,6 +124,16 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
     return command
 
 
-def uses_jobs(stage: Stage, graph: Graph) -> bool:
-    """Whether a stage has independent cells, or runs stages that have."""
-    return stage.has_cells or (stage is graph.stages[-1] and any(other.has_cells for other in graph.stages))
+def options_of_span(
+    over: str | None, begin: float | None, end: float | None, model: str | None, periods: int | None
+) -> tuple[str, ...]:
+    """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
+    if over is not None and (begin is None or end is None):
+        raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+    given = {"over": over, "from": begin, "to": end, "model": model, "periods": periods}
+    return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)
+
+
+def all_cores() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,5 +1,7 @@
-"""The options, each declared once."""
+"""The options, each declared once, and how they are typed again."""
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +19,11 @@ Runs = Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all
 Strides = Annotated[
     int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
 ]
-Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Processes for independent cells.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."),
+]
+Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")]
 Full = Annotated[bool, typer.Option("--full", help="Run the long campaign too; interrupted, it goes on the next time.")]
 Force = Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would happen and why; touch nothing.")]
@@ -25,7 +31,23 @@ NoWait = Annotated[bool, typer.Option("--no-wait", help="Give up (exit 6) if ano
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")]
+Over = Annotated[str | None, typer.Option("--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.")]
+From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
+To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
+Model = Annotated[str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits to follow.")]
+Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")]
+AllRuns = Annotated[bool, typer.Option("--all", help="Every run in the folder of all runs.")]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 
 RUNS = Path("runs")
+
+
+def typed_options(config: Path | None, sets: Sequence[str] | None, strides: int | None, runs: Path) -> str:
+    """The options that say which run is meant, each with a blank before it; none if it is that of the paper config."""
+    words = [] if config is None else ["-c", str(config)]
+    for setting in sets or ():
+        words += ["--set", setting]
+    words += [] if strides is None else ["--set", f"strides={strides}"]
+    words += [] if runs == Path("runs") else ["--runs", str(runs)]
+    return "".join(f" {shlex.quote(word)}" for word in words)

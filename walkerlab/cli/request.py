@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import Path
 
 from walkerlab.cli.console import Console
-from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.cli.options import typed_options
+from walkerlab.config.loader import EarlierRun, LoadedConfig, Template, template
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
 
@@ -29,16 +30,33 @@ class Request:
     as_json: bool = False
     quiet: bool = False
     verbose: bool = False
+    open_page: bool = False
 
     @cached_property
     def console(self) -> Console:
         """Where messages go."""
-        return Console(self.quiet, self.verbose)
+        return Console(self.quiet, self.verbose, self.open_page)
+
+    @property
+    def typed(self) -> str:
+        """The options that say which run it is, as they can be typed again."""
+        return typed_options(self.config, self.sets, self.strides, self.runs)
 
     @cached_property
-    def loaded(self) -> LoadedConfig:
-        """The config, its warnings said; ConfigError if it is not usable."""
-        loaded = load(self.config, self.sets, self.strides)
+    def earlier(self) -> EarlierRun | None:
+        """The run that `--config` names, if it is a run's folder or one of its artifacts."""
+        if self.config is None or not (self.config.is_dir() or self.config.suffix == ".h5"):
+            return None
+        # Imported here: reading a config from a file needs no HDF5.
+        from walkerlab.cli.earlier import run_at
+
+        return run_at(self.config)
+
+    @cached_property
+    def template(self) -> Template:
+        """The config, ready to be varied, its warnings said; ConfigError if it is not usable."""
+        read = template(self.config, self.sets, self.strides, self.earlier)
+        loaded = read.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 
@@ -46,7 +64,12 @@ class Request:
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {self.runs / loaded.run_name}")
-        return loaded
+        return read
+
+    @property
+    def loaded(self) -> LoadedConfig:
+        """The config as it is."""
+        return self.template.base
 
     @property
     def resolved(self) -> Config:

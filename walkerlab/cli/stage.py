@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import asdict
 from typing import Any
 
 import typer
 
+from walkerlab.cli.answers import answer, verdict
+from walkerlab.cli.browser import open_file
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
-from walkerlab.cli.text import aligned, described_summary
+from walkerlab.cli.text import aligned
 from walkerlab.stages.graph import Graph, Stage
 from walkerlab.stages.runner import StageReport, execute, preview
 
@@ -26,9 +29,11 @@ def run_stage(
     report = execute(
         config, stage.name, folder, force=force, wait=wait, jobs=jobs, full=full, reporter=request.console, graph=graph
     )
-    show(request, as_json(report), printed(report))
+    show(request, as_json(report), printed(request, report))
+    if request.open_page and "html" in report.summary and not request.console.shown:
+        open_file(report.run_dir / str(report.summary["html"]), request.console)
     if report.no_answer is not None:
-        say(report.no_answer)
+        say(report.no_answer, request.typed)
         raise typer.Exit(report.no_answer.exit_code)
 
 
@@ -55,20 +60,42 @@ def as_json(report: StageReport) -> dict[str, Any]:
     return common | own | {"stages": [asdict(done) for done in report.steps]} | error
 
 
-def printed(report: StageReport) -> str:
-    """The result for people."""
-    where = f"{report.stage}: {report.artifact}" if report.artifact else f"{report.stage}: no result"
+def printed(request: Request, report: StageReport) -> str:
+    """The result for people: what was found, where it is, and what to do next."""
+    if report.artifact is None:
+        return "\n".join([f"{report.stage}: no result", *left_out_lines(request, report)])
     own = {key: value for key, value in report.summary.items() if key != "no_answer"}
-    return "\n".join([where, *described_summary(own), *left_out_lines(report)])
+    if "html" in own:
+        lines = [*verdict(report.results), *answer(report.stage, own), *pages(request, report)]
+    else:
+        lines = [*answer(report.stage, own), "", f"stored in {report.artifact}"]
+    return "\n".join([*lines, *left_out_lines(request, report)])
+
+
+def pages(request: Request, report: StageReport) -> list[str]:
+    """Where the page is, and what to do next."""
+    page = (report.run_dir / str(report.summary["html"])).resolve()
+    next_steps = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
+    others = f"`walkerlab show STAGE{request.typed}` has every number"
+    return ["", f"page: {page}", f"next: {next_steps}; {others}."]
 
 
 def planned(report: StageReport) -> str:
     """What would happen, for people."""
     rows = [[done.stage, done.action, done.reason] for done in report.steps]
-    return "\n".join([f"in {report.run_dir}:", *aligned(rows), *left_out_lines(report)])
+    return "\n".join([f"in {report.run_dir}:", *aligned(rows), *each_left_out(report)])
 
 
-def left_out_lines(report: StageReport) -> list[str]:
+def left_out_lines(request: Request, report: StageReport) -> list[str]:
+    """What was left out: how much, and if asked for, what, why and what that saves."""
+    if report.left_out and not request.verbose:
+        names = list(dict.fromkeys(entry.what for entry in report.left_out))
+        few = f"{', '.join(names[:3])}{' …' if len(names) > 3 else ''}"
+        return [f"left out: {len(names)} ({few}); -v and --json say why"]
+    return each_left_out(report)
+
+
+def each_left_out(report: StageReport) -> list[str]:
     """What was left out, why, and what that saves."""
     return [
         f"left out: {entry.what} ({entry.why})" + (f"; saves {entry.saves}" if entry.saves else "")

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 INDENT = "  "
+LONGEST_ROW, ENDS = 12, 4
+"""Of more values in a row, so many are shown of either end."""
 LONGEST_CELL = 100
 """Letters; a column with longer cells, which are sentences, is left out of a table."""
 
 
-def described_summary(summary: Mapping[str, Any], indent: str = INDENT) -> Iterator[str]:
-    """One line a key; below it what is nested, rows of equal objects as a table."""
-    width = max((len(key) for key in summary), default=0)
+def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
+    """One line a key; below it what is nested, rows of equal objects as a table.
+
+    short  leave out the middle of long rows of numbers and of long tables
+    """
+    widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:
             yield f"{indent}{key}"
-            yield from described_summary(value, indent + INDENT)
+            yield from described_summary(value, indent + INDENT, short)
         elif is_rows(value):
             yield f"{indent}{key}"
             yield from (f"{indent}{INDENT}{line}" for line in table(value))
         else:
-            yield f"{indent}{key:<{width}}  {in_words(value)}"
+            yield f"{indent}{key:<{widest}}  {in_words(cut(value) if short else value)}"
+
+
+def cut(value: Any) -> Any:
+    """A value, or of a long row its ends and how many there are."""
+    if not isinstance(value, list) or len(value) <= LONGEST_ROW:
+        return value
+    ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]
+    return [*ends[:ENDS], "…", *ends[ENDS:], f"({len(value)} of them; `walkerlab show` has all)"]
 
 
 def is_rows(value: Any) -> bool:
@@ -41,8 +55,16 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows of cells in columns of equal width."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
+    return [
+        "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def width(text: str) -> int:
+    """Columns that a text takes on a terminal: a dot above a letter takes none of its own."""
+    return sum(not unicodedata.combining(letter) for letter in text)
 
 
 def in_words(value: Any) -> str:

@@ -24,10 +24,12 @@ class ConfigFile:
 
     path   of the file
     label  as messages name it
+    text   of the config, if it is not the file's own
     """
 
     path: Path
     label: str
+    text: str | None = None
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -132,6 +134,8 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
     asked   where its name stands, for the message if it cannot be read
     wanted  what it should be, if not a config
     """
+    if file.text is not None:
+        return file.text
     kind = "file" if wanted else "config"
     try:
         mode = file.path.stat().st_mode

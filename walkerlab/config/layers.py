@@ -94,11 +94,20 @@ def with_settings(tree: Mapping, settings: Sequence[Setting]) -> Mapping:
 
     Raises ConfigError if a setting goes into something that is no block.
     """
+    _refuse_slopes_in_conflict(settings)
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
             tree = tree.without(*SLOPE_KEYS)
         tree = _placed(tree, setting, 0)
     return tree
+
+
+def _refuse_slopes_in_conflict(settings: Sequence[Setting]) -> None:
+    """Raise ConfigError if the slope is set in radians and in degrees."""
+    given = {setting.path[0]: setting.position for setting in settings if setting.path[0] in SLOPE_KEYS}
+    if len(given) == len(SLOPE_KEYS):
+        (first, there), (second, here) = given.items()
+        raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
 
 
 def _placed(block: Mapping, setting: Setting, depth: int) -> Mapping:

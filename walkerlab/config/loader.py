@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.layers import Setting, parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import CompassWalker, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
 from walkerlab.config.validation import typed
 
@@ -32,16 +35,60 @@ class LoadedConfig:
     source: str
 
 
-def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None) -> LoadedConfig:
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A config that is read but not yet typed, of which many variants are made.
+
+    base   the config as it is
+    tree   what it was typed from
+    """
+
+    base: LoadedConfig
+    tree: Mapping
+
+    def variant(self, settings: Sequence[Setting]) -> Config:
+        """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
+        tree = with_settings(self.tree, settings)
+        return on_the_slope(typed(tree), tree)[0]
+
+
+@dataclass(frozen=True, slots=True)
+class EarlierRun:
+    """A run that a config is taken from.
+
+    text   its resolved config
+    name   of its folder, in which the same config runs again
+    label  as messages name it
+    """
+
+    text: str
+    name: str
+    label: str
+
+
+def load(
+    path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
+) -> LoadedConfig:
     """Load a config.
 
     path     of a YAML file, or the name of a built-in config; None is the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, over everything else
+    run      whose config it is, instead of a file's
 
     Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
     """
-    file = builtin(DEFAULT) if path is None else find(path)
+    return template(path, sets, strides, run).base
+
+
+def template(
+    path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
+) -> Template:
+    """The same config as `load` gives, ready to be varied; raises ConfigError as that."""
+    if run is not None:
+        file = ConfigFile(Path(run.name), run.label, run.text)
+    else:
+        file = builtin(DEFAULT) if path is None else find(path)
     tree = _named(stacked(read_layers(file)), file)
     settings = parse_settings(sets)
     if strides is not None:
@@ -51,7 +98,15 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
     base = typed(tree) if settings else changed
     refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
-    return LoadedConfig(config, run_name(base, changed, _degrees(changed_tree)), warnings, file.label)
+    name = run_name(base, changed, _degrees(changed_tree), None if run is None else run.name)
+    warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
+    return Template(LoadedConfig(config, name, warnings, file.label), changed_tree)
+
+
+def safe_name(text: str) -> str:
+    """A text as the name of a run folder: accents, blanks and what else such a name cannot have replaced."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
 def _named(tree: Mapping, file: ConfigFile) -> Mapping:
@@ -59,9 +114,31 @@ def _named(tree: Mapping, file: ConfigFile) -> Mapping:
     if "name" in tree.entries:
         return tree
     named = tree.without()
-    start = Position(file.label, 1, 1)
-    named.put("name", Scalar(start, file.path.stem, file.path.stem), start)
+    start, name = Position(file.label, 1, 1), safe_name(file.path.stem)
+    named.put("name", Scalar(start, name, name), start)
     return named
+
+
+def _renamed(tree: Mapping, file: ConfigFile) -> tuple[str, ...]:
+    """That the run cannot have the file's own name, if so."""
+    name = tree.entries["name"]
+    if not isinstance(name, Scalar) or name.position != Position(file.label, 1, 1) or name.value == file.path.stem:
+        return ()
+    return (f"{file.label}: the run is named {name.value}, since a run folder cannot be named as the file is",)
+
+
+def _left_behind(config: Config, tree: Mapping) -> tuple[str, ...]:
+    """That a leg was given another length than the config beneath has, and its mass stays where that puts it."""
+    walker, block = config.walker, tree.entries.get("walker")
+    if not isinstance(walker, CompassWalker) or not isinstance(block, Mapping):
+        return ()
+    leg, mass = block.keys.get("leg_length_m"), block.keys.get("foot_to_mass_m")
+    if leg is None or mass is None or leg.source == mass.source or walker.foot_to_mass_m == walker.leg_length_m / 2:
+        return ()
+    return (
+        f"{leg}: walker.leg_length_m is {short(walker.leg_length_m)} m, and walker.foot_to_mass_m stays "
+        f"{short(walker.foot_to_mass_m)} m, as {mass.source} has it: the mass is not in the middle of the leg",
+    )
 
 
 def _degrees(tree: Mapping) -> float | None:

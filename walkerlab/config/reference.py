@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
 from typing import Any, Final
@@ -11,8 +12,11 @@ from pydantic.fields import FieldInfo
 from walkerlab.config.fields import block_of, bounds_of, extra, kind, leaves
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
+from walkerlab.config.problems import nearest
 from walkerlab.config.schema import Config, SlopeInDegrees
+from walkerlab.errors import ConfigError
 
+COLUMNS: Final = 79
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
@@ -77,6 +81,28 @@ def as_text() -> str:
     optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
     notes = [f"The block `{name}` may be left out; what needs it is then left out too." for name in optional]
     return "\n".join([*lines, "", *notes, ""])
+
+
+def as_paragraphs(asked: str = "") -> str:
+    """The keys for a terminal, each as a short paragraph; only those of a block or key, if one is asked for.
+
+    Raises ConfigError with the nearest key if there is no such block or key.
+    """
+    found = [key for key in keys() if not asked or key.key == asked or key.key.startswith(f"{asked}.")]
+    if not found:
+        names = {".".join(key.key.split(".")[:depth]) for key in keys() for depth in (1, 2, 3)}
+        near = nearest(asked, names) or nearest(asked, {name.split(".")[-1] for name in names})
+        meant = f" Did you mean {near}?" if near else ""
+        raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
+    return "\n\n".join("\n".join(_paragraph(key)) for key in found)
+
+
+def _paragraph(key: KeyReference) -> Iterator[str]:
+    yield key.key
+    what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
+    facts = [", ".join(part for part in what if part), f"default: {key.default}", key.meaning, f"source: {key.source}"]
+    for fact in facts:
+        yield from textwrap.wrap(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ")
 
 
 def _line(cells: tuple[str, ...] | list[str], widths: list[int]) -> str:

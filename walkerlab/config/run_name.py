@@ -14,12 +14,13 @@ MAX_CHANGE: Final = 80
 KEPT_OF_A_LONG_CHANGE: Final = 56
 
 
-def run_name(base: Config, changed: Config, slope_deg: float | None = None) -> str:
+def run_name(base: Config, changed: Config, slope_deg: float | None = None, run: str | None = None) -> str:
     """Name of the run folder of `changed`, which `--set` made of `base`: `name`, or `name@key=value,...`.
 
     The name follows from what differs and not from how the change was typed: one experiment, one folder.
 
     slope_deg  the slope as the user gave it, if in degrees
+    run        the folder that `base` was taken from, which has perhaps a change in its name already
     """
     before, after = base.model_dump(mode="json"), changed.model_dump(mode="json")
     parts = []
@@ -28,8 +29,11 @@ def run_name(base: Config, changed: Config, slope_deg: float | None = None) -> s
         parts.append(f"{name}=added")
     known = dict(_flat(before))
     differing = [(key, value) for key, value in _flat(after) if key not in known or known[key] != value]
-    parts += [_part(key, value, slope_deg) for key, value in differing]
-    return f"{base.name}@{_shortened(','.join(parts))}" if parts else base.name
+    renamed = [value for key, value in differing if key == "name"]
+    parts += [_part(key, value, slope_deg) for key, value in differing if key != "name"]
+    whole, _, earlier = (renamed[0] if renamed else run or base.name).partition("@")
+    parts = [earlier, *parts] if earlier else parts
+    return f"{whole}@{_shortened(','.join(parts))}" if parts else str(whole)
 
 
 def _added_blocks(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, type[Block]]]:

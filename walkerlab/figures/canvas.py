@@ -18,17 +18,27 @@ from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Transform
 
-from walkerlab.figures.style import PNG_DPI, RC, WIDTH
+from walkerlab.figures.style import ONE_COLUMN, PNG_DPI, RC, WIDTH
 
 LETTER, BESIDE_LABEL = 0.07, 0.65
 """Width of a legend's letter, and of all that is beside a label, in."""
 
 
 @contextlib.contextmanager
-def styled() -> Iterator[None]:
-    """Matplotlib's defaults and this project's style on top, whatever the user's own settings are."""
-    with matplotlib.style.context(["default", RC]):
+def styled(columns: int = 2) -> Iterator[None]:
+    """Matplotlib's defaults and this project's style on top, whatever the user's own settings are.
+
+    columns  of a journal that a figure is to fill: in one, letters are smaller and lines thinner
+    """
+    with matplotlib.style.context(["default", RC, *([ONE_COLUMN] if columns == 1 else [])]):
         yield
+
+
+def resize(figure: Figure, columns: int) -> None:
+    """Make a figure as wide as one column, and not as much lower; as it is for two."""
+    if columns == 1:
+        _, height = figure.get_size_inches()
+        figure.set_size_inches(WIDTH / 2, max(0.62 * height, 2.0))
 
 
 def blank(height: float) -> Figure:
@@ -103,6 +113,15 @@ def svg_of(figure: Figure, name: str, title: str) -> bytes:
 def png_of(figure: Figure, title: str) -> bytes:
     """The figure as PNG."""
     return saved(figure, "png", {"Software": None, "Title": title}, dpi=PNG_DPI)
+
+
+def bytes_of(figure: Figure, kind: str, name: str, title: str) -> bytes:
+    """The figure as SVG, PNG or PDF."""
+    if kind == "svg":
+        return svg_of(figure, name, title)
+    if kind == "png":
+        return png_of(figure, title)
+    return saved(figure, kind, {"CreationDate": None, "Title": title})
 
 
 def saved(figure: Figure, kind: str, metadata: dict[str, str | None], **options: Any) -> bytes:

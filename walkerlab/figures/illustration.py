@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import png_of, settle, styled, svg_of
+from walkerlab.figures.canvas import bytes_of, png_of, resize, settle, styled, svg_of
 from walkerlab.figures.needs import Need, Results, why_not
 
 
@@ -65,6 +65,15 @@ class Illustration:
             figure = self.plot(results)
             settle(figure)
             return Drawing(svg_of(figure, self.name, title), png_of(figure, title), self.caption(results))
+
+    def as_file(self, results: Results, kind: str, columns: int) -> bytes:
+        """The figure as PDF, SVG or PNG, as wide as one or two columns of a journal."""
+        title = self.title if self.number is None else f"Figure {self.number}. {self.title}"
+        with styled(columns):
+            figure = self.plot(results)
+            resize(figure, columns)
+            settle(figure)
+            return bytes_of(figure, kind, self.name, title)
 
 
 def paper_figure(

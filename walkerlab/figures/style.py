@@ -53,6 +53,17 @@ RC: Final = {
     "ytick.major.width": 0.7,
 }
 """On top of matplotlib's own defaults, whatever the user's matplotlibrc says."""
+ONE_COLUMN: Final = {
+    "axes.labelsize": 7.0,
+    "axes.titlesize": 7.0,
+    "font.size": 7.0,
+    "legend.fontsize": 6.0,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.0,
+    "xtick.labelsize": 6.0,
+    "ytick.labelsize": 6.0,
+}
+"""On top of it, for a figure of half the width."""
 
 
 @dataclass(frozen=True)

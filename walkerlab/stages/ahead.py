@@ -23,9 +23,11 @@ class Ahead:
     def __init__(self) -> None:
         """Nothing is compiled ahead so far."""
         self._process: BaseProcess | None = None
+        self.begun = False
 
     def begin(self, later: Sequence[Stage], config: Config) -> None:
         """Compile for the first of the later stages that takes long to compile."""
+        self.begun = True
         slow = [stage for stage in later if stage.compiles_long]
         if slow:
             self._process = get_context("spawn").Process(target=compile_for, args=(slow[0].module, config), daemon=True)

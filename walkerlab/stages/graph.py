@@ -54,7 +54,11 @@ class Stage:
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
+    on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
+    alone          whether it measures times, and so runs with nothing beside it
+    early_with     the results with which it is worth drawing while others are still being computed
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -71,8 +75,17 @@ class Stage:
     has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
+    on_demand: bool = False
     keeps_parts: bool = False
+    follows: bool = False
+    alone: bool = False
+    early_with: tuple[str, ...] = ()
     does_without: Lacks = nothing
+
+    @property
+    def optional(self) -> bool:
+        """Whether it runs only if the user asks for it."""
+        return self.on_demand or bool(self.campaign_of)
 
 
 class Graph:
@@ -104,7 +117,19 @@ class Graph:
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
 PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = ("name", "source", *MODEL, "contact", "solver", "tune", "stability", "seed")
+EVERYTHING = (
+    "name",
+    "source",
+    *MODEL,
+    "contact",
+    "solver",
+    "tune",
+    "stability",
+    "continuation",
+    "basin",
+    "sweep",
+    "seed",
+)
 
 PIPELINE = Graph(
     Stage(
@@ -157,6 +182,7 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         has_cells=True,
+        alone=True,
     ),
     Stage(
         "stability",
@@ -177,12 +203,29 @@ PIPELINE = Graph(
         keeps_parts=True,
     ),
     Stage(
+        "continuation",
+        "walkerlab.stages.continuation",
+        "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
+        reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        follows=True,
+    ),
+    Stage(
+        "basin",
+        "walkerlab.stages.basin",
+        "Map which starts come to which attractor, and which fall; goes on where it was interrupted.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact", "solver.contact", "basin", "seed"),
+        inputs=results_of("fixedpoint"),
+        has_cells=True,
+        on_demand=True,
+        keeps_parts=True,
+    ),
+    Stage(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune", "stability-maps"),
+        if_current=("accuracy", "tune", "stability-maps", "continuation", "basin"),
         draws=True,
     ),
     Stage(
@@ -191,8 +234,9 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("stability-maps",),
+        if_current=("stability-maps", "continuation", "basin"),
         draws=True,
+        early_with=("fixedpoint", "simulate", "contact-sim"),
     ),
 )
 STAGES = PIPELINE.stages

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
 
 
 class Progress(Protocol):
@@ -18,18 +20,42 @@ class Progress(Protocol):
         """Say one line about the work."""
 
 
-class Reporter(Progress, Protocol):
-    """What the runner calls besides."""
+class StageReporter(Progress, Protocol):
+    """What the runner calls besides, of a stage that runs."""
+
+    def compiling(self, kernel: str) -> None:
+        """Say that a kernel is being compiled; '' once it is there and the computing goes on."""
+
+    def end(self, said: str) -> None:
+        """End the stage with one line about it; '' if it has failed, which others will tell."""
+
+
+class Reporter(Protocol):
+    """Whom the runner tells."""
+
+    def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
+        """Begin a stage, perhaps beside others.
+
+        place       which of how many it is, and why it runs, in words
+        expected_s  how long it took the last time, if that is known
+        """
+
+    def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
+        """Say that something can be looked at in a run's folder while the rest is still being computed."""
+
+    def note(self, text: str) -> None:
+        """Say one line."""
 
     def warn(self, text: str) -> None:
         """Say one line that the user should not miss."""
 
-    def finish(self) -> None:
-        """End the piece of work that was begun last, if any."""
-
 
 class Silent:
-    """A reporter that says nothing."""
+    """A reporter that says nothing, of stages too."""
+
+    def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
+        """Nothing."""
+        return self
 
     def start(self, label: str, total: int | None = None) -> None:
         """Nothing."""
@@ -43,5 +69,11 @@ class Silent:
     def warn(self, text: str) -> None:
         """Nothing."""
 
-    def finish(self) -> None:
+    def compiling(self, kernel: str) -> None:
+        """Nothing."""
+
+    def end(self, said: str) -> None:
+        """Nothing."""
+
+    def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
         """Nothing."""

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import datetime
 import importlib
-import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.canonical import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.ahead import Ahead
+from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import LeftOut, Planner, Step, input_digest, left_out, no_answer, plan
-from walkerlab.stages.progress import Reporter, Silent
+from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, Planner, Step, input_digest, left_out, no_answer, plan
+from walkerlab.stages.progress import Reporter, Silent, StageReporter
+from walkerlab.stages.task import Compilation, Task, kernels_told_of, nothing_compiled_yet, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
-from walkerlab.store.files import drawing_into
+from walkerlab.store.elsewhere import take_over
 from walkerlab.store.parts import Parts
+from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 
 __all__ = ["Done", "StageReport", "execute", "plan", "preview"]
@@ -49,6 +51,7 @@ class StageReport:
     summary    of the result; empty if there is none
     steps      what was done with each stage
     no_answer  message and advice, if the computation has no answer or the drawing had to do without one
+    results    the summaries of all stages on the way that have a result
     """
 
     stage: str
@@ -60,6 +63,7 @@ class StageReport:
     summary: dict[str, Any]
     steps: tuple[Done, ...]
     no_answer: NoAnswer | None = None
+    results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
 def execute(
@@ -78,7 +82,7 @@ def execute(
 
     force  run the target and all it needs
     wait   for another process that works in the folder, and reuse what it made
-    jobs   processes for stages with independent cells
+    jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
     full   run the target's campaigns too
 
     Raises ConfigError if the config has not what the target needs, LockedError (only without `wait`), StorageError.
@@ -90,11 +94,12 @@ def execute(
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
     run = Run(planner, reporter or Silent(), jobs)
-    if any(step.action == "run" for step in steps):
+    to_run = [step.stage for step in steps if step.action == "run"]
+    if to_run or any(step.origin is not None for step in steps):
         with folder.locked(wait, run.reporter.note):
             # Decided anew, stage by stage: another process may have worked here until now.
             run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
-            run.carry_out(stages)
+            run.carry_out(stages, to_run)
     else:
         for step in steps:
             run.skip(step)
@@ -138,6 +143,17 @@ def refuse_without_contact(stage: Stage, config: Config) -> None:
         )
 
 
+@dataclass(frozen=True)
+class Begun:
+    """A stage that runs."""
+
+    step: Step
+    task: Task
+    provenance: Provenance
+    reporter: StageReporter
+    started: float
+
+
 class Run:
     """One execution: what is known of the results, and what was done so far."""
 
@@ -148,95 +164,161 @@ class Run:
         self.reporter = reporter
         self.jobs = jobs
         self.done: list[Done] = []
-        self.announced = False
-        self.ahead = Ahead()
-        self.later: Sequence[Stage] = ()
+        self.waiting: list[Stage] = []
+        self.running: dict[Member | None, Begun] = {}
+        self.left: list[str] = []
+        self.of = 0
 
-    def carry_out(self, stages: Sequence[Stage]) -> None:
-        """Decide on one stage after another, and do it."""
-        for index, stage in enumerate(stages):
-            self.later = stages[index + 1 :]
-            self.planner.look_at_current(stage, stages)
-            step = self.planner.decide(stage)
-            if step.damaged:
-                self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
-            if step.action == "run":
-                self._run(step)
+    def carry_out(self, stages: Sequence[Stage], to_run: Sequence[Stage]) -> None:
+        """Decide on the stages, and do what is decided; those of `to_run` will probably run."""
+        self.waiting, self.left, self.of = list(stages), [stage.name for stage in to_run], len(to_run)
+        try:
+            if self.jobs > 1 and any_side_by_side(to_run, self.planner.config):
+                with Crew(self.jobs) as crew:
+                    self._side_by_side(stages, crew)
             else:
-                self.planner.expect(step)
-                self.skip(step)
+                self._one_by_one(stages)
+        finally:
+            for begun in self.running.values():
+                begun.reporter.end("")
 
     def skip(self, step: Step) -> None:
         """Take note of a stage that does not run."""
-        self._record(Done(step.stage.name, step.action, step.reason))
-
-    def _record(self, done: Done) -> None:
+        done = Done(step.stage.name, step.action, step.reason)
         self.done.append(done)
         self.reporter.note(said_of(done))
 
-    def _run(self, step: Step) -> None:
-        started = time.perf_counter()
-        try:
-            result = self._result(step)
-        finally:
-            self.reporter.finish()
-        self.planner.settle(step.stage, result)
-        reason = step.reason if result.complete else f"no answer: {no_answer(result)}"
-        self._record(Done(step.stage.name, "run", reason, time.perf_counter() - started))
+    def _one_by_one(self, stages: Sequence[Stage]) -> None:
+        ahead = Ahead()
+        for stage in stages:
+            step = self._decided(stage, stages)
+            self.waiting.remove(stage)
+            if step.action == "run":
+                importlib.import_module(stage.module)
+                if not ahead.begun and nothing_compiled_yet():
+                    ahead.begin(self.waiting, self.planner.config)
+                ahead.wait_for(stage)
+                self._run_here(self._begin(step, self.jobs))
+                self._draw_early(stages)
+            else:
+                self._pass_over(step)
 
-    def _result(self, step: Step) -> Stored:
-        """Run a stage and store what it returns, or what it has got when it finds that there is no answer."""
-        stage, identity = step.stage, step.identity
-        assert identity is not None, "a stage that is left out does not run"
-        inputs = self.planner.inputs(stage)
-        digests = {name: input_digest(stage, result) for name, result in inputs.items()}
-        begun = provenance.begin(self.planner.config, digests)
-        complete = True
+    def _pass_over(self, step: Step) -> None:
+        """Go on without running a stage; its result may lie in another run folder."""
+        if step.origin is not None:
+            take_over(step.origin, self.folder.artifact(step.stage.name))
+        self.planner.expect(step)
+        self.skip(step)
+
+    def _run_here(self, begun: Begun) -> None:
+        self.running[None] = begun
         try:
-            content = self._call(step, inputs)
+            with kernels_told_of(begun.reporter.compiling):
+                content, complete = begun.task.run(begun.reporter), True
         except NoAnswer as error:
             content, complete = unanswered(error), False
+        self._settle(self.running.pop(None), content, complete)
+
+    def _side_by_side(self, stages: Sequence[Stage], crew: Crew) -> None:
+        compiled: set[str] = set()
+        while self.waiting or self.running:
+            self._start_what_can_run(stages, crew, compiled)
+            outcomes = list(crew.outcomes())
+            while not outcomes:
+                outcomes = list(crew.outcomes())
+            for member, task, message in outcomes:
+                if isinstance(task, Compilation):
+                    continue
+                try:
+                    content, complete = found(message), True
+                except NoAnswer as error:
+                    content, complete = unanswered(error), False
+                self._settle(self.running.pop(member), content, complete)
+            self._draw_early(stages)
+
+    def _start_what_can_run(self, stages: Sequence[Stage], crew: Crew, compiled: set[str]) -> None:
+        """Give work to the processes that have none: stages whose inputs are there, kernels of those that wait."""
+        for stage in list(self.waiting):
+            if any(begun.step.stage.alone for begun in self.running.values()):
+                return
+            if not self._ready(stage, stages):
+                if stage.compiles_long and stage.name in self.left and stage.name not in compiled:
+                    member = crew.free()
+                    if member is not None:
+                        compiled.add(stage.name)
+                        member.give(Compilation(stage.module, self.planner.config))
+                continue
+            step = self._decided(stage, stages)
+            if step.action != "run":
+                self.waiting.remove(stage)
+                self._pass_over(step)
+            elif not (stage.alone and self.running):
+                member = crew.free()
+                if member is None:
+                    return
+                self.waiting.remove(stage)
+                begun = self.running[member] = self._begin(step, self.jobs if stage.alone else max(1, self.jobs // 2))
+                member.give(begun.task, begun.reporter)
+
+    def _ready(self, stage: Stage, stages: Sequence[Stage]) -> bool:
+        """Whether all that a stage takes is there, or known not to come."""
+        taken = {*stage.inputs(self.planner.config), *stage.if_current}
+        unsettled = {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
+        return not taken & unsettled & {one.name for one in stages}
+
+    def _decided(self, stage: Stage, stages: Sequence[Stage]) -> Step:
+        self.planner.look_at_current(stage, stages)
+        return self.planner.decide(stage)
+
+    def _begin(self, step: Step, jobs: int) -> Begun:
+        stage, identity = step.stage, step.identity
+        assert identity is not None, "a stage that is left out does not run"
+        if step.damaged and step.origin is None:
+            self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
+        if stage.keeps_parts and self.planner.force:
+            Parts(self.folder.parts(stage.name), identity.key).forget()
+        inputs = self.planner.inputs(stage)
+        digests = {name: input_digest(stage, result) for name, result in inputs.items()}
+        absent = self.planner.missing_inputs(stage)
+        task = task_of(stage, self.planner.config, inputs, self.folder, jobs=jobs, key=identity.key, left_out=absent)
+        number = self.of - len(self.left) + 1 + len(self.running)
+        of = max(self.of, number)
+        said = f"{number} of {of}, {step.reason}" if of > 1 else step.reason
+        reporter = self.reporter.begin(stage.name, said, seconds_taken(step.found))
+        return Begun(step, task, provenance.begin(self.planner.config, digests), reporter, time.perf_counter())
+
+    def _settle(self, begun: Begun, content: Content, complete: bool) -> None:
+        """Store what a stage has returned, or what it has got where it found that there is no answer."""
+        stage, identity = begun.step.stage, begun.step.identity
+        assert identity is not None, "a stage that is left out does not run"
         path = self.folder.artifact(stage.name)
-        stored = artifact.write(path, content, identity, begun.until_now(), complete)
+        try:
+            result = artifact.write(path, content, identity, begun.provenance.until_now(), complete)
+        except BaseException:
+            begun.reporter.end("")
+            raise
         if stage.keeps_parts:
-            self._parts(step).forget()
-        return stored
+            Parts(self.folder.parts(stage.name), identity.key).forget()
+        self.planner.settle(stage, result)
+        reason = begun.step.reason if result.complete else f"no answer: {no_answer(result)}"
+        done = Done(stage.name, "run", reason, time.perf_counter() - begun.started)
+        self.done.append(done)
+        self.left = [name for name in self.left if name != stage.name]
+        begun.reporter.end(said_of(done) + (f"; left: {', '.join(self.left)}" if self.left else ""))
 
-    def _parts(self, step: Step) -> Parts:
-        """What an earlier run has left of a result."""
-        assert step.identity is not None, "a stage that is left out has no parts"
-        return Parts(self.folder.parts(step.stage.name), step.identity.key)
-
-    def _call(self, step: Step, inputs: dict[str, Stored]) -> Content:
-        """Call a stage's `run` with what it declared and nothing else."""
-        stage = step.stage
-        # Imported now and not before: a stage brings its libraries and compiled code along.
-        run = importlib.import_module(stage.module).run
-        self._announce_compilation()
-        self.ahead.wait_for(stage)
-        config = only(self.planner.config, stage.reads)
-        extra: dict[str, Any] = {"jobs": self.jobs} if stage.has_cells else {}
-        if stage.keeps_parts:
-            extra["parts"] = parts = self._parts(step)
-            if self.planner.force:
-                parts.forget()
-        if stage.draws:
-            extra |= {"folder": self.folder.path, "left_out": self.planner.missing_inputs(stage)}
-            with drawing_into(self.folder.path):
-                content = run(config, inputs, self.reporter, **extra)
-        else:
-            content = run(config, inputs, self.reporter, **extra)
-        if not isinstance(content, Content):
-            raise TypeError(f"{stage.module}.run returned {type(content).__name__}, not Content")
-        return content
-
-    def _announce_compilation(self) -> None:
-        """Say once why the first stages of a new installation take so long; a stage without kernels is not asked."""
-        kernels = sys.modules.get("walkerlab.kernels")
-        if kernels is not None and not self.announced and kernels.nothing_compiled_yet():
-            self.announced = True
-            self.reporter.note("compiling the models for this machine, once; later runs use the compiled code")
-            self.ahead.begin(self.later, self.planner.config)
+    def _draw_early(self, stages: Sequence[Stage]) -> None:
+        """Draw what is to be looked at while the rest is still being computed."""
+        unsettled = {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
+        for stage in self.waiting:
+            inputs = self.planner.inputs(stage)
+            pending = unsettled & set(stage.inputs(self.planner.config))
+            others = [name for name in pending if not self.planner.graph[name].draws]
+            if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
+                continue
+            absent = [entry for entry in self.planner.missing_inputs(stage) if entry.what not in pending]
+            absent += [LeftOut(one.name, STILL_COMPUTED) for one in stages if one.name in pending]
+            task = task_of(stage, self.planner.config, inputs, self.folder, jobs=1, key="", left_out=tuple(absent))
+            self.reporter.drawn(task.run(Silent()).summary, self.folder.path)
 
     def report(self, target: Stage, wall_s: float) -> StageReport:
         """How it went."""
@@ -255,16 +337,17 @@ class Run:
             summary=summary,
             steps=tuple(self.done),
             no_answer=self._no_answer(summary.get("no_answer")),
+            results={name: dict(one.summary) for name, one in self.planner.results.items() if one.complete},
         )
 
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
         """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
 
-        A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
+        What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
         """
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
-        found = [entry for entry in found if not graph[entry.what].campaign_of]
+        found = [entry for entry in found if not graph[entry.what].optional]
         found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         entries = [*by_stage]
         for done in self.done:
@@ -283,6 +366,25 @@ class Run:
             if said is not None:
                 return NoAnswer(f"{done.stage}: {said['message']}", said["advice"])
         return None
+
+
+def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
+    """Whether two of the stages need nothing of each other."""
+    needed: dict[str, set[str]] = {}
+    for stage in stages:
+        own = {name for name in (*stage.inputs(config), *stage.if_current) if name in needed}
+        needed[stage.name] = own.union(*(needed[name] for name in own))
+    return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
+
+
+def seconds_taken(stored: Stored | None) -> float | None:
+    """How long a stored result took; None if there is none."""
+    if stored is None:
+        return None
+    begun, ended = (
+        datetime.datetime.fromisoformat(t) for t in (stored.provenance.started_utc, stored.provenance.ended_utc)
+    )
+    return (ended - begun).total_seconds()
 
 
 def unanswered(error: NoAnswer) -> Content:

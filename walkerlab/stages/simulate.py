@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.thinning import thinned
 from walkerlab.store.content import Content, Group, Variable
 
 STEP, TIME, LEG = "step", "time", "leg"
@@ -26,6 +28,8 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     steps = 2 * config.strides
     progress.start("simulate", steps)
     walk = take_walk(scene.walker, scene.method, start_state(config, inputs), steps, scene.sampled, progress.advance)
+    if walk.samples is not None:
+        walk = replace(walk, samples=thinned(walk.samples, walk.samples.time, walk.heel_strikes, progress))
     content = Content(groups(scene, walk), summary(config, walk))
     if not walk.outcome.answered:
         raise NoAnswer(f"simulate: {walk.outcome.label} after {walk.steps} steps", walk.outcome.advice, content)

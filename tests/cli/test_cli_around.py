@@ -1,0 +1,155 @@
+"""Commands that begin, repeat and remove runs, and how commands end that are cut short."""
+
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from walkerlab.cli.failures import to_type_back
+from walkerlab.cli.options import typed_options
+from walkerlab.config.loader import load, safe_name
+
+
+def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
+    done = walker("init", "my walker.yaml")
+    assert done.returncode == 0
+    assert "walkerlab report -c 'my walker.yaml'" in done.stdout
+    text = (walker.folder / "my walker.yaml").read_text()
+    assert text.startswith("# yaml-language-server: $schema=.walkerlab-schema.json\nname: my-walker\n")
+    assert "# L: Table 1" in text
+    assert "slope_rad" in json.loads((walker.folder / ".walkerlab-schema.json").read_text())["properties"]
+    assert (
+        load(walker.folder / "my walker.yaml").config.model_dump()
+        == load().config.model_copy(update={"name": "my-walker"}).model_dump()
+    )
+    assert walker("init", "my walker.yaml").returncode == 4
+
+
+def test_init_knows_the_types_of_walkers(walker):
+    done = walker("init", "x.yaml", "--type", "compas")
+    assert done.returncode == 3
+    assert "Did you mean compass?" in done.stderr
+
+
+@pytest.mark.parametrize(("text", "name"), [("Läufer 2", "Laufer-2"), ("a  b", "a-b"), ("-x.", "x"), ("歩", "run")])
+def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
+    assert safe_name(text) == name
+    path = tmp_path / f"{text}.yaml"
+    path.write_text("extends: paper\n")
+    loaded = load(path)
+    assert loaded.run_name == name
+    assert f"the run is named {name}" in loaded.warnings[0]
+
+
+def test_a_longer_leg_whose_mass_stays_is_told():
+    (warning,) = load(sets=["walker.leg_length_m=1.2"]).warnings
+    assert "walker.foot_to_mass_m stays 0.5 m" in warning
+    assert load(sets=["walker.leg_length_m=1.2", "walker.foot_to_mass_m=0.6"]).warnings == ()
+
+
+def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
+    toy("roll", "--strides", "3")
+    folder = "runs/paper@strides=3"
+    for config in (folder, f"{folder}/roll.h5"):
+        done = json.loads(toy("roll", "-c", config, "--json").stdout)
+        assert done["run_dir"] == folder
+        assert done["reused"] is True
+    changed = json.loads(toy("roll", "-c", folder, "--set", "slope_deg=2", "--json").stdout)
+    assert changed["run_dir"] == "runs/paper@strides=3,slope_deg=2"
+    assert not (toy.folder / "runs" / "paper").exists()
+
+
+def test_a_folder_without_results_is_no_config(toy):
+    (toy.folder / "empty").mkdir()
+    done = toy("roll", "-c", "empty")
+    assert done.returncode == 3
+    assert "no result to take a config from" in done.stderr
+
+
+def test_rerun_says_whether_a_result_comes_out_again(toy):
+    toy("roll")
+    artifact = "runs/paper/roll.h5"
+    done = toy("rerun", artifact)
+    assert done.returncode == 0
+    assert "comes out again to the last bit" in done.stdout
+    source = toy.folder.parent / "source" / "toy" / "physics.py"
+    source.write_text(source.read_text().replace("math.sqrt(2", "math.sqrt(3"))
+    done = toy("rerun", artifact, "--json")
+    assert done.returncode == 5
+    assert "the code has changed since" in done.stderr
+    assert json.JSONDecoder().raw_decode(done.stdout)[0]["same"] is False
+
+
+def test_open_without_a_page_says_what_writes_it(toy):
+    assert "there is no run paper" in toy("open").stderr
+    toy("roll")
+    done = toy("open", "paper")
+    assert done.returncode == 5
+    assert "walkerlab report -c runs/paper" in done.stderr
+
+
+def test_a_key_is_explained_in_80_columns(walker):
+    lines = walker("schema", "contact").stdout.splitlines()
+    assert "contact.stiffness" in lines
+    assert max(map(len, lines)) < 80
+    done = walker("schema", "contact.stifness")
+    assert done.returncode == 3
+    assert "Did you mean contact.stiffness?" in done.stderr
+
+
+def test_advice_can_be_typed_back(toy):
+    done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
+    assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` makes it." in done.stderr
+    typed = typed_options(None, ["start=[0, 1, 2, 3]"], None, Path("runs"))
+    assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
+        "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
+    )
+
+
+def test_the_slope_is_set_once(toy):
+    done = toy("drop", "--set", "slope_deg=2", "--set", "slope_rad=0.1")
+    assert done.returncode == 3
+    assert "the slope is given already, as slope_deg" in done.stderr
+
+
+def test_clean_all_leaves_no_empty_folders(toy):
+    toy("roll")
+    toy("roll", "--strides", "3")
+    (toy.folder / "runs" / "paper" / "notes.txt").write_text("mine")
+    removed = json.loads(toy("clean", "--all", "--yes", "--json").stdout)["removed"]
+    assert len(removed) == 4
+    assert [path.name for path in (toy.folder / "runs").iterdir()] == ["paper"]
+
+
+def test_a_request_to_end_is_an_interrupt_with_an_object_that_names_the_run(toy, tmp_path):
+    begun = tmp_path / "begun"
+    environment = {"TOY_BEGUN": str(begun), "TOY_GO_ON": str(tmp_path / "never")}
+    with toy.start("drop", "--json", environment=environment) as process:
+        while not begun.exists():
+            assert process.poll() is None
+        os.kill(process.pid, signal.SIGTERM)
+        assert process.wait(timeout=30) == 130
+        value = json.loads(process.stdout.read())
+    assert value["run_dir"] == "runs/paper"
+    assert value["error"]["exit_code"] == 130
+
+
+def test_a_closed_pipe_ends_quietly(walker):
+    with walker.start("schema") as process:
+        process.stdout.close()
+        assert process.wait(timeout=30) in (0, 141)
+        assert process.stderr.read() == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device here")
+def test_a_full_stdout_is_told(walker):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*walker.command, "schema"], cwd=walker.folder, env=walker.environment, stdout=full, stderr=subprocess.PIPE
+        )
+    assert done.returncode == 4
+    assert b"error: the output could not be written" in done.stderr
+    assert b"Traceback" not in done.stderr

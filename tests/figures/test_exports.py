@@ -1,0 +1,111 @@
+"""What leaves a run for use elsewhere: figures, tables, trajectories, films."""
+
+import csv
+
+import numpy as np
+import pytest
+import xarray
+from PIL import Image
+from synthetic_walks import both_models
+
+from walkerlab.cli.console import Console
+from walkerlab.cli.exports import cell, export_from
+from walkerlab.cli.films import Film, write_film
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, StaleError
+from walkerlab.store.artifact import write
+from walkerlab.store.content import Content
+from walkerlab.store.provenance import begin
+
+QUIET = Console(quiet=True)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "runs" / "paper"
+    folder.mkdir(parents=True)
+    for name, result in both_models().items():
+        extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
+        content = Content(result.groups, {**result.summary, **extra})
+        write(folder / f"{name}.h5", content, result.identity, begin(Config(), {}))
+    return folder
+
+
+@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")])
+def test_a_figure_in_every_format(run, kind, start):
+    path = export_from(run, "figure-07", kind, None, 2, "")
+    assert path.name == f"paper-figure-07.{kind}"
+    assert path.read_bytes().startswith(start)
+
+
+def test_a_figure_for_one_column_is_half_as_wide(run, tmp_path):
+    widths = []
+    for columns in (1, 2):
+        with Image.open(export_from(run, "figure-07", "png", tmp_path / f"{columns}.png", columns, "")) as image:
+            widths.append(image.size[0])
+    assert 2 * widths[0] == widths[1]
+
+
+def test_a_trajectory_as_csv_is_the_stored_one(run):
+    path = export_from(run, "trajectory", "csv", None, 2, "simulate")
+    with path.open() as file:
+        head, *rows = csv.reader(file)
+    stored = both_models()["simulate"]["trajectory"]
+    assert head[0] == "time (s)"
+    assert np.array([float(row[0]) for row in rows]).tolist() == stored["time"].tolist()
+    column = head.index("angle 1 (rad)")
+    assert [float(row[column]) for row in rows] == stored["angle"][:, 1].tolist()
+
+
+def test_a_trajectory_as_netcdf_opens_without_a_group(run):
+    path = export_from(run, "trajectory", "nc", None, 2, "contact-sim")
+    with xarray.open_dataset(path, engine="h5netcdf") as dataset:
+        assert dataset["angle"].dims == ("time", "leg")
+        assert dataset["time"].attrs["units"] == "s"
+
+
+def test_a_table_for_latex_guards_its_letters(run):
+    text = export_from(run, "table-3", "tex", None, 2, "").read_text()
+    assert r"t\_left & s & $0.7$ \\" in text
+    assert cell(1.5e-9) == r"$1.5 \times 10^{-9}$"
+    assert cell("50 %") == r"50 \%"
+
+
+@pytest.mark.parametrize(
+    ("what", "kind", "error", "said"),
+    [
+        ("figure-7", "pdf", ConfigError, "Did you mean figure-07"),
+        ("figure-07", "csv", ConfigError, "cannot be written as csv"),
+        ("figure-11", "pdf", StaleError, "cannot be drawn"),
+    ],
+)
+def test_what_cannot_be_exported_is_told(run, what, kind, error, said):
+    with pytest.raises(error, match=said):
+        export_from(run, what, kind, None, 2, "")
+
+
+def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
+    path = write_film(run, tmp_path / "walk.gif", Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET)
+    with Image.open(path) as film:
+        assert film.n_frames == pytest.approx(7, abs=1)
+        assert film.size == (640, 360)
+        first = np.asarray(film.convert("L"))
+        film.seek(5)
+        assert (np.asarray(film.convert("L")) != first).any()
+
+
+def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for name, said in (("walk.avi", "is no film"), ("walk.mp4", "needs ffmpeg")):
+        with pytest.raises(ConfigError, match=said):
+            write_film(run, tmp_path / name, Film("simulate", 1, 10, 1.0), QUIET)
+
+
+def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
+    tool = tmp_path / "ffmpeg"
+    tool.write_text("#!/bin/sh\n/bin/cat | /usr/bin/wc -c\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    path = write_film(run, tmp_path / "walk.mp4", Film("simulate", 1, 5, 1.0), QUIET)
+    assert int(path.read_bytes()) % (640 * 360 * 3) == 0

@@ -1,0 +1,97 @@
+"""Stages in processes side by side: the same results, told as they come, with a page before all is there."""
+
+from dataclasses import replace
+
+import pytest
+
+from walkerlab.stages.crew import Message, found
+from walkerlab.stages.graph import Graph
+from walkerlab.stages.runner import STILL_COMPUTED, any_side_by_side, execute
+from walkerlab.store.artifact import read
+
+STEEP = "slope_rad=1.2"
+NUMBERS = ("drop", "roll", "bounce", "survey")
+
+
+def with_page_early(graph):
+    return Graph(*(replace(stage, early_with=("drop",)) if stage.name == "page" else stage for stage in graph.stages))
+
+
+@pytest.mark.parametrize("sets", [(), (STEEP,)])
+def test_processes_give_what_one_gives(toy, tmp_path, sets):
+    one = toy.execute("page", *sets)
+    files = {name: one.run_dir / f"{name}.h5" for name in NUMBERS}
+    digests = {name: read(path).digest() for name, path in files.items() if path.exists()}
+    toy.runs = tmp_path / "others"
+    two = toy.execute("page", *sets, jobs=2)
+    assert {name: read(two.run_dir / f"{name}.h5").digest() for name in digests} == digests
+    assert sorted((done.stage, done.action) for done in two.steps) == sorted((d.stage, d.action) for d in one.steps)
+    assert str(two.no_answer) == str(one.no_answer)
+    assert set(two.left_out) == set(one.left_out)
+    assert toy.execute("page", *sets, jobs=2).reused
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_the_page_is_there_before_the_rest_and_says_what_is_missing(toy, listener, jobs):
+    toy.graph = with_page_early(toy.graph)
+    final = toy.execute("page", reporter=listener, jobs=jobs).run_dir / "report.html"
+    assert f"survey: {STILL_COMPUTED}" in listener.pages[0]
+    assert "'drop'" in listener.pages[0]
+    assert STILL_COMPUTED not in final.read_text()
+
+
+def test_every_stage_tells_its_beginning_its_place_and_its_end(toy, listener):
+    toy.execute("page", reporter=listener, jobs=2)
+    stages = [stage for stage, _, _ in listener.begun]
+    assert sorted(stages) == ["bounce", "drop", "page", "picture", "roll", "survey"]
+    assert listener.begun[0][1] == "1 of 6, not there yet"
+    assert [place.split()[0] for _, place, _ in listener.begun] == ["1", "2", "3", "4", "5", "6"]
+    assert listener.ended[-1].startswith("page: ran in")
+    assert "left: page" in listener.ended[-2]
+    assert "dropping" in [label for label, _ in listener.started]
+
+
+def test_a_stage_that_ran_before_tells_how_long_it_took(toy, listener):
+    toy.execute("drop")
+    toy.execute("drop", force=True, reporter=listener)
+    ((_, _, expected),) = listener.begun
+    assert 0.0 <= expected < 60.0
+
+
+def test_what_measures_times_has_nothing_beside_it(toy, listener):
+    toy.graph = Graph(*(replace(stage, alone=stage.name == "survey") for stage in toy.graph.stages))
+    told = []
+    listener.end = lambda said: told.append(said.split(":")[0])
+    begin = listener.begin
+    listener.begin = lambda stage, *rest: told.append(f"{stage} begins") or begin(stage, *rest)
+    toy.execute("page", reporter=listener, jobs=3)
+    place = told.index("survey begins")
+    assert told[place + 1] == "survey"
+    assert {name.split()[0] for name in told[:place] if name.endswith("begins")} == set(told[:place]) & set(NUMBERS)
+
+
+def test_what_fails_in_a_process_is_told_with_its_traceback(toy):
+    toy.edit("roll", "period = ", "period = 1 / 0 + ")
+    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
+        toy.execute("page", jobs=2)
+    assert not (toy.runs / "paper" / "roll.h5").exists()
+
+
+def test_a_process_that_was_killed_is_told():
+    with pytest.raises(Exception, match="ended from outside"):
+        found(Message("died", last=True))
+
+
+def test_a_chain_is_walked_in_one_process(toy):
+    config, _ = toy.loaded()
+    chain = [toy.graph[name] for name in ("drop", "roll")]
+    assert not any_side_by_side(chain, config)
+    assert any_side_by_side([*chain, toy.graph["survey"]], config)
+
+
+def test_no_process_is_left(toy):
+    import multiprocessing
+
+    config, folder = toy.loaded()
+    execute(config, "page", folder, jobs=2, graph=toy.graph)
+    assert multiprocessing.active_children() == []

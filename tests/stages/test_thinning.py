@@ -1,0 +1,54 @@
+"""What is stored of a long walk: less of its middle, and every heel strike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.stages.progress import Silent
+from walkerlab.stages.thinning import FIRST_STEPS, LAST_STEPS, MOST_BETWEEN, thinned
+
+
+@dataclass(frozen=True)
+class Samples:
+    time: NDArray[np.float64]
+    height: NDArray[np.float64]
+
+
+def walk(steps, per_step=50):
+    """Heel strikes at whole numbers, with a sample one rounding before each and one at it."""
+    ends = np.arange(1.0, steps + 1.0)
+    grid = np.arange(steps * per_step) / per_step
+    time = np.unique(np.concatenate((grid, ends, np.nextafter(ends, 0.0))))
+    return Samples(time, np.sin(time)), ends
+
+
+def test_an_ordinary_walk_is_stored_whole():
+    samples, ends = walk(FIRST_STEPS + LAST_STEPS)
+    assert thinned(samples, samples.time, ends, Silent()) is samples
+
+
+def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
+    samples, ends = walk(20_000)
+    kept = thinned(samples, samples.time, ends, Silent())
+    assert np.isin(ends[:-1], kept.time).all()
+    assert np.isin(np.nextafter(ends, 0.0), kept.time).all()
+    assert kept.height.tolist() == np.sin(kept.time).tolist()
+
+
+def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
+    samples, ends = walk(20_000)
+    kept = thinned(samples, samples.time, ends, Silent())
+    first, last = samples.time < FIRST_STEPS, samples.time >= ends.size - LAST_STEPS
+    assert np.isin(samples.time[first | last], kept.time).all()
+    assert kept.time.size <= MOST_BETWEEN + 2 * ends.size + (first | last).sum()
+    assert kept.time.size < samples.time.size / 8
+
+
+def test_it_is_told():
+    told = []
+    progress = Silent()
+    progress.note = told.append
+    samples, ends = walk(1000)
+    thinned(samples, samples.time, ends, progress)
+    assert told[0].startswith("1000 steps: of ")

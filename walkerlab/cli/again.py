@@ -1,0 +1,52 @@
+"""`walkerlab rerun`: a stored result computed again from its own config."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from walkerlab.cli.console import Console
+from walkerlab.cli.earlier import artifact_at
+from walkerlab.cli.failures import print_json
+from walkerlab.config.loader import EarlierRun, load
+from walkerlab.errors import StaleError
+from walkerlab.stages.graph import Graph
+from walkerlab.stages.runner import execute
+from walkerlab.store.runfolder import RunFolder
+
+SHORT = 12
+
+
+def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) -> None:
+    """Run an artifact's stage and all it needs in an empty folder, and say whether its content is the same.
+
+    Raises StaleError if it is not.
+    """
+    stored = artifact_at(path)
+    stage = stored.identity.stage
+    name = path.resolve().parent.name
+    config = load(run=EarlierRun(stored.provenance.config, name, str(path))).config
+    with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
+        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=console, graph=graph)
+        again = None if report.artifact is None else artifact_at(report.artifact)
+    before, after = stored.digest(), None if again is None else again.digest()
+    same_code = again is not None and again.identity.key == stored.identity.key
+    if as_json:
+        print_json(
+            {
+                "stage": stage,
+                "artifact": str(path),
+                "same": before == after,
+                "digest": before,
+                "digest_again": after,
+                "same_code": same_code,
+            }
+        )
+    if before != after:
+        why = "the code is the same" if same_code else "the code has changed since"
+        raise StaleError(
+            f"{path} does not come out again: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
+            "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
+        )
+    if not as_json:
+        print(f"{path} comes out again to the last bit: content {before[:SHORT]}.")

@@ -1,0 +1,261 @@
+"""What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.cli.text import aligned, described_summary
+from walkerlab.report.numbers import MINUS, count, fixed, length, listed, number, quantity
+
+Summary = Mapping[str, Any]
+Answer = Callable[[Summary], list[str]]
+
+SYMBOLS = {
+    "theta_1": "θ₁",
+    "theta_2": "θ₂",
+    "dtheta_1": "θ̇₁",
+    "dtheta_2": "θ̇₂",
+}
+COMPASS = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+SHOWN = 6
+"""So many of a long row of numbers are shown."""
+WORDS = {"as-printed": "as printed", "corrected": "corrected"}
+
+
+def answer(stage: str, summary: Summary) -> list[str]:
+    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short."""
+    return ANSWERS[stage](summary) if stage in ANSWERS else list(described_summary(summary, short=True))
+
+
+def fixedpoint(summary: Summary) -> list[str]:
+    """The gait under both sets of equations, side by side."""
+    slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
+    if "state" not in summary:
+        return [f"No gait on a slope of {slope}: {summary['reason']}."]
+    stable = "a stable gait" if summary["stable"] else "an unstable gait"
+    head = (
+        f"On a slope of {slope} there is {stable}: steps of {fixed(summary['step_length_m'], 4)} m "
+        f"in {fixed(summary['period_s'], 4)} s; the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
+    )
+    sets = summary.get("equation_sets", {})
+    shown = {name: found for name, found in sets.items() if "state" in found} or {summary["equations"]: summary}
+    first = [summary["equations"], *(name for name in shown if name != summary["equations"])]
+    rows = [["", *(WORDS.get(name, name) for name in first), "unit"], *gait_rows([shown[name] for name in first])]
+    found = f"{count(summary['gaits_found'], 'gait')} of one step found."
+    return [head, "", *aligned(rows), "", found]
+
+
+def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
+    """State, multipliers and measures of gaits, one column each."""
+    names = gaits[0].get("state_names") or COMPASS[: len(gaits[0]["state"])]
+    rows = [
+        [symbol(name), *(fixed(gait["state"][place], 6) for gait in gaits), "rad/s" if name.startswith("d") else "rad"]
+        for place, name in enumerate(names)
+    ]
+    most = max(len(gait["multipliers"]) for gait in gaits)
+    rows += [
+        [f"multiplier {place + 1}", *(multiplier(gait["multipliers"], place) for gait in gaits), "1"]
+        for place in range(most)
+    ]
+    rows += [
+        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit]
+        for key, words, written, unit in (
+            ("period_s", "step period", partial(fixed, decimals=5), "s"),
+            ("step_length_m", "step length", partial(fixed, decimals=5), "m"),
+            ("energy_J", "mean energy", partial(fixed, decimals=3), "J"),
+            ("energy_drift_J", "energy drift", partial(number, digits=2), "J"),
+            ("min_normal_force_N", "least normal force", partial(fixed, decimals=1), "N"),
+            ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4), "1"),
+            ("max_scuff_depth_m", "scuffing depth", partial(number, digits=4), "m"),
+        )
+        if any(key in gait for gait in gaits)
+    ]
+    return rows
+
+
+def symbol(name: str) -> str:
+    """A coordinate's symbol, its own name if it has none."""
+    return SYMBOLS.get(name, name)
+
+
+def multiplier(values: Sequence[Sequence[float]], place: int) -> str:
+    """A multiplier as a complex number."""
+    if place >= len(values):
+        return ""
+    real, imaginary = values[place]
+    if imaginary == 0.0:
+        return fixed(real, 4)
+    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)} i"
+
+
+def walk(model: str, summary: Summary) -> list[str]:
+    """How a walk of the rigid or the contact model went, step by step."""
+    steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
+    walked = summary["outcome"] == "walked"
+    head = f"The {model} model walks " + (f"all {count(steps, 'step')}" if walked else count(steps, "step"))
+    head += "" if walked else f" and then: {summary['outcome']}"
+    if periods:
+        head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
+    rows = [["step", *map(str, shown_places(steps)), ""]] if steps else []
+    for words, values, unit in (("period", periods, "s"), ("length", lengths, "m")):
+        if values:
+            rows.append([words, *elided([fixed(value, 4) for value in values]), unit])
+    if summary.get("slips_m"):
+        rows.append(["slip", *elided([fixed(1e3 * value, 2) for value in summary["slips_m"]]), "mm"])
+    own = [[words, said] for words, said in walk_measures(summary) if said]
+    advice = [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != "walked" else []
+    return [f"{head}.", "", *aligned(rows), "", *aligned(own), *advice]
+
+
+def walk_measures(summary: Summary) -> list[tuple[str, str]]:
+    """What was measured over a walk as a whole."""
+    dissipated = summary.get("dissipated_J") or {}
+    lost = listed(f"{quantity(value, 'J', 3)} by {name}" for name, value in dissipated.items())
+    return [
+        ("mean energy", told(summary, "mean_energy_J", "J", 7)),
+        ("energy drift", told(summary, "energy_drift_J", "J", 2)),
+        ("energy balance off by", told(summary, "energy_balance_residual_J", "J", 2)),
+        ("energy lost", lost),
+        ("least normal force", told(summary, "min_normal_force_N", "N")),
+        ("largest friction ratio", told(summary, "max_friction_ratio", "")),
+        ("largest penetration", length(summary["max_penetration_m"]) if "max_penetration_m" in summary else ""),
+        ("scuffing depth", length(summary["max_scuff_depth_m"]) if "max_scuff_depth_m" in summary else ""),
+        ("right-hand sides", told(summary, "rhs_evaluations", "", 9)),
+    ]
+
+
+def told(summary: Summary, key: str, unit: str, digits: int = 4) -> str:
+    """A number of a summary with its unit; nothing if it is not there."""
+    return quantity(summary[key], unit, digits) if key in summary else ""
+
+
+def shown_places(total: int) -> list[Any]:
+    """The numbers of the steps that are shown of so many."""
+    return elided(list(range(1, total + 1)))
+
+
+def elided(values: Sequence[Any]) -> list[Any]:
+    """The values, or of a long row the first and the last ones."""
+    if len(values) <= 2 * SHOWN:
+        return list(values)
+    return [*values[:SHOWN], "…", *values[-2:]]
+
+
+def tune(summary: Summary) -> list[str]:
+    """Whether other initial velocities are needed, and what the contact model's own gait is."""
+    change, gait, cells = summary["adjustment"], summary["gait"], summary["map"]
+    if not change["needed"]:
+        head = "The contact model walks from the rigid gait as it stands: no adjustment is needed."
+    elif change["found"]:
+        swing, stance = number(change["scale_dtheta1"], 4), number(change["scale_dtheta2"], 4)
+        head = f"The smallest change that walks: θ̇₁ by a factor of {swing}, θ̇₂ by {stance}."
+    else:
+        head = f"No start was found that walks: {change['reason']}."
+    rows = [["starts on the map that walk", f"{100 * cells['walks_share']:.1f} % of {cells['cells']}"]]
+    if gait["found"]:
+        rows += [
+            ["own gait", "stable" if gait["stable"] else "unstable"],
+            ["step period", quantity(gait["period_s"], "s")],
+            ["step length", quantity(gait["step_length_m"], "m")],
+            ["slip a step", length(gait["slip_m"])],
+            ["largest multiplier", multiplier(gait["multipliers"], 0)],
+        ]
+    else:
+        rows.append(["own gait", f"none: {gait['reason']}"])
+    for name, margin in change.get("margins", {}).items():
+        beyond = margin["beyond"] or "still walks"
+        rows.append([name.replace("_", " "), f"to a factor of {number(margin['factor'], 4)}; beyond: {beyond}"])
+    return [head, "", *aligned(rows)]
+
+
+def compare(summary: Summary) -> list[str]:
+    """What of the paper's numbers comes out, as printed beside corrected."""
+    verdicts = summary["verdicts"]
+    total = sum(verdicts.values())
+    head = f"Of {total} numbers that the paper prints, " + listed(
+        f"{number} {'is' if number == 1 else 'are'} {name}" for name, number in verdicts.items()
+    )
+    columns, about = ("as_printed", "corrected", "contact"), ("where", "quantity", "printed")
+    rows = [["where", "quantity", "paper", "as printed", "corrected", "contact", "unit", "verdict"]]
+    rows += [
+        [*(row[key] for key in about), *(number(row[key]) for key in columns), row["unit"], row["verdict"]]
+        for row in summary["paper_numbers"]
+    ]
+    return [f"{head}.", "", *aligned(rows)]
+
+
+def accuracy(summary: Summary) -> list[str]:
+    """Which method is fastest at which error, a line a scene."""
+    rows = [["scene", *(f"at {level}" for level in levels(summary["best"]))]]
+    rows += [
+        [scene, *(best.get(level, "no method") for level in levels(summary["best"]))]
+        for scene, best in summary["best"].items()
+    ]
+    head = f"{len(summary['rows'])} runs measured; the fastest method by the error that is asked for:"
+    return [head, "", *aligned(rows), "", *summary["conclusions"].values()]
+
+
+def levels(best: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Every level of error at which some method was best."""
+    return list(dict.fromkeys(level for scene in best.values() for level in scene))
+
+
+def stability(summary: Summary) -> list[str]:
+    """How many cases ended as they should, and those that did not."""
+    total = summary["passed"] + summary["failed"]
+    head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
+    outcomes = Counter((case["family"], case["outcome"]) for case in summary["cases"])
+    rows = [["family", "outcome", "cases"], *([family, end, str(n)] for (family, end), n in outcomes.items())]
+    failed = [case for case in summary["cases"] if not case["ok"]]
+    said = [f"not as expected: {case['name']} ended {case['outcome']}: {case['note']}" for case in failed]
+    said += [
+        f"not as expected: {known['name']}, off by {number(known['error'], 2)}"
+        for known in summary["known"]
+        if not known["ok"]
+    ]
+    return [head, "", *aligned(rows), *said]
+
+
+def plot(summary: Summary) -> list[str]:
+    """The figures."""
+    figures = summary["figures"]
+    return [f"{count(len(figures), 'figure')} drawn.", "", *(f"{one['svg']}  {one['title']}" for one in figures)]
+
+
+def report(summary: Summary) -> list[str]:
+    """What is on the page."""
+    return [f"The page has {count(len(summary['figures']), 'figure')} and {count(len(summary['tables']), 'table')}."]
+
+
+ANSWERS: dict[str, Answer] = {
+    "fixedpoint": fixedpoint,
+    "simulate": partial(walk, "rigid"),
+    "contact-sim": partial(walk, "contact"),
+    "tune": tune,
+    "compare": compare,
+    "accuracy": accuracy,
+    "stability": stability,
+    "plot": plot,
+    "report": report,
+}
+
+
+def verdict(results: Mapping[str, Summary]) -> list[str]:
+    """What a whole run has found, in three lines at most: the gait, both walks, and what of the paper holds."""
+    lines = []
+    if "fixedpoint" in results:
+        lines.append(fixedpoint(results["fixedpoint"])[0])
+    walks = [(words, results[name]) for name, words in WALKS.items() if name in results]
+    said = [f"the {words} model walks {count(one['steps'], 'step')} ({one['outcome']})" for words, one in walks]
+    if said:
+        lines.append(f"{'; '.join(said)}."[:1].upper() + f"{'; '.join(said)}."[1:])
+    last = [compare(results["compare"])[0]] if "compare" in results else []
+    last += [stability(results["stability"])[0]] if "stability" in results else []
+    return [*lines, " ".join(last)] if last else lines
+
+
+WALKS = {"simulate": "rigid", "contact-sim": "contact"}

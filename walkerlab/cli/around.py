@@ -1,0 +1,97 @@
+"""Commands that begin, show and repeat runs: init, open, rerun, export, animate."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkerlab.cli.failures import exit_on_failure
+from walkerlab.cli.options import RUNS, AsJson, Quiet, Runs, Verbose
+from walkerlab.stages.graph import Graph
+
+RunArgument = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
+]
+FIGURES = "figure-07 and so on, table-1 to table-3, table, trajectory"
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    """Add the commands to a program for a pipeline."""
+
+    @app.command("init")
+    def init(
+        file: Annotated[Path, typer.Argument(metavar="FILE", help="The config to be written; it must not exist.")],
+        walker: Annotated[str, typer.Option("--type", metavar="TYPE", help="Type of walker.")] = "compass",
+        quiet: Quiet = False,
+    ) -> None:
+        """Write a commented config to begin with, and a schema by which editors check it."""
+        with exit_on_failure("init", as_json=False):
+            from walkerlab.cli.begin import write_config
+
+            said = write_config(file, walker)
+            if not quiet:
+                print(said)
+
+    @app.command("open")
+    def open_run(
+        run: RunArgument = Path("paper"), runs: Runs = RUNS, quiet: Quiet = False, verbose: Verbose = False
+    ) -> None:
+        """Show a run's page in the browser."""
+        with exit_on_failure("open", as_json=False):
+            from walkerlab.cli.browser import open_file
+            from walkerlab.cli.console import Console
+            from walkerlab.cli.runs import page_of
+
+            page = page_of(run, runs)
+            open_file(page, Console(quiet, verbose))
+            print(page)
+
+    @app.command("rerun")
+    def rerun(
+        artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
+        as_json: AsJson = False,
+        quiet: Quiet = False,
+        verbose: Verbose = False,
+    ) -> None:
+        """Compute a stored result again, from nothing, and say whether it comes out the same."""
+        with exit_on_failure("rerun", as_json):
+            from walkerlab.cli.again import rerun_artifact
+            from walkerlab.cli.console import Console
+
+            rerun_artifact(artifact, graph, Console(quiet, verbose), as_json)
+
+    @app.command("export")
+    def export(
+        run: RunArgument,
+        what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
+        to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")],
+        output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Where to.")] = None,
+        columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 2,
+        model: Annotated[str, typer.Option(metavar="STAGE", help="Whose trajectory.")] = "contact-sim",
+        runs: Runs = RUNS,
+    ) -> None:
+        """Write a figure, a table or a trajectory of a run for use elsewhere."""
+        with exit_on_failure("export", as_json=False):
+            from walkerlab.cli.exports import export_from
+            from walkerlab.cli.runs import folder_of
+
+            print(export_from(folder_of(run, runs), what, to, output, columns, model))
+
+    @app.command("animate")
+    def animate(
+        run: RunArgument,
+        to: Annotated[Path, typer.Option("--to", metavar="FILE", help="A .gif, or an .mp4 where ffmpeg is found.")],
+        model: Annotated[str, typer.Option(metavar="STAGE", help="Whose walk.")] = "contact-sim",
+        steps: Annotated[int, typer.Option(min=1, help="Steps that are shown.")] = 4,
+        rate: Annotated[int, typer.Option(min=1, max=60, help="Pictures a second.")] = 25,
+        slower: Annotated[float, typer.Option(min=0.01, help="So many times slower than life.")] = 1.0,
+        runs: Runs = RUNS,
+        quiet: Quiet = False,
+    ) -> None:
+        """Draw a run's walk as a moving picture."""
+        with exit_on_failure("animate", as_json=False):
+            from walkerlab.cli.console import Console
+            from walkerlab.cli.films import Film, write_film
+            from walkerlab.cli.runs import folder_of
+
+            print(write_film(folder_of(run, runs), to, Film(model, steps, rate, slower), Console(quiet)))

@@ -1,0 +1,44 @@
+"""`walkerlab init`: a commented config to begin with."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin_names
+from walkerlab.config.loader import load, safe_name
+from walkerlab.config.problems import nearest
+from walkerlab.config.reference import as_json_schema
+from walkerlab.errors import ConfigError, StorageError
+from walkerlab.store.files import storing
+
+SCHEMA = ".walkerlab-schema.json"
+
+
+def write_config(file: Path, walker: str) -> str:
+    """Write the built-in config of a type of walker as one of the user's own, and the schema beside it.
+
+    Raises ConfigError if there is no such type, StorageError if the file exists or cannot be written.
+    """
+    text = (BUILTIN_FOLDER / f"{template(walker)}.yaml").read_text(encoding="utf-8")
+    if file.exists():
+        raise StorageError(f"{file} is there already.", "Choose another name; nothing was overwritten.")
+    lines = [line for line in text.splitlines() if not line.startswith("name:")]
+    head = [f"# yaml-language-server: $schema={SCHEMA}", f"name: {safe_name(file.stem)}"]
+    with storing(file):
+        (file.parent / SCHEMA).write_text(json.dumps(as_json_schema(), indent=1) + "\n", encoding="utf-8")
+        file.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
+    return f"{file} written, with its schema beside it; next: `walkerlab report -c {shlex.quote(str(file))}`"
+
+
+def template(walker: str) -> str:
+    """The built-in config of a type of walker, the paper's before others; ConfigError if there is none."""
+    types: dict[str, str] = {}
+    for name in (DEFAULT, *builtin_names()):
+        types.setdefault(load(Path(name)).config.walker.type, name)
+    if walker not in types:
+        near = nearest(walker, types)
+        meant = f" Did you mean {near}?" if near else ""
+        raise ConfigError(f"there is no type of walker {walker!r}.{meant}", f"There are {', '.join(types)}.")
+    return types[walker]

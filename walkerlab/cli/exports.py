@@ -1,0 +1,139 @@
+"""`walkerlab export`: figures, tables and trajectories of a run as files for use elsewhere."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from walkerlab.config.problems import nearest
+from walkerlab.errors import ConfigError, StaleError
+from walkerlab.store.artifact import Damaged, Stored, read
+from walkerlab.store.content import Group
+from walkerlab.store.files import write_atomically
+
+FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
+TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
+TRAJECTORY = "trajectory"
+TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
+
+
+def export_from(folder: Path, what: str, kind: str, output: Path | None, columns: int, model: str) -> Path:
+    """Write one thing of a run as a file of a kind, and say where it is.
+
+    Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
+    """
+    if what == TRAJECTORY:
+        data = written(what, kind, TRAJECTORY_KINDS, lambda: trajectory(result(folder, model), kind))
+    elif what in TABLES:
+        data = written(what, kind, TABLE_KINDS, lambda: table(result(folder, "compare").summary[TABLES[what]], kind))
+    else:
+        data = written(what, kind, FIGURE_KINDS, lambda: figure(folder, what, kind, columns))
+    path = output or Path(f"{folder.resolve().name}-{what}.{kind}")
+    write_atomically(path, data)
+    return path
+
+
+def written(what: str, kind: str, kinds: Sequence[str], make: Callable[[], bytes]) -> bytes:
+    """What `make` makes; ConfigError if there is no such kind of it."""
+    if kind not in kinds:
+        raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
+    return make()
+
+
+def result(folder: Path, stage: str) -> Stored:
+    """A stage's stored result; StaleError if there is none."""
+    try:
+        return read(folder / f"{stage}.h5")
+    except (FileNotFoundError, Damaged):
+        advice = f"`walkerlab {stage} -c {folder}` makes it." if folder.is_dir() else ""
+        raise StaleError(f"{folder} has no result of {stage}.", advice) from None
+
+
+def figure(folder: Path, name: str, kind: str, columns: int) -> bytes:
+    """A figure, drawn anew for one or two columns of a journal."""
+    # Imported here: a table needs no drawing.
+    from walkerlab.figures.registry import FIGURES
+
+    named = {one.name: one for one in FIGURES}
+    if name not in named:
+        near = nearest(name, (*named, *TABLES, TRAJECTORY))
+        meant = f" Did you mean {near}?" if near else ""
+        raise ConfigError(f"there is no {name}.{meant}", f"There are {', '.join((*named, *TABLES, TRAJECTORY))}.")
+    illustration = named[name]
+    stored = {path.stem: read(path) for path in sorted(folder.glob("*.h5"))}
+    why = illustration.why_left_out(stored, {})
+    if why is not None:
+        raise StaleError(f"{name} cannot be drawn: {why}.", f"`walkerlab plot -c {folder}` makes what it needs.")
+    return illustration.as_file(stored, kind, columns)
+
+
+def table(rows: Any, kind: str) -> bytes:
+    """A table of a summary: rows of objects, or objects by row."""
+    if isinstance(rows, Mapping):
+        rows = [{"quantity": name, **row} for name, row in rows.items()]
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    return csv_of(names, [[row.get(key) for key in names] for row in rows]) if kind == "csv" else tex_of(names, rows)
+
+
+def csv_of(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> bytes:
+    """Rows as CSV with a head; nothing where a value is missing."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([["" if value is None else value for value in row] for row in rows])
+    return text.getvalue().encode()
+
+
+def tex_of(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bytes:
+    """Rows as a LaTeX table for the package booktabs; sentences are left out."""
+    kept = [name for name in names if name not in ("evidence", "why")]
+    lines = [" & ".join(cell(row.get(name)) for name in kept) + r" \\" for row in rows]
+    head = " & ".join(cell(name.replace("_", " ")) for name in kept) + r" \\"
+    body = [rf"\begin{{tabular}}{{{'l' * len(kept)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
+    return "\n".join([*body, r"\end{tabular}", ""]).encode()
+
+
+def cell(value: Any) -> str:
+    """A value in a LaTeX table: numbers in maths, text with its special letters guarded."""
+    if value is None:
+        return "--"
+    if isinstance(value, float):
+        mantissa, _, exponent = f"{value:.5g}".partition("e")
+        return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
+    return str(value).translate(TEX)
+
+
+def trajectory(stored: Stored, kind: str) -> bytes:
+    """A walk in time: a column for each variable and leg, or a netCDF file."""
+    group = stored.groups.get(TRAJECTORY)
+    if group is None:
+        raise StaleError("the walk was stored without a trajectory.", "outputs: [states, energies, forces] has it.")
+    if kind == "nc":
+        # Imported here: CSV needs no HDF5.
+        from walkerlab.store import hdf5
+
+        about = {"title": f"walkerlab {stored.identity.stage}", "content_digest": stored.digest()}
+        return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
+    names, values = columns_of(group)
+    return csv_of(names, list(zip(*values, strict=True)))
+
+
+def columns_of(group: Group) -> tuple[list[str], list[list[Any]]]:
+    """Names with units, and values, of what a group has over time."""
+    names, values = [], []
+    for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
+        if variable.dims[:1] != ("time",):
+            continue
+        unit = f" ({variable.units})" if variable.units not in ("", "1") else ""
+        if len(variable.dims) == 1:
+            names.append(name + unit)
+            values.append(variable.values.tolist())
+        else:
+            for place in range(variable.values.shape[1]):
+                names.append(f"{name} {place}{unit}")
+                values.append(variable.values[:, place].tolist())
+    return names, values

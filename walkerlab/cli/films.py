@@ -1,0 +1,92 @@
+"""`walkerlab animate`: a walk as GIF, or as MP4 where ffmpeg is found."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from walkerlab.cli.console import Console
+from walkerlab.errors import ConfigError, StaleError, StorageError
+from walkerlab.store.artifact import read
+from walkerlab.store.files import write_atomically
+
+KINDS = (".gif", ".mp4")
+
+
+@dataclass(frozen=True)
+class Film:
+    """What is shown.
+
+    model   the stage whose walk it is
+    steps   how many of its steps
+    rate    pictures a second
+    slower  so many times slower than life
+    """
+
+    model: str
+    steps: int
+    rate: int
+    slower: float
+
+
+def write_film(folder: Path, path: Path, film: Film, console: Console) -> Path:
+    """Draw a run's walk, picture by picture, and write the film.
+
+    Raises ConfigError for a kind of file that there is not, StaleError if there is no walk to draw, StorageError.
+    """
+    if path.suffix not in KINDS:
+        raise ConfigError(f"{path.name} is no film.", f"--to a name that ends in {' or '.join(KINDS)}")
+    ffmpeg = shutil.which("ffmpeg")
+    if path.suffix == ".mp4" and ffmpeg is None:
+        raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
+    # Imported here: what cannot be written is told before anything is loaded that draws.
+    from walkerlab.figures.film import pictures, sticks_of, times, why_not
+
+    results = {file.stem: read(file) for file in sorted(folder.glob("*.h5")) if file.stem == film.model}
+    why = why_not(results, film.model)
+    if why is not None:
+        raise StaleError(f"the walk cannot be drawn: {why}.", f"`walkerlab {film.model} -c {folder}` makes it.")
+    sticks = sticks_of(results, film.model)
+    at = times(sticks, film.steps, film.rate, film.slower)
+    line = console.begin("animate", f"{at.size} pictures")
+    line.start("drawing", int(at.size))
+    drawn = told(pictures(sticks, at), line)
+    data = gif(drawn, film.rate) if path.suffix == ".gif" else mp4(drawn, film.rate, str(ffmpeg))
+    write_atomically(path, data)
+    line.end("")
+    return path
+
+
+def told(drawn: Iterable[Any], line: Any) -> Iterable[Any]:
+    """The pictures, each counted."""
+    for picture in drawn:
+        yield picture
+        line.advance()
+
+
+def gif(drawn: Iterable[Any], rate: int) -> bytes:
+    """The pictures as a GIF that goes round and round."""
+    from PIL import Image
+
+    frames = [Image.fromarray(picture).quantize(64) for picture in drawn]
+    file = io.BytesIO()
+    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
+    return file.getvalue()
+
+
+def mp4(drawn: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
+    """The pictures as an MP4 that browsers and slides play; StorageError if ffmpeg fails."""
+    frames = list(drawn)
+    height, width, _ = frames[0].shape
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
+    coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
+    command = [ffmpeg, "-loglevel", "error", *raw, *coded]
+    done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)
+    if done.returncode:
+        raise StorageError(f"ffmpeg failed: {done.stderr.decode(errors='replace').strip()}", "Write a .gif instead.")
+    return done.stdout

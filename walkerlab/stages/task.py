@@ -1,0 +1,114 @@
+"""One stage ready to run, here or in another process."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from walkerlab.config.canonical import only
+from walkerlab.config.schema import Config
+from walkerlab.stages.graph import Stage
+from walkerlab.stages.plan import LeftOut
+from walkerlab.stages.progress import Progress
+from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Content
+from walkerlab.store.files import drawing_into
+from walkerlab.store.parts import Parts
+from walkerlab.store.runfolder import RunFolder
+
+
+@dataclass(frozen=True)
+class Task:
+    """A stage with all that it is given.
+
+    reads     the keys of the config that it is shown
+    inputs    the results that it gets
+    jobs      processes for independent cells, None if it has none
+    key       of its result, if it keeps parts of it; parts of another key are not used
+    left_out  the results that it has to do without, if it draws
+    """
+
+    name: str
+    module: str
+    config: Config
+    reads: tuple[str, ...]
+    inputs: Mapping[str, Stored]
+    folder: RunFolder
+    jobs: int | None = None
+    key: str | None = None
+    left_out: tuple[LeftOut, ...] | None = None
+
+    def run(self, progress: Progress) -> Content:
+        """Call the stage's `run` with what it declared and nothing else."""
+        # Imported now and not before: a stage brings its libraries and compiled code along.
+        run = importlib.import_module(self.module).run
+        extra: dict[str, Any] = {} if self.jobs is None else {"jobs": self.jobs}
+        if self.key is not None:
+            extra["parts"] = Parts(self.folder.parts(self.name), self.key)
+        config = only(self.config, self.reads)
+        if self.left_out is not None:
+            extra |= {"folder": self.folder.path, "left_out": self.left_out}
+            with drawing_into(self.folder.path):
+                content = run(config, self.inputs, progress, **extra)
+        else:
+            content = run(config, self.inputs, progress, **extra)
+        if not isinstance(content, Content):
+            raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
+        return content
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """The kernels of a stage, compiled before it runs if nothing is compiled yet; what fails, the stage will tell."""
+
+    module: str
+    config: Config
+
+    def run(self) -> None:
+        """Compile them."""
+        with contextlib.suppress(Exception):
+            module = importlib.import_module(self.module)
+            if nothing_compiled_yet():
+                module.compile_kernels(self.config)
+
+
+def task_of(
+    stage: Stage,
+    config: Config,
+    inputs: Mapping[str, Stored],
+    folder: RunFolder,
+    *,
+    jobs: int,
+    key: str,
+    left_out: tuple[LeftOut, ...],
+) -> Task:
+    """The task of a stage; it is given of the rest what it asks for."""
+    return Task(
+        stage.name,
+        stage.module,
+        config,
+        stage.reads,
+        inputs,
+        folder,
+        jobs if stage.has_cells else None,
+        key if stage.keeps_parts else None,
+        left_out if stage.draws else None,
+    )
+
+
+def nothing_compiled_yet() -> bool:
+    """Whether what was imported has kernels, and none of them was compiled on this machine yet."""
+    kernels = sys.modules.get("walkerlab.kernels")
+    return kernels is not None and bool(kernels.nothing_compiled_yet())
+
+
+@contextlib.contextmanager
+def kernels_told_of(tell: Callable[[str], None]) -> Iterator[None]:
+    """Have `tell` told what is compiled meanwhile; a stage without kernels is not asked."""
+    kernels = sys.modules.get("walkerlab.kernels")
+    with kernels.watched(tell) if kernels is not None else contextlib.nullcontext():
+        yield
