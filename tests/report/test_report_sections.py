@@ -27,6 +27,7 @@ from walkerlab.report.blocks import PAPER, Code, Findings, Paragraph, Player, Se
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections.gaits import coordinate
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.tracks import Track, slip_since_touch
 
@@ -222,6 +223,17 @@ def test_both_sets_of_equations_stand_side_by_side():
     assert found["stable"] == ["no", "yes"]
     assert found["step period T (s)"] == ["0.700000"] * 2
     assert found["multipliers λ₁"] == ["0.3626 + 0.4603i"] * 2
+
+
+def test_the_coordinates_of_any_walker_have_their_signs():
+    names = ("theta_1", "theta_1_shank", "theta_torso", "dtheta_1_shank", "q_7")
+    assert [coordinate(name) for name in names] == [
+        "θ₁ (rad)",
+        "θ₁, shank (rad)",
+        "θ, torso (rad)",
+        "θ̇₁, shank (rad/s)",
+        "q_7 (rad)",
+    ]
 
 
 def test_a_set_of_equations_without_a_gait_is_left_away():

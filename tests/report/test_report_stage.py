@@ -12,7 +12,7 @@ from walkerlab.errors import StorageError
 from walkerlab.report.images import fitting
 from walkerlab.stages import report
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import LeftOut
+from walkerlab.stages.plan import STILL_COMPUTED, LeftOut
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.report import write_pages
 from walkerlab.store.index import broken_file, indexed_files
@@ -71,6 +71,18 @@ def test_figures_have_the_papers_numbers_only_where_the_scene_is_the_papers(tmp_
     assert run(tmp_path, inputs=inputs | {"compare": departs}).summary["figures"] == ["Legs."]
 
 
+def test_the_report_of_another_scene_only_links_the_paper(tmp_path):
+    departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
+    inputs = {"fixedpoint": EVERYTHING["fixedpoint"](), "compare": departs, "plot": plot(tmp_path)}
+    run(tmp_path, "source=null", inputs=inputs)
+    page = Page((tmp_path / "report.html").read_text())
+    words = " ".join(
+        text for tag in page.words if tag not in ("style", "script", "code", "a") for text in page.said(tag)
+    )
+    assert "the paper" not in words.replace("config paper", "").lower()
+    assert {"href": "report-paper.html"} in page.all("a")
+
+
 def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     left_out = [LeftOut("compare", "not yet"), LeftOut("tune", "the config has no contact block")]
     write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out, ("compare", "accuracy"))
@@ -79,6 +91,11 @@ def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     assert sum("Still being computed: " in text for text in page.said("p")) == 3
     assert "not yet" not in page.text
     assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
+
+
+def test_a_drawing_made_early_says_what_it_waits_for(tmp_path):
+    run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("compare", STILL_COMPUTED)])
+    assert "Still being computed: compare." in Page((tmp_path / "report.html").read_text()).text
 
 
 def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):

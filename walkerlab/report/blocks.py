@@ -123,8 +123,8 @@ class Table(Block):
 
 
 @dataclass(frozen=True)
-class Picture(Block):
-    """A drawn figure, embedded.
+class Picture:
+    """A drawn figure, embedded; a gallery shows it.
 
     title    what it shows, in a line
     caption  how to read it
@@ -136,7 +136,6 @@ class Picture(Block):
     page     the file that it is on
     """
 
-    template: ClassVar[str] = "picture"
     title: str
     caption: str
     alt: str

@@ -59,13 +59,17 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
     name = element.tag.removeprefix(SVG)
     if name not in SHAPES:
         return Markup("")
-    kept = attributes(element, used)
-    inside = Markup("").join(markup(child, used) for child in element)
-    text = escape(element.text.strip()) if name in ("text", "tspan") and element.text else ""
-    tails = Markup("").join(escape((child.tail or "").strip()) for child in element) if name == "text" else ""
+    inside = words(element.text, name)
+    for child in element:
+        inside += markup(child, used) + words(child.tail, name)
     if name in ("g", "defs") and not inside:
         return Markup("")
-    return Markup("<{0}{1}>{2}{3}{4}</{0}>").format(Markup(name), kept, text, inside, tails)
+    return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes(element, used), inside)
+
+
+def words(text: str | None, name: str) -> Markup:
+    """What an element says, if it is one that says something."""
+    return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
 def attributes(element: ET.Element, used: set[str]) -> Markup:

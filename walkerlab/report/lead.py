@@ -9,8 +9,6 @@ from walkerlab.config.schema import Config
 from walkerlab.report.numbers import count, length, number, quantity
 from walkerlab.report.results import Results
 
-"""Radius of a foot, in leg lengths, above which it is called round."""
-
 
 def title(run: str) -> str:
     """The page's heading."""
@@ -29,8 +27,8 @@ def scene(config: Config, run: str) -> str:
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of "
-        f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
+        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of {number(config.slope_rad)} rad "
+        f"({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
 

@@ -72,7 +72,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     if links is not None:
         place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
         main.insert(place, links)
-    redone = "A variation on" if results.departures else "Redoes"
+    redone = "After" if results.departures else "Redoes"
     report = Page(title(run), tuple(main), lead(results, run), MAIN, results.config.source, redone, results.pending)
     beside = (
         Page(f"{name} · {run}", found, file=file)

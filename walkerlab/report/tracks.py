@@ -156,13 +156,4 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 def sampling_gap(config: Config) -> float:
     """Time between samples (s): as many a pendulum time for every size of walker."""
-    return math.sqrt(9.81 / config.gravity_m_s2 * leg_length(config.walker)) / SAMPLES_A_SECOND
-
-
-def leg_length(walker: Any) -> float:
-    """Hip to sole, m, of any type of walker."""
-    if hasattr(walker, "leg_length_m"):
-        return float(walker.leg_length_m)
-    if hasattr(walker, "thigh") and hasattr(walker, "shank"):
-        return float(walker.thigh.length_m + walker.shank.length_m)
-    return 1.0
+    return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

@@ -119,7 +119,19 @@ class Graph:
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
 PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = ("name", "source", *MODEL, "contact", "solver", "tune", "stability", "continuation", "basin", "seed")
+EVERYTHING = (
+    "name",
+    "source",
+    *MODEL,
+    "contact",
+    "solver",
+    "tune",
+    "stability",
+    "continuation",
+    "basin",
+    "sweep",
+    "seed",
+)
 
 PIPELINE = Graph(
     Stage(

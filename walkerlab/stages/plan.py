@@ -32,6 +32,8 @@ class LeftOut:
 
 
 NO_CONTACT = "the config has no contact block"
+STILL_COMPUTED = "still being computed"
+"""Why a drawing made early has to do without a result."""
 
 
 ANOTHER_WALKER = "it is about the paper's compass, and this is another walker"

@@ -14,7 +14,7 @@ from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.further import TITLES
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import LeftOut, why_unsuited
+from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, why_unsuited
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
@@ -37,7 +37,8 @@ def run(
     Raises StorageError if a page cannot be stored.
     """
     progress.start("report", 1)
-    written, results = write_pages(whole(config), inputs, folder, left_out)
+    pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
+    written, results = write_pages(whole(config), inputs, folder, left_out, pending)
     progress.advance()
     tables = [block for page in written for block in blocks_of(page.sections) if isinstance(block, Table)]
     return Content(

@@ -17,6 +17,7 @@ from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
     ANOTHER_WALKER,
+    STILL_COMPUTED,
     LeftOut,
     Planner,
     Step,
@@ -37,8 +38,6 @@ from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 
 __all__ = ["Done", "StageReport", "execute", "plan", "preview"]
-
-STILL_COMPUTED = "still being computed"
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ def section(results: Results) -> Section | None:
     if not rows:
         return None
     columns = [Column("assumption"), Column("measured", wide=True), Column("value", numeric=True), Column("verdict")]
-    caption = "What the rigid model assumes (sections 3.1 and 3.2), and what its walk says"
+    where = " (sections 3.1 and 3.2)" if results.of_the_paper else ""
+    caption = f"What the rigid model assumes{where}, and what its walk says"
     return Section("assumptions", "Assumptions, checked", (table(caption, columns, rows, wordy=True),), finding(rows))
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from walkerlab.report.blocks import MAIN, Block, Cards, Section, Waiting
+from walkerlab.report.blocks import CASES, COSTS, MAIN, PAPER, Block, Cards, Section, Waiting
 from walkerlab.report.results import Results
 
 TITLES = {
-    "report-paper.html": "Number by number: the paper and what is found here",
-    "report-stability.html": "Extreme cases and known problems",
-    "report-accuracy.html": "Accuracy: what an error costs, and the rigid limit",
+    PAPER: "Number by number: the paper and what is found here",
+    CASES: "Extreme cases and known problems",
+    COSTS: "Accuracy: what an error costs, and the rigid limit",
 }
 """The pages beside the report, in their order."""
 
@@ -32,13 +32,14 @@ WAITED_FOR = {
 def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
     """Links to the other pages, each with what it comes to, and what will be there."""
     items = tuple(
-        (file, title, brief(on(file, elsewhere)))
+        (file, title, "" if file == PAPER and not results.of_the_paper else brief(on(file, elsewhere)))
         for file, title in TITLES.items()
         if any(one.page == file for one in elsewhere)
     )
     blocks: list[Block] = [Cards(items)] if items else []
     blocks += [Waiting(f"Still being computed: {WAITED_FOR.get(name, name)}.") for name in results.pending]
-    return Section("further", "Further pages", tuple(blocks)) if blocks else None
+    title = "Further pages" if items else "Still to come"
+    return Section("further", title, tuple(blocks)) if blocks else None
 
 
 def brief(sections: Iterable[Section]) -> str:

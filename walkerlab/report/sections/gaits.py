@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import Block, Column, Paragraph, Section, Table, body, table
-from walkerlab.report.numbers import MINUS, fixed, number, power_of_ten, quantity
+from walkerlab.report.numbers import MINUS, NONE, fixed, number, power_of_ten, quantity
 from walkerlab.report.results import Results
+from walkerlab.report.symbols import DOT, SUBSCRIPTS, in_signs
 from walkerlab.store.content import Group
 
-STATE = ("θ₁, swing leg (rad)", "θ₂, stance leg (rad)", "θ̇₁ (rad/s)", "θ̇₂ (rad/s)")
+COORDINATE = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
+STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+"""The coordinates of a compass; results of other walkers name theirs."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """The sets of equations, as they are stored and as they are called."""
 
@@ -20,11 +24,13 @@ def section(results: Results) -> Section | None:
     summary = results.summary("fixedpoint")
     if summary is None:
         return None
-    sets = {name: found for name in SETS if (found := set_of(summary, name)) is not None}
+    names = summary.get("state_names", STATE)
+    shown = SETS if results.of_the_paper else (summary["equations"],)
+    sets = {name: found for name in shown if (found := set_of(summary, name)) is not None}
     blocks: list[Block] = [Paragraph(in_words(summary))]
     if sets:
-        blocks.append(gait_table(sets))
-    every = found_gaits(results)
+        blocks.append(gait_table(sets, names))
+    every = found_gaits(results, shown, names)
     if every is not None:
         blocks.append(every)
     return Section("gait", "The gait", tuple(blocks), finding(summary))
@@ -48,30 +54,52 @@ def in_words(summary: Mapping[str, Any]) -> str:
     """What the multipliers say, and how a state is given."""
     way = "die out" if summary["stable"] else "grow"
     return (
-        f"With the {SETS[summary['equations']]} equations small disturbances {way} by the largest multiplier a step. "
+        f"Small disturbances {way} by the largest multiplier a step. "
         "A state is given just after the heel strike, angles absolute, from the vertical."
     )
 
 
-def gait_table(sets: Mapping[str, Mapping[str, Any]]) -> Table:
+def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Table:
     """Fixed point and multipliers, the sets side by side."""
-    rows = [[label, *(fixed(gait["state"][i], 6) for gait in sets.values())] for i, label in enumerate(STATE)]
+    rows = [[coordinate(name), *(fixed(gait["state"][i], 6) for gait in sets.values())] for i, name in enumerate(names)]
     for key, label, digits in (("period_s", "step period T (s)", 6), ("step_length_m", "step length S (m)", 6)):
         rows.append([label, *(fixed(gait[key], digits) for gait in sets.values())])
-    for i, label in enumerate(("multipliers λ₁", "λ₂", "λ₃")):
-        rows.append([label, *(complex_number(*gait["multipliers"][i]) for gait in sets.values())])
+    for i in range(max(len(gait["multipliers"]) for gait in sets.values())):
+        label = in_signs(f"{'multipliers ' if i == 0 else ''}lambda_{i + 1}")
+        rows.append([label, *(multiplier(gait, i) for gait in sets.values())])
     rows.append(["spectral radius", *(fixed(gait["spectral_radius"], 5) for gait in sets.values())])
     rows.append(["stable", *("yes" if gait["stable"] else "no" for gait in sets.values())])
     rows.append(["energy from the stance foot (J)", *(fixed(gait["energy_J"], 3) for gait in sets.values())])
     rows.append(["residual of the step map", *(power_of_ten(gait["residual"], 2) for gait in sets.values())])
+    if len(sets) < 2:
+        columns = [Column("quantity"), *(Column(SETS[name], numeric=True) for name in sets)]
+        return table("Fixed point of the step map and its multipliers", columns, rows)
     columns = [Column("quantity"), *(Column(SETS[name], numeric=True) for name in sets)]
+    note = "As printed: Appendix A with its misprint in eq. A.5, as the paper's own code; corrected: without it."
     return table(
-        "Fixed point of the step map and its multipliers, under both sets of equations",
-        columns,
-        rows,
-        note="As printed: Appendix A with its misprint in eq. A.5, which the paper's own code had too; "
-        "corrected: without it.",
+        "Fixed point of the step map and its multipliers, under both sets of equations", columns, rows, note=note
     )
+
+
+def coordinate(name: str) -> str:
+    """A coordinate with its unit."""
+    return f"{symbol(name)} ({'rad/s' if name.startswith('d') else 'rad'})"
+
+
+def symbol(name: str) -> str:
+    """A coordinate's sign, and the body that it is of: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
+    found = COORDINATE.fullmatch(name)
+    if found is None:
+        return name
+    dot = DOT if found["rate"] else ""
+    body = f", {found['body'].replace('_', ' ')}" if found["body"] else ""
+    return f"θ{dot}{(found['index'] or '').translate(SUBSCRIPTS)}{body}"
+
+
+def multiplier(gait: Mapping[str, Any], index: int) -> str:
+    """A multiplier of a gait; a dash if it has fewer."""
+    found = gait["multipliers"]
+    return complex_number(*found[index]) if index < len(found) else NONE
 
 
 def complex_number(real: float, imaginary: float) -> str:
@@ -81,14 +109,14 @@ def complex_number(real: float, imaginary: float) -> str:
     return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"
 
 
-def found_gaits(results: Results) -> Table | None:
+def found_gaits(results: Results, sets: Iterable[str], names: Sequence[str]) -> Table | None:
     """All gaits that the search found, if it was more than one of a set."""
-    groups = {name: results.group("fixedpoint", f"{name}/gaits") for name in SETS}
+    groups = {name: results.group("fixedpoint", f"{name}/gaits") for name in sets}
     bodies = [body(gait_rows(group), SETS[name]) for name, group in groups.items() if group is not None]
     if all(len(one.rows) < 2 for one in bodies):
         return None
-    heads = ("gait", "T (s)", "S (m)", "θ₁", "θ₂", "θ̇₁", "θ̇₂", "spectral radius", "stable", "remark")
-    columns = tuple(Column(head, numeric=index not in (8, 9)) for index, head in enumerate(heads))
+    heads = ("gait", "T (s)", "S (m)", *map(symbol, names), "spectral radius")
+    columns = (*(Column(head, numeric=True) for head in heads), Column("stable"), Column("remark"))
     return Table("Every gait of one step that was found", columns, tuple(bodies))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from walkerlab.report.blocks import Block, Pad, Player, Section, Walker
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
 from walkerlab.report.results import Results
-from walkerlab.report.tracks import Array, Track, leg_length, sampling_gap, track_of
+from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
 
 MOST_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
@@ -38,8 +38,8 @@ def section(results: Results) -> Section | None:
 def player(results: Results, tracks: dict[str, Track]) -> Block:
     """The walkers on their ground."""
     config, gap = results.config, sampling_gap(results.config)
-    length = leg_length(config.walker)
-    torso = getattr(config.walker, "torso", None)
+    length = config.walker.leg_length_m
+    torso = config.walker.torso
     return Player(
         title="The walk.",
         caption=caption(results, tuple(tracks)),
@@ -47,8 +47,8 @@ def player(results: Results, tracks: dict[str, Track]) -> Block:
         walkers=tuple(walker(results, stage, track, gap) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,
         leg_m=length,
-        foot_radius_m=float(getattr(config.walker, "foot_radius_m", 0.0)),
-        torso_m=0.0 if torso is None else float(torso.above_hip_m),
+        foot_radius_m=config.walker.foot_radius_m,
+        torso_m=0.0 if torso is None else torso.above_hip_m,
         ordinary_force=weight(tracks),
         closeup_m=closeup(tracks, length),
         pads=pads(results),
