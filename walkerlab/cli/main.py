@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import around, housekeeping
+from walkerlab.cli import around, housekeeping, sweep
+from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -16,14 +17,19 @@ from walkerlab.cli.options import (
     ConfigFile,
     DryRun,
     Force,
+    From,
     Full,
     Jobs,
+    Model,
     NoWait,
     Open,
+    Over,
+    Periods,
     Quiet,
     Runs,
     Sets,
     Strides,
+    To,
     Verbose,
     typed_options,
 )
@@ -50,6 +56,8 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
     around.add_to(app, graph)
+    sweep.add_to(app, graph)
+    whole_runs.add_to(app, graph)
     return app
 
 
@@ -75,6 +83,11 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         config: ConfigFile = None,
         sets: Sets = None,
         strides: Strides = None,
+        over: Over = None,
+        begin: From = None,
+        end: To = None,
+        model: Model = None,
+        periods: Periods = None,
         runs: Runs = RUNS,
         jobs: Jobs = None,
         full: Full = False,
@@ -91,7 +104,8 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose, open_page)
+            settings = (*(sets or ()), *following(over, begin, end, model, periods))
+            request = Request(config, settings, strides, runs, as_json, quiet, verbose, open_page)
             asked.run_dir = request.folder.path
             cores = jobs or all_cores()
             run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=cores, full=full)
@@ -102,6 +116,7 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         "full": bool(graph.campaigns_of(stage.name)),
         "open_page": last,
     }
+    meant |= dict.fromkeys(("over", "begin", "end", "model", "periods"), stage.follows)
     meaningless = {name for name, has in meant.items() if not has}
     signature = inspect.signature(command)
     options = [option for name, option in signature.parameters.items() if name not in meaningless]
@@ -112,3 +127,13 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
 def all_cores() -> int:
     """The processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def following(
+    over: str | None, begin: float | None, end: float | None, model: str | None, periods: int | None
+) -> tuple[str, ...]:
+    """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
+    if over is not None and (begin is None or end is None):
+        raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+    given = {"over": over, "from": begin, "to": end, "model": model, "periods": periods}
+    return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)

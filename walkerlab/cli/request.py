@@ -8,7 +8,7 @@ from pathlib import Path
 
 from walkerlab.cli.console import Console
 from walkerlab.cli.options import typed_options
-from walkerlab.config.loader import EarlierRun, LoadedConfig, load
+from walkerlab.config.loader import EarlierRun, LoadedConfig, Template, template
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
 
@@ -53,9 +53,10 @@ class Request:
         return run_at(self.config)
 
     @cached_property
-    def loaded(self) -> LoadedConfig:
-        """The config, its warnings said; ConfigError if it is not usable."""
-        loaded = load(self.config, self.sets, self.strides, self.earlier)
+    def template(self) -> Template:
+        """The config, ready to be varied, its warnings said; ConfigError if it is not usable."""
+        read = template(self.config, self.sets, self.strides, self.earlier)
+        loaded = read.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 
@@ -63,7 +64,12 @@ class Request:
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {self.runs / loaded.run_name}")
-        return loaded
+        return read
+
+    @property
+    def loaded(self) -> LoadedConfig:
+        """The config as it is."""
+        return self.template.base
 
     @property
     def resolved(self) -> Config:

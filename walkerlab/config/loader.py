@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.layers import Setting, parse_settings, stacked, strides_setting, with_settings
 from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
@@ -49,6 +49,23 @@ class EarlierRun:
     label: str
 
 
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A config that is read but not yet typed, of which many variants are made.
+
+    base   the config as it is
+    tree   what it was typed from
+    """
+
+    base: LoadedConfig
+    tree: Mapping
+
+    def variant(self, settings: Sequence[Setting]) -> Config:
+        """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
+        tree = with_settings(self.tree, settings)
+        return on_the_slope(typed(tree), tree)[0]
+
+
 def load(
     path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
 ) -> LoadedConfig:
@@ -61,6 +78,13 @@ def load(
 
     Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
     """
+    return template(path, sets, strides, run).base
+
+
+def template(
+    path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
+) -> Template:
+    """The same config as `load` gives, ready to be varied; raises ConfigError as that."""
     if run is not None:
         file = ConfigFile(Path(run.name), run.label, run.text)
     else:
@@ -76,7 +100,7 @@ def load(
     config, warnings = on_the_slope(changed, changed_tree)
     name = run_name(base, changed, _degrees(changed_tree), None if run is None else run.name)
     warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
-    return LoadedConfig(config, name, warnings, file.label)
+    return Template(LoadedConfig(config, name, warnings, file.label), changed_tree)
 
 
 def safe_name(text: str) -> str:

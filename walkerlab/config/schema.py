@@ -9,9 +9,12 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact, ContactSI
+from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
+from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
     LIGHTEST_CONTACT,
     CompassWalker,
@@ -26,12 +29,14 @@ from walkerlab.config.walkers import (
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Basin",
     "Case",
     "CompassWalker",
     "Config",
     "Contact",
     "ContactSI",
     "ContactSolver",
+    "Continuation",
     "Equations",
     "Kneed",
     "Method",
@@ -44,6 +49,7 @@ __all__ = [
     "Stability",
     "State",
     "StraightLegs",
+    "Sweep",
     "Tune",
     "Walker",
 ]
@@ -246,6 +252,9 @@ class Config(Block):
     solver: Solvers = Solvers()
     stability: Stability = Stability()
     tune: Tune = Tune()
+    continuation: Continuation = Continuation()
+    basin: Basin = Basin()
+    sweep: Sweep | None = None
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),

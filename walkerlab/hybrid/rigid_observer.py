@@ -121,14 +121,7 @@ def vertex(before: float, at: float, after: float) -> float:
 
 @inlined
 def climb_to_worst(
-    observer: Observer,
-    method: Any,
-    system: Any,
-    mode: Mode,
-    measure: int,
-    middle: float,
-    spacing: float,
-    last: float,
+    observer: Observer, method: Any, mode: Mode, system: Any, measure: int, middle: float, spacing: float, last: float
 ) -> None:
     """Follow a measure of `assumptions` to its maximum near `middle` of the step, by parabolas that close in.
 
@@ -159,7 +152,7 @@ def record(observer: Observer, method: Any, mode: Mode, system: Any, fraction: f
         mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
-                climb_to_worst(observer, method, system, mode, measure, spacing * (eighth - 1), spacing, fraction)
+                climb_to_worst(observer, method, mode, system, measure, spacing * (eighth - 1), spacing, fraction)
         before, at = at, after
     observer.energy[INTEGRAL] += mean_energy * fraction * h
     observer.energy[DURATION] += fraction * h

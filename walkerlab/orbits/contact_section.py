@@ -53,6 +53,8 @@ class SectionStep:
     books_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
     height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    touch_s: float  # from the section to the touch
+    spacing_m: float  # between the feet at the touch
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
@@ -192,6 +194,8 @@ def step_from_section(
         observer.books.copy(),
         float(lost),
         method.counts[:4].copy(),
+        float(ledger.touch_time[0]),
+        float(ledger.touch_along[0] - ledger.foothold[stance] - ledger.slip[0]),
     )
 
 

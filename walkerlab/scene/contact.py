@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.ground.compliant import (
     STANCE_FOOT,
     CompassParts,
     KneeRules,
     centre_to,
-    compass_assembly,
     contact_walker,
     pinned_walker,
 )
@@ -23,8 +25,10 @@ from walkerlab.ground.terrain import AfterMidSwing, Checkerboard, Plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
 from walkerlab.hybrid.contact_run import Ground, MethodSettings
-from walkerlab.mechanics.parts import Assembly
+from walkerlab.mechanics.parts import Assembly, Position
+from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
+from walkerlab.scene.parts import AnyWalker, assembly_of
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Contact
 
 GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
+FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
 GAIT_BUDGET = 10_000_000  # right-hand sides
 
 
@@ -44,6 +49,7 @@ class ContactScene:
     frame: Frame
     pinned: Pinned | None  # the hinged first step, if the config wants one
     pitch_m: float
+    assembly: Assembly
 
     @property
     def ground(self) -> Ground:
@@ -59,10 +65,27 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
     """
     contact = with_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
-    parts = compass_parts(config.walker)
     return assembled_scene(
-        compass_assembly(parts), parts.leg_length_m, contact, config.gravity_m_s2, config.slope_rad, pitch
+        assembly_of(config.walker),
+        config.walker.leg_length_m,
+        contact,
+        config.gravity_m_s2,
+        config.slope_rad,
+        pitch,
+        knee_rules(config.walker),
     )
+
+
+def knee_rules(walker: AnyWalker) -> KneeRules:
+    """How the knees of a walker lock and are released; straight legs have none."""
+    if not isinstance(walker, Kneed | PartsWalker):
+        return KneeRules()
+    knee = walker.knee
+    at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
+    if knee.lock == "ideal":
+        return KneeRules(release_at_touch=at_touch)
+    # damped from the first hundredth of a milliradian on
+    return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
 def assembled_scene(
@@ -82,7 +105,8 @@ def assembled_scene(
     knee_rules  how knees lock and are released
     """
     walker = contact_walker(assembly, normal_law(contact), friction_law(contact), gravity, slope, knee_rules)
-    hip = centre_to(assembly, assembly.legs[STANCE_FOOT][0], (0.0, 0.0))
+    upper = assembly.legs[STANCE_FOOT][0]
+    hip = centre_to(assembly, upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     frame = Frame(
         leg_length=leg_length_m,
         pendulum_time=math.sqrt(leg_length_m / gravity),
@@ -91,7 +115,17 @@ def assembled_scene(
         locate_joins=True,
     )
     pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
-    return ContactScene(walker, TERRAINS[contact.terrain](pitch_m), frame, pinned, pitch_m)
+    return ContactScene(walker, TERRAINS[contact.terrain](pitch_m), frame, pinned, pitch_m, assembly)
+
+
+def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
+    """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
+    for joint in assembly.joints:
+        if (joint.parent, joint.child) == (body, other):
+            return joint.parent_point_m
+        if (joint.parent, joint.child) == (other, body):
+            return joint.child_point_m
+    return (0.0, 0.0)
 
 
 TERRAINS: dict[str, Callable[[float], Checkerboard | AfterMidSwing | Plane]] = {
@@ -110,7 +144,7 @@ def with_contact(config: Config) -> Contact:
 
 def hinged_walker(config: Config, walker: ContactWalker) -> Pinned:
     """The walker with a revolute joint at its first stance foot."""
-    return pinned_walker(compass_assembly(compass_parts(config.walker)), walker, STANCE_FOOT, 0.0)
+    return pinned_walker(assembly_of(config.walker), walker, STANCE_FOOT, 0.0)
 
 
 def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
@@ -168,14 +202,17 @@ def friction_law(contact: Contact) -> Coulomb | Frictionless:
 def start_state(scene: ContactScene, rigid_state: State) -> State:
     """The walker with the rigid start state, its stance foot just touching at along = 0, at rest and rolling.
 
-    rigid_state  angles of all bodies, then their velocities, both feet on the slope; of a compass (theta_1 swing,
-                 theta_2 stance, dtheta_1, dtheta_2)
+    rigid_state  of the rigid model, both feet on the slope; of a compass (theta_1 swing, theta_2 stance, dtheta_1,
+                 dtheta_2)
 
     The hinge at the ball's centre gives position and velocity; then the ball rolls without slip instead of turning
     about its centre.
     """
     walker = scene.walker
     n = len(walker.tree.arm_x)
+    members = places_of(scene.assembly).members
+    parts = np.array(rigid_state).reshape(2, members.shape[1])
+    rigid_state = tuple(float(x) for x in (parts @ members.T).ravel())
     pinned = scene.pinned or Pinned(walker, walker.tree, STANCE_FOOT, 0.0, (0.0,) * (2 * n))
     hinged = floating_state(pinned, rigid_state)
     if scene.pinned is not None:

@@ -7,11 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.held import Knees
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
@@ -22,10 +24,13 @@ from walkerlab.hybrid.contact_run import (
     sampled_feet,
     walk_contact,
 )
+from walkerlab.mechanics.rigid import places_of
+from walkerlab.mechanics.walkers import TORSO
 from walkerlab.scene.contact import (
     ContactScene,
     contact_gait,
     contact_scene,
+    hinge_of,
     scene_measures,
     start_state,
     wants_own_pitch,
@@ -41,6 +46,7 @@ SAMPLES_PER_PENDULUM_TIME = 200
 RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
 TIME, LEG = "time", "leg"
+Floats = NDArray[np.float64]
 
 
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -82,13 +88,20 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
 def compile_kernels(config: Config) -> None:
     """Have everything compiled that `run` calls, by walks that may evaluate next to nothing: hinged and free."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    y = start_state(scene, (-HALF_ANGLE, HALF_ANGLE, 0.0, 0.0))
+    y = start_state(scene, standing(scene))
     settings = config.solver.contact
     methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, 1)
     interval = scene.frame.pendulum_time if config.outputs else None
     for pinned in dict.fromkeys((scene.pinned, None)):
         result = walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, y, methods, 1, interval)
         groups(config, scene, result)
+
+
+def standing(scene: ContactScene) -> tuple[float, ...]:
+    """A rigid state with the legs straight and apart, at rest."""
+    places = places_of(scene.assembly).names
+    angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
+    return (*angles, *(0.0 for _ in places))
 
 
 def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
@@ -142,6 +155,7 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, result.dissipated_J),
+        **knee_times(result),
         "rhs_evaluations": int(result.work[0]),
         "accepted_steps": int(result.work[1]),
         "rejected_steps": int(result.work[2]),
@@ -150,6 +164,11 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         **scene_measures(scene),
         "left_out": list(of_contact_walk(config)),
     }
+
+
+def knee_times(result: ContactWalkResult) -> dict[str, Any]:
+    """When the swing leg's knee locked in each step (s), for walkers with knees."""
+    return {"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}
 
 
 def groups(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
@@ -229,13 +248,48 @@ def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> 
     hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
     along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
     height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
-    return {
+    legs = {
         "angle": Variable(y[:, 2 : 2 + n][:, upper], (TIME, LEG), "rad", "angle of the leg from the vertical"),
         "velocity": Variable(y[:, 4 + n :][:, upper], (TIME, LEG), "rad/s", "angular velocity of the leg"),
         "hip_along_m": Variable(along, (TIME,), "m", "position of the hip along the slope"),
         "hip_height_m": Variable(height, (TIME,), "m", "height of the hip over the slope"),
         "foot_along_m": Variable(feet[:, :, 0], (TIME, LEG), "m", "position of the foot along the slope"),
         "foot_height_m": Variable(feet[:, :, 1], (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
+    }
+    return legs | knee_variables(scene, y, along, height) | torso_variables(scene, y)
+
+
+def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height: Floats) -> dict[str, Variable]:
+    """Angles and velocities of the shanks, and where the knees are; nothing for straight legs."""
+    knees = scene.walker.knees
+    if not isinstance(knees, Knees):
+        return {}
+    n, names = len(scene.frame.hip_x), [body.name for body in scene.assembly.bodies]
+    shanks, per_leg = list(knees.shanks), (TIME, LEG)
+    along, height = np.zeros((y.shape[0], 2)), np.zeros((y.shape[0], 2))
+    for leg, (thigh, shank) in enumerate(zip(knees.thighs, knees.shanks, strict=True)):
+        hip = hinge_of(scene.assembly, names[thigh], names[knees.thighs[1 - leg]])
+        knee = hinge_of(scene.assembly, names[thigh], names[shank])
+        ahead, up = knee[0] - hip[0], knee[1] - hip[1]
+        s, c = np.sin(y[:, 2 + thigh] + scene.walker.slope), np.cos(y[:, 2 + thigh] + scene.walker.slope)
+        along[:, leg], height[:, leg] = hip_along + c * ahead - s * up, hip_height + s * ahead + c * up
+    return {
+        "shank_angle": Variable(y[:, 2 : 2 + n][:, shanks], per_leg, "rad", "angle of the shank from the vertical"),
+        "shank_velocity": Variable(y[:, 4 + n :][:, shanks], per_leg, "rad/s", "angular velocity of the shank"),
+        "knee_along_m": Variable(along, per_leg, "m", "position of the knee along the slope"),
+        "knee_height_m": Variable(height, per_leg, "m", "height of the knee over the slope"),
+    }
+
+
+def torso_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
+    """Angle and velocity of the torso, if there is one."""
+    names = [body.name for body in scene.assembly.bodies]
+    if TORSO not in names:
+        return {}
+    n, torso = len(names), names.index(TORSO)
+    return {
+        "torso_angle": Variable(y[:, 2 + torso], (TIME,), "rad", "angle of the torso from the vertical"),
+        "torso_velocity": Variable(y[:, 4 + n + torso], (TIME,), "rad/s", "angular velocity of the torso"),
     }
 
 

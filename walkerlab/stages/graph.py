@@ -54,9 +54,11 @@ class Stage:
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
+    on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -64,7 +66,6 @@ class Stage:
     module: str
     purpose: str
     reads: tuple[str, ...]
-    reads_of_paper: tuple[str, ...] = ()
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
@@ -73,10 +74,18 @@ class Stage:
     has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
+    on_demand: bool = False
     keeps_parts: bool = False
     alone: bool = False
     early_with: tuple[str, ...] = ()
+    follows: bool = False
     does_without: Lacks = nothing
+    reads_of_paper: tuple[str, ...] = ()
+
+    @property
+    def optional(self) -> bool:
+        """Whether it runs only if the user asks for it."""
+        return self.on_demand or bool(self.campaign_of)
 
 
 class Graph:
@@ -108,7 +117,7 @@ class Graph:
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
 PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "seed")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "continuation", "basin", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -182,12 +191,29 @@ PIPELINE = Graph(
         keeps_parts=True,
     ),
     Stage(
+        "continuation",
+        "walkerlab.stages.continuation",
+        "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
+        reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        follows=True,
+    ),
+    Stage(
+        "basin",
+        "walkerlab.stages.basin",
+        "Map which starts come to which attractor, and which fall; goes on where it was interrupted.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact", "solver.contact", "basin", "seed"),
+        inputs=results_of("fixedpoint"),
+        has_cells=True,
+        on_demand=True,
+        keeps_parts=True,
+    ),
+    Stage(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune", "stability-maps"),
+        if_current=("accuracy", "tune", "stability-maps", "continuation", "basin"),
         draws=True,
     ),
     Stage(
@@ -196,7 +222,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("stability-maps",),
+        if_current=("stability-maps", "continuation", "basin"),
         draws=True,
         early_with=("fixedpoint", "simulate", "contact-sim"),
     ),

@@ -21,6 +21,7 @@ from walkerlab.stages.task import Compilation, Task, kernels_told_of, nothing_co
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
+from walkerlab.store.elsewhere import take_over
 from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
@@ -96,7 +97,7 @@ def execute(
     steps = planner.plan(stages)
     run = Run(planner, reporter or Silent(), jobs)
     to_run = [step.stage for step in steps if step.action == "run"]
-    if to_run:
+    if to_run or any(step.origin is not None for step in steps):
         with folder.locked(wait, run.reporter.note):
             # Decided anew, stage by stage: another process may have worked here until now.
             run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
@@ -202,6 +203,8 @@ class Run:
                 self._run_here(self._begin(step, self.jobs))
                 self._draw_early(stages)
             else:
+                if step.origin is not None:
+                    take_over(step.origin, self.folder.artifact(stage.name))
                 self.planner.expect(step)
                 self.skip(step)
 
@@ -246,6 +249,8 @@ class Run:
             step = self._decided(stage, stages)
             if step.action != "run":
                 self.waiting.remove(stage)
+                if step.origin is not None:
+                    take_over(step.origin, self.folder.artifact(stage.name))
                 self.planner.expect(step)
                 self.skip(step)
             elif not (stage.alone and self.running):
@@ -269,7 +274,7 @@ class Run:
     def _begin(self, step: Step, jobs: int) -> Begun:
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
-        if step.damaged:
+        if step.damaged and step.origin is None:
             self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
         if stage.keeps_parts and self.planner.force:
             Parts(self.folder.parts(stage.name), identity.key).forget()
@@ -339,11 +344,11 @@ class Run:
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
         """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
 
-        A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
+        What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
         """
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
-        found = [entry for entry in found if not graph[entry.what].campaign_of]
+        found = [entry for entry in found if not graph[entry.what].optional]
         found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         entries = [*by_stage]
         for done in self.done:
