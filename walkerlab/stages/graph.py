@@ -57,9 +57,9 @@ class Stage:
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
-    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -67,7 +67,6 @@ class Stage:
     module: str
     purpose: str
     reads: tuple[str, ...]
-    reads_of_paper: tuple[str, ...] = ()
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
@@ -79,10 +78,11 @@ class Stage:
     campaign_of: str = ""
     on_demand: bool = False
     keeps_parts: bool = False
-    follows: bool = False
     alone: bool = False
     early_with: tuple[str, ...] = ()
+    follows: bool = False
     does_without: Lacks = nothing
+    reads_of_paper: tuple[str, ...] = ()
 
     @property
     def optional(self) -> bool:
