@@ -1,0 +1,89 @@
+"""Walkers described in YAML: types, limits, own parts, and what is refused."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.mechanics.standing import Standing
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
+
+DOCS = Path(__file__).parents[2] / "docs" / "walkers.md"
+
+
+def flat(model: Standing):
+    numbers = []
+    for value in (model.tree, model.foot_x, model.foot_y, model.hip_x, model.hip_y, model.straight, model.at_strike):
+        numbers += [np.ravel(part) for part in (value if isinstance(value[0], tuple) else (value,))]
+    return np.concatenate([np.ravel(np.array(part, float)) for part in numbers])
+
+
+def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
+    (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
+    path = tmp_path / "own-parts.yaml"
+    path.write_text(text)
+    own, kneed = load(path).config, load(Path("kneed")).config
+    assert coordinates(own) == coordinates(kneed)
+    one, other = rigid_walker(own, "corrected"), rigid_walker(kneed, "corrected")
+    assert type(one) is type(other)
+    assert flat(one) == pytest.approx(flat(other), rel=1e-15)
+    assert (one.picked, one.roles, one.leg_length) == (other.picked, other.roles, other.leg_length)
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "numbers"),
+    [("simplest", 1.0, 4), ("round-feet", 2.0, 4), ("kneed", 1.6, 6), ("kneed-round-feet", 1.6, 6), ("torso", 20.0, 6)],
+)
+def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
+    config = load(Path(name)).config
+    model = rigid_walker(config, "corrected")
+    assert model.tree.mass == pytest.approx(mass, rel=1e-11)
+    assert config.walker.total_mass_kg == pytest.approx(mass, rel=1e-11)
+    assert len(coordinates(config)) == len(model.blank) == numbers
+    assert len(assembly_of(config.walker).feet) == 2
+
+
+def test_appendix_a_is_a_plain_compass_only():
+    assert equation_sets(load().config) == ("corrected", "as-printed")
+    assert equation_sets(load(Path("torso")).config) == ("corrected",)
+
+
+@pytest.mark.parametrize(
+    ("config", "setting", "said"),
+    [
+        ("kneed", "walker.shank.mass_below_knee_m=0", "massless"),
+        ("round-feet", "walker.foot_radius_m=0.5", "below leg_length_m"),
+        ("simplest", "contact={}", "next to no mass"),
+        ("torso", "equations=as-printed", "compass"),
+        ("kneed", "walker.type=knead", "kneed"),
+        ("kneed", "walker.thigh.mas_kg=1", "mass_kg"),
+        ("kneed", "start=[0.1, 0.1, 0.1, 0.1]", "6"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_with_the_reason(config, setting, said):
+    with pytest.raises(ConfigError) as refused:
+        load(Path(config), [setting])
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("mass_kg: 0.05, centre_m: [0.0, -0.125]}\n  hinges", "mass_kg: 0.06, centre_m: [0.0, -0.125]}\n  hinges", "differ"),
+        ("locks: true}\n  particles", "locks: false}\n  particles", "without a knee"),
+        ("[thigh 2, shank 2]]", "[thigh 2, thigh 1]]", "both legs"),
+        ("child: shank 2, child_point_m: [0.0, 0.0], locks: true", "child: thigh 1, child_point_m: [0.0, 0.0]", "loop"),
+    ],
+)  # fmt: skip
+def test_parts_that_make_no_walker_are_refused_in_words(tmp_path, old, new, said):
+    (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
+    assert old in text
+    path = tmp_path / "broken.yaml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ConfigError) as refused:
+        rigid_walker(load(path).config, "corrected")
+    assert said in str(refused.value)
