@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import platform
 import re
+import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
@@ -28,11 +29,20 @@ from whole_process import whole_process_times
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.config.loader import load
+from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, walk_lanes
+from walkerlab.orbits.basin import ATOL, RTOL
+from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import newton
+from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
+from walkerlab.stages.progress import Silent
+from walkerlab.stages.runner import execute
+from walkerlab.store.runfolder import RunFolder
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
@@ -170,6 +180,16 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 
 
+def family_lines(watch: Stopwatch) -> Iterator[Line]:
+    """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
+    config = load().config
+    rigid = Question(config, parameter_of("slope_rad", config), Span(1e-4, 0.1), periods=16, points=400)
+    yield at_most("rigid branches to period 16", watch(lambda: rigid_branches(rigid, Silent())), "s", 5.0, 2.5)
+    contact = Question(config, parameter_of("slope_deg", config), Span(0.2, 4.2), periods=1, points=400)
+    seconds = watch(lambda: contact_branches(contact, Silent()))
+    yield at_most("contact branch from 0.2 deg to beyond its first flip", seconds, "s", 60.0, 30.0)
+
+
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     """The two right-hand sides, and what generality costs."""
     rigid, contact, hinged = times["rigid"], times["contact"], times["contact, hinged"]
@@ -177,6 +197,40 @@ def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     yield at_most("right-hand side, contact", contact, "ns", 100, 60)
     work = "assembled from parts and hinged, swing foot watched, against Appendix A's closed form"
     yield at_most(work, hinged / rigid, "x", 3, 1)
+
+
+def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
+    """Walks in lanes on one core, and basins of attraction on two."""
+    walker = rigid_walker(ONE_DEGREE, "corrected")
+    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    trial = RigidTrial(walker, start, STEPS)
+    reference = reference_for(trial)
+    many = 2_000
+    strikes, fates = Strikes(np.zeros((many, STEPS)), np.zeros((many, STEPS, 4))), new_fates(many)
+    memory = new_lane_memory(RTOL, ATOL)
+    seconds = watch(lambda: walk_lanes(walker, memory, strikes, np.array([start] * many), fates))
+    error = float(np.max(np.abs(strikes.after[:, -1] - reference.state)))
+    alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
+    script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)
+    rate = many * STEPS / seconds
+    others = [f"{name} {STEPS / run.seconds:.3g}" for name, run in (("one by one", alone), ("SciPy", script)) if run]
+    bar = MET if rate >= 1e6 and error <= 1e-6 else MISSED
+    said = f"{rate:.3g} steps/s at {error:.1e} ({', '.join(others)})"
+    yield Line("rigid steps in lanes, one core, at 1e-6", said, "1e+06 steps/s", bar)
+    yield basin_line("basin, rigid, 1,000 x 1,000", 20.0, "basin.cells=[1000,1000]")
+    if not quick:
+        yield basin_line("basin, contact, 200 x 200", 120.0, "basin.model=contact", "basin.cells=[200,200]")
+
+
+def basin_line(work: str, bar: float, *sets: str) -> Line:
+    """A basin of the paper's walker at one degree, as the command computes it with two processes."""
+    with tempfile.TemporaryDirectory() as folder:
+        loaded = load(None, ["slope_deg=1", *sets])
+        place = RunFolder(Path(folder), loaded.run_name)
+        execute(loaded.config, "fixedpoint", place)
+        report = execute(loaded.config, "basin", place, jobs=2)
+    line = at_most(f"{work}, two processes", report.wall_s, "s", bar, bar / 2.0)
+    return replace(line, measured=f"{line.measured}, {report.summary['trajectories_per_s']:.3g} walks/s")
 
 
 def memory_line() -> Line:
@@ -250,10 +304,11 @@ def main() -> None:
     options = parser.parse_args()
     watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
 
-    lines = [*rigid_lines(watch), *newton_lines(watch)]
+    lines = [*rigid_lines(watch), *newton_lines(watch), *family_lines(Stopwatch(3, 10.0))]
     trial = contact_trial_at_one_degree()
     reference = reference_for(trial)
     lines += contact_lines(trial, reference, watch)
+    lines += batch_lines(watch, options.quick)
     repeats = 5 if options.quick else 15
     sides = times_ns(repeats)
     lines += [*rhs_lines(sides), memory_line(), process_line(repeats)]

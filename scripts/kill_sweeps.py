@@ -1,9 +1,9 @@
-"""Kill a sweep, parent or worker, again and again at random moments, and compare what comes out with a quiet one.
+"""Kill a sweep at work, parent or worker, again and again at random moments, and compare it with a quiet one.
 
     python scripts/kill_sweeps.py [--kills 50] [--seed 0]
 
 The sweep is of real fixed points over slope, in chunks of a tenth of a second. After each kill of the parent the same
-command goes on. At the end two more sweeps of other parameters run on one folder at once. Nothing is left behind.
+command goes on. At the end two such sweeps run on one folder at once. Nothing is left behind.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def main() -> None:
         while parents + workers < options.kills:
             process = subprocess.Popen(command(killed), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             while process.poll() is None and parents + workers < options.kills:
-                time.sleep(chance.uniform(0.0, 4.0))
+                wait_for_a_chunk(killed, process)
+                time.sleep(chance.uniform(0.0, 1.0))
                 below = children_of(process.pid)
                 if below and chance.random() < 0.5:
                     kill(chance.choice(below))
@@ -73,6 +74,18 @@ def command(runs: Path) -> list[str]:
 def run(arguments: list[str]) -> None:
     """Run to the end."""
     subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
+
+
+def wait_for_a_chunk(runs: Path, process: subprocess.Popen[bytes]) -> None:
+    """Wait until one more chunk is there than now, so that work is under way; or until the process ends."""
+    before = len(chunks(runs))
+    while process.poll() is None and len(chunks(runs)) <= before:
+        time.sleep(0.02)
+
+
+def chunks(runs: Path) -> list[Path]:
+    """The chunks that are kept."""
+    return list(runs.glob("*/sweep-chunks/*.h5"))
 
 
 def kill(pid: int) -> None:

@@ -46,6 +46,19 @@ def test_links_lead_to_files_that_are_there(path):
     assert [link for link in relative if not (path.parent / link).exists()] == []
 
 
+def called_in(path):
+    """Names that a document calls in code: `name(...)`."""
+    return {name for code in code_in(path) for name in re.findall(r"\b([A-Za-z_]\w+)\(\w", code)}
+
+
+@pytest.mark.parametrize("path", [ROOT / "docs" / "pipeline.md"], ids=lambda path: path.name)
+def test_functions_that_a_document_calls_are_defined(path):
+    source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
+    defined = set(re.findall(r"^\s*(?:def|class) (\w+)", source, re.MULTILINE)) | {"sha256"}
+    assert called_in(path)
+    assert called_in(path) <= defined
+
+
 @pytest.mark.parametrize("command", commands())
 def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -39,6 +39,8 @@ KEPT_GENERATIONS = 8
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 # parts of a kernel are never entered from outside
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
+# of what takes lanes: handing them on in memory costs as much as the work
+WOVEN_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -299,6 +301,11 @@ def inlined(function: F) -> F:
     return cast(F, register_jitable(**PART_FLAGS)(function))
 
 
+def woven(function: F) -> F:
+    """As `inlined`, and put into the code of its callers, however large."""
+    return cast(F, register_jitable(**WOVEN_FLAGS)(function))
+
+
 def uncompiled(compiled: F) -> F:
     """The Python function that a kernel was made of: the same source, for methods that are not compiled themselves."""
     return cast(F, cast(Any, compiled).py_func)
@@ -311,19 +318,30 @@ class ByType:
         """Take name and documentation from `declaration`, whose own body never runs."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
+        self._woven: set[type] = set()
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
         """Run the body for the type of `chooser`."""
         return self._bodies[type(chooser)](chooser, *rest)
 
-    def case(self, chosen: type) -> Callable[[F], F]:
-        """Register the decorated function as the body for first arguments of type `chosen`."""
+    def case(self, chosen: type, woven: bool = False) -> Callable[[F], F]:
+        """Register the decorated function as the body for first arguments of type `chosen`.
+
+        woven  it is put into the code of its callers, however large, and never called
+        """
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
+            if woven:
+                self._woven.add(chosen)
             return body
 
         return register
+
+    def body(self, kind: Any, woven: bool) -> Callable[..., Any] | None:
+        """The body for numba's type of a first argument, if it is woven or is not; else None."""
+        chosen = getattr(kind, "instance_class", type(None))
+        return self._bodies.get(chosen) if (chosen in self._woven) == woven else None
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
@@ -333,8 +351,12 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     """
     chosen = ByType(declaration)
 
-    def choose(*arguments: Any) -> Callable[..., Any] | None:
-        return chosen._bodies.get(getattr(arguments[0], "instance_class", type(None)))
+    def called(*arguments: Any) -> Callable[..., Any] | None:
+        return chosen.body(arguments[0], woven=False)
 
-    overload(chosen, strict=False, jit_options=PART_FLAGS)(choose)
+    def woven(*arguments: Any) -> Callable[..., Any] | None:
+        return chosen.body(arguments[0], woven=True)
+
+    overload(chosen, strict=False, jit_options=PART_FLAGS)(called)
+    overload(chosen, strict=False, jit_options=WOVEN_FLAGS)(woven)
     return chosen

@@ -203,3 +203,12 @@ def test_a_bar_is_drawn_on_a_terminal_only(toy):
     off_terminal = toy("drop", "--force", environment={"TERM": "xterm"}).stderr
     assert "\x1b" not in off_terminal
     assert "dropping" not in off_terminal
+
+
+def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
+    done = walker("continuation", "--over", "slope_deg")
+    assert done.returncode == 2
+    assert "--from and --to" in done.stderr
+    wrong = walker("continuation", "--over", "strides", "--from", "1", "--to", "2", "--json")
+    assert wrong.returncode == 3
+    assert "touches no model" in json.loads(wrong.stdout)["error"]["message"]

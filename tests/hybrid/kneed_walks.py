@@ -16,8 +16,10 @@ MASS, PAPER_MASS, GRAVITY, SLOPE = 1.6, 20.0, 9.81, 0.0504
 # its rigid gait just after heel strike, from the slope's normal, recomputed: half the angle between the legs, rates
 HALF, STANCE_RATE, SWING_RATE = 0.2385854603, -1.1095873312, -0.0571481063
 PERIOD, STEP = 0.564328, 2.0 * np.sin(HALF)
-ANGLES = (-HALF - SLOPE, HALF - SLOPE) * 2
+ANGLES = (-HALF - SLOPE, HALF - SLOPE) * 2  # thighs, then shanks
 RATES = (SWING_RATE, STANCE_RATE) * 2
+# as the rigid model counts: swing thigh, straight stance leg, swing shank
+RIGID_ANGLES, RIGID_RATES = (*ANGLES[:2], ANGLES[0]), (*RATES[:2], RATES[0])
 
 
 def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **contact):
@@ -43,7 +45,7 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
 def walked(steps=3, rules=None, interval=None, tolerance=1e-8, scale=1.0, **changes):
     """A walk from the rigid gait."""
     scene = scene_of(rules, scale=scale, **changes)
-    start = start_state(scene, (*ANGLES, *(rate / scale**0.5 for rate in RATES)))
+    start = start_state(scene, (*RIGID_ANGLES, *(rate / scale**0.5 for rate in RIGID_RATES)))
     return walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, settings(tolerance), steps, interval)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import plain_walk
 import pytest
+from contact_walks import settings
 from kneed_walks import (
     ANGLES,
     AT_TOUCH,
@@ -12,6 +13,8 @@ from kneed_walks import (
     PAPER_MASS,
     PERIOD,
     RATES,
+    RIGID_ANGLES,
+    RIGID_RATES,
     SHANK,
     SLOPE,
     STEP,
@@ -20,13 +23,17 @@ from kneed_walks import (
     walked,
 )  # fmt: skip
 
-from walkerlab.ground.compliant import KneeRules
+from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.hybrid.contact_events import feet_motion
 from walkerlab.hybrid.contact_knee import locked
 from walkerlab.hybrid.contact_run import by_channel
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.mechanics.walkers import Limb
+from walkerlab.mechanics.parts import Assembly, Particle
+from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
+from walkerlab.orbits.contact_gait import find_gait_from, section_points
+from walkerlab.orbits.contact_section import coordinates_of, state_on_section, step_from_section
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.system import derivative, jacobian
 
@@ -132,9 +139,6 @@ def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
 
 def test_the_equations_of_a_locked_knee_are_those_of_one_leg():
     """Compared with the compass whose legs carry thigh and shank masses as one."""
-    from walkerlab.ground.compliant import contact_walker
-    from walkerlab.mechanics.parts import Assembly, Particle
-    from walkerlab.mechanics.walkers import Arc, straight_legs
 
     scene = scene_of()
     legs = straight_legs(Limb(1.0, THIGH.mass_kg, THIGH.mass_below_m), HIP_MASS, Arc())
@@ -191,27 +195,42 @@ def test_a_stiff_stop_walks_as_the_ideal_lock_does():
     assert apart[1] < 0.3 * apart[0]
 
 
-def test_a_foot_that_comes_down_on_a_bent_knee_ends_the_walk():
-    scene = scene_of(slope=0.02)
-    walk = walked(steps=20, rules=AT_TOUCH, slope=0.02)
-    assert walk.outcome in (Outcome.BENT_KNEE, Outcome.FELL, Outcome.NO_HEEL_STRIKE)
-    assert walk.outcome.advice
-    assert scene.walker.knees.release_at_touch is False
+def test_its_own_gait_is_found_on_the_section_and_is_the_one_that_a_long_walk_settles_on():
+    scene, walk = scene_of(), walked(steps=40, tolerance=1e-9)
+    start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
+    answer = find_gait_from(scene.walker, scene.ground, settings(1e-10), start)
+    assert answer.gait is not None, answer.reason
+    gait = answer.gait
+    assert gait.z.size == 8  # height, two angles, two velocities, three angular velocities
+    assert gait.step.period_s == pytest.approx(walk.periods_s[-1], abs=1e-6)
+    assert gait.step.length_m == pytest.approx(walk.lengths_m[-1], abs=1e-6)
+    assert gait.step.slip_m == pytest.approx(walk.slip_m[-2], abs=1e-6)
+    assert gait.stable
+    assert gait.step.books_J.sum() == pytest.approx(gait.step.height_lost_J, rel=1e-6)
+    # what the rigid gait's are is not far off
+    assert abs(gait.multipliers[0]) == pytest.approx(abs(0.35257 + 0.55221j), abs=0.1)
 
 
-def test_round_feet_of_a_fifth_of_a_leg_walk_on_the_plane():
-    walk = walked(steps=6, radius=0.2)
-    assert walk.outcome is Outcome.WALKED
-    assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
-    # they roll forward by the radius times what the leg turns, and slip far less
-    assert np.all(walk.rolling_m > 0.2 * 0.3)
-    assert np.all(np.abs(walk.slip_m) < 0.1 * walk.rolling_m)
+def test_the_derivative_of_the_step_through_lock_and_release_is_its_slope():
+    scene, stance = scene_of(), 1
+    methods = settings(1e-11)
+    start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
+    z = next(section_points(scene.walker, scene.ground, settings(1e-10), start))[1]
+    at = step_from_section(scene.walker, scene.ground, methods, z, STEP)
+    assert at.outcome is Outcome.WALKED
+    back = coordinates_of(scene.walker, np.array(state_on_section(scene.walker, z, stance)), stance)
+    np.testing.assert_allclose(back, z, atol=1e-15)
+    for column, step in ((1, 3e-5), (2, 3e-5), (5, 3e-4), (6, 3e-4), (7, 3e-5)):
+        ahead, behind = (
+            step_from_section(scene.walker, scene.ground, methods, z + sign * step * np.eye(z.size)[column], STEP).z
+            for sign in (1, -1)
+        )
+        slope = (ahead - behind) / (2.0 * step)
+        np.testing.assert_allclose(at.DP[:, column], slope, atol=2e-4 * np.abs(at.DP).max())
 
 
-def test_the_start_rolls_and_stands():
+def test_a_round_foots_start_rolls_and_stands():
     scene = scene_of(radius=0.2)
-    y = start_state(scene, (*ANGLES, *RATES))
-    from walkerlab.hybrid.contact_events import feet_motion
-
+    y = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     stance = feet_motion(scene.walker, y)[1]
     np.testing.assert_allclose((stance.slip, stance.climb, stance.height), 0.0, atol=1e-14)

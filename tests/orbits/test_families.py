@@ -11,7 +11,7 @@ from walkerlab.orbits.attractors import close_returns, feigenbaum_ratios, larges
 from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import Follower, Limits, Seed, Span
+from walkerlab.orbits.families import Follower, Limits, Seed, Span, period_amplitude
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_maps import RigidMap, multipliers_of, walk_steps
@@ -166,14 +166,28 @@ def multiplier_by_differences(step, z, slope):
 
 
 @pytest.mark.parametrize(
-    ("walker_at", "step", "span", "coordinates"),
+    ("walker_at", "step", "span", "coordinates", "printed"),
     [
-        (paper_walker, compass_step, (1e-4, 0.1, 0.05), lambda z, _: z * [1.0, np.sqrt(G / L), np.sqrt(G / L)]),
-        (simplest_walker, simplest_step, (5e-3, 0.0185, 0.012), lambda z, slope: np.array([z[0] + slope, z[2]])),
+        (
+            paper_walker,
+            compass_step,
+            (1e-4, 0.1, 0.05),
+            lambda z, _: z * [1.0, np.sqrt(G / L), np.sqrt(G / L)],
+            np.radians(4.37),
+        ),
+        (
+            simplest_walker,
+            simplest_step,
+            (5e-3, 0.0185, 0.012),
+            lambda z, slope: np.array([z[0] + slope, z[2]]),
+            0.0151,
+        ),
     ],
     ids=["compass", "simplest"],
 )
-def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(walker_at, step, span, coordinates):
+def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(
+    walker_at, step, span, coordinates, printed
+):
     branch = next(b for b in family(walker_at, *span, 8) if b.period == 1 and any(p.stable for p in b.points))
     (flip,) = branch.bifurcations
     z = coordinates(flip.point.x[:-1], flip.value)
@@ -184,6 +198,7 @@ def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences
     elsewhere = slopes[0] - values[0] * (slopes[1] - slopes[0]) / (values[1] - values[0])
     assert flip.kind == "flip"
     assert abs(flip.value - elsewhere) < 1e-7
+    assert flip.value == pytest.approx(printed, rel=6e-3)  # Goswami et al. 1996, Garcia et al. 1998
 
 
 def test_the_cascade_of_the_compass_is_followed_by_itself():
@@ -221,6 +236,13 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
     assert [end.reason for end in stable.ends] == ["end of the span"] * 2
     doubled = next(b for b in branches if b.period == 2)
     assert doubled.stable_ranges == ((flips[(1, "flip")], flips[(2, "flip")]),)
+
+
+def test_a_doubled_branch_is_followed_away_from_its_flip():
+    for branch in compass_family():
+        if branch.period > 1:
+            parted = [period_amplitude(point.solved, branch.period) for point in branch.points[:3]]
+            assert 0.0 < parted[0] < parted[1] < parted[2]
 
 
 def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():

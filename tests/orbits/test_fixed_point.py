@@ -63,12 +63,12 @@ def test_gait_at_three_degrees_has_the_published_period():
     assert find_gaits(on_slope(3.0)).gait.period == pytest.approx(0.735, abs=1e-3)
 
 
-def test_gait_loses_stability_by_period_doubling_near_the_published_slope():
-    # Goswami, Thuilot, Espiau 1996: 4.37 deg
-    before, after = (find_gaits(on_slope(degrees)).gaits[-1] for degrees in (4.32, 4.42))
+def test_gait_loses_stability_by_period_doubling_a_little_above_the_published_slope():
+    # printed at 4.37 deg by Goswami, Thuilot, Espiau 1996; for these equations it lies 0.02 deg higher
+    before, after = (find_gaits(on_slope(degrees)).gaits[-1] for degrees in (4.39, 4.392))
     assert before.stable
     assert not after.stable
-    assert after.multipliers[0] == pytest.approx(-1.0, abs=0.1)
+    assert after.multipliers[0] == pytest.approx(-1.0, abs=2e-3)
 
 
 def test_corrected_gait_at_the_papers_slope():
@@ -215,7 +215,9 @@ def test_a_slope_with_unstable_gaits_only_says_so():
 
 
 def gait_with(radius, pull=0.0):
-    return Gait((0.0, 0.0, -1.0, -1.0), 1.0, 0.4, (radius, 0.0, 0.0), 0.0, 150.0, 0.0, 100.0 - pull, 0.2, 0.0)
+    return Gait(
+        (0.0, 0.0, -1.0, -1.0), 1.0, 0.4, (radius, 0.0, 0.0), 0.0, 150.0, 0.0, 100.0 - pull, 0.2, 0.0, True, None
+    )
 
 
 def test_the_stable_gait_is_chosen_and_one_that_cannot_be_walked_never():

@@ -5,7 +5,7 @@ from synthetic_results import config, fixedpoint, stored
 
 from walkerlab.report.blocks import Findings, Table
 from walkerlab.report.results import Results
-from walkerlab.report.sections.accuracy import section
+from walkerlab.report.sections.accuracy import introduction, section
 
 
 def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
@@ -106,3 +106,8 @@ def test_references_come_with_what_is_known_of_them(made):
 
 def test_what_was_not_run_is_said_once_for_each_reason(made):
     assert tables(made)["Not run"]["", "rigid"] == ["scipy-bdf", "10⁻⁷ and 10⁻⁹", "too much work"]
+
+
+def test_that_the_rigid_scene_does_not_start_on_its_gait_is_said():
+    said = introduction({"repeats": 7, "rigid_velocity_factor": 0.98})
+    assert "starts with 0.98 of the start’s angular velocities" in said

@@ -165,6 +165,7 @@ def test_the_summary_has_the_fixed_keys(rows, reference):
     assert {"rows", "repeats", "reference", "best"} <= summary.keys()
     fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
     assert fixed <= summary["rows"][0].keys()
+    assert summary["rigid_velocity_factor"] == 0.98
     assert {"method", "second_method", "agreement", "state"} <= summary["reference"]["rigid"].keys()
 
 

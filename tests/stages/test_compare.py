@@ -80,6 +80,7 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
             "steps": steps,
             "step_periods_s": (SLOWER * done["period_s"][:steps]).tolist(),
             "step_lengths_m": done["length_m"][:steps].tolist(),
+            "pitch_m": 0.3714,
             "static_penetration_m": 5.9e-5,
             "damping_ratio": 3.7,
         },

@@ -100,6 +100,24 @@ def test_xarray_opens_each_group(tmp_path, content, identity, origin):
         assert root.attrs["stage_key"] == identity.key
 
 
+def test_arrays_at_the_root_are_one_dataset_with_text_in_any_shape(tmp_path, identity, origin):
+    words = np.array([["a", "b", "a"], ["c", "", "é"]], dtype=object)
+    group = Group(
+        {
+            "slope": Variable(np.array([0.1, 0.2]), ("slope",), "rad", "slope"),
+            "outcome": Variable(words, ("slope", "mass"), "", "outcome"),
+        },
+        {"coordinates": "slope"},
+    )
+    content = Content({"": group}, {"done": 6})
+    artifact.write(tmp_path / "a.h5", content, identity, origin)
+    assert artifact.read(tmp_path / "a.h5").digest() == content.digest()
+    with xarray.open_dataset(tmp_path / "a.h5", engine="h5netcdf") as dataset:
+        assert dataset.outcome.values.tolist() == words.tolist()
+    with pytest.raises(ValueError, match="say something else"):
+        artifact.write(tmp_path / "a.h5", Content({"": Group({}, {"stage_key": "x"})}), identity, origin)
+
+
 def test_every_array_has_unit_name_and_dimension_scales(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", content, identity, origin)
     with h5py.File(tmp_path / "a.h5") as file:

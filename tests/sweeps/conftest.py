@@ -15,7 +15,7 @@ from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.sweep import Sweep, Work
 
 HERE = Path(__file__).parent
-AT = "toy_sweep.pipeline:GRAPH"
+AT = "toy_sweep.sweep_pipeline:GRAPH"
 
 
 @contextlib.contextmanager
@@ -29,7 +29,7 @@ HERE_AND_NOW = Engine(in_this_process, chunk_s=5.0)
 
 class Toy:
     def __init__(self, runs):
-        from toy_sweep.pipeline import GRAPH
+        from toy_sweep.sweep_pipeline import GRAPH
 
         self.runs = runs
         self.graph = GRAPH

@@ -148,6 +148,12 @@ def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
     assert not toy.runs.exists()
 
 
+def test_a_stage_that_keeps_parts_is_swept_without_its_file(toy):
+    swept = toy.run("count", "seed=[2, 3, 4]")
+    assert swept.content[""]["total"].tolist() == [1.0, 3.0, 6.0]
+    assert not list(toy.runs.rglob("*.parts"))
+
+
 def test_only_stages_without_files_can_be_swept(toy):
     with pytest.raises(ConfigError, match="cannot be swept"):
         toy.sweep("picture", GRAVITIES)

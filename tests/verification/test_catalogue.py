@@ -23,6 +23,7 @@ QUICK = (
     "moon",
     "rigid-1-km",
     "rigid-simplest",
+    "after-mid-swing-hinged",
     "slope-0",
     "rigid-slope-5.2-deg",
     "rigid-slope-minus-1-deg",
@@ -38,7 +39,7 @@ QUICK = (
 
 def test_families_and_their_sizes():
     families = {case.family for case in CASES.values()}
-    assert families == {"stiffness", "walkers", "slopes", "starts", "numerics"}
+    assert families == {"stiffness", "walkers", "terrain", "slopes", "starts", "numerics"}
     assert len(CASES) >= 60
 
 

@@ -40,7 +40,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("open", as_json=False):
             from walkerlab.cli.browser import open_file
             from walkerlab.cli.console import Console
-            from walkerlab.cli.runs import page_of
+            from walkerlab.cli.named import page_of
 
             page = page_of(run, runs)
             open_file(page, Console(quiet, verbose))
@@ -73,7 +73,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
         with exit_on_failure("export", as_json=False):
             from walkerlab.cli.exports import export_from
-            from walkerlab.cli.runs import folder_of
+            from walkerlab.cli.named import folder_of
 
             print(export_from(folder_of(run, runs), what, to, output, columns, model))
 
@@ -92,6 +92,6 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("animate", as_json=False):
             from walkerlab.cli.console import Console
             from walkerlab.cli.films import Film, write_film
-            from walkerlab.cli.runs import folder_of
+            from walkerlab.cli.named import folder_of
 
             print(write_film(folder_of(run, runs), to, Film(model, steps, rate, slower), Console(quiet)))

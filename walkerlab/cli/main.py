@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import around, differences, housekeeping, sweep
+from walkerlab.cli import around, housekeeping, sweep
+from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -56,7 +57,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     housekeeping.add_to(app, graph)
     around.add_to(app, graph)
     sweep.add_to(app, graph)
-    differences.add_to(app, graph)
+    whole_runs.add_to(app, graph)
     return app
 
 
@@ -103,8 +104,7 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            following = options_of_span(over, begin, end, model, periods)
-            settings = (*(sets or ()), *following)
+            settings = (*(sets or ()), *following(over, begin, end, model, periods))
             request = Request(config, settings, strides, runs, as_json, quiet, verbose, open_page)
             asked.run_dir = request.folder.path
             cores = jobs or all_cores()
@@ -124,7 +124,12 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
     return command
 
 
-def options_of_span(
+def all_cores() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def following(
     over: str | None, begin: float | None, end: float | None, model: str | None, periods: int | None
 ) -> tuple[str, ...]:
     """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
@@ -132,8 +137,3 @@ def options_of_span(
         raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
     given = {"over": over, "from": begin, "to": end, "model": model, "periods": periods}
     return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)
-
-
-def all_cores() -> int:
-    """The processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

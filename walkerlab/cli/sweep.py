@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -143,8 +144,9 @@ def where(graph: Graph) -> str:
 
     if graph is PIPELINE:
         return PIPELINE_AT
-    module = graph.stages[0].module.partition(".")[0]
-    return f"{module}.pipeline:GRAPH"
+    package = graph.stages[0].module.partition(".")[0]
+    own = [(name, module) for name, module in list(sys.modules.items()) if name.partition(".")[0] == package]
+    return next(f"{name}:{key}" for name, module in own for key, value in vars(module).items() if value is graph)
 
 
 def show_plan(request: Request, foreseen: Foreseen) -> None:

@@ -17,7 +17,7 @@ _HERE: Final = "this project"
 _UNIT: Final = "rad, rad/s"
 _WIDTH: Final = "the gait's own, 0.15 rad and 0.25 sqrt(g/L) away"
 _Bound = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-_Bounds = tuple[_Bound, ...] | None
+_Bounds = tuple[_Bound, ...]  # empty: the usual window
 
 
 class Basin(Block):
@@ -50,7 +50,7 @@ class Basin(Block):
             default=f"below {_WIDTH}",
             sequence=True,
         ),
-    ] = None
+    ] = ()
     upper: Annotated[
         _Bounds,
         key(
@@ -61,7 +61,7 @@ class Basin(Block):
             default=f"above {_WIDTH}",
             sequence=True,
         ),
-    ] = None
+    ] = ()
     refine: Annotated[
         int,
         key("1", "parts along each axis that cells at edges of basins are divided into; 1: none", _HERE, ge=1, le=32),
@@ -80,11 +80,9 @@ class Basin(Block):
 
     @field_validator("cells", "lower", "upper")
     @classmethod
-    def _one_for_each_coordinate(
-        cls, value: tuple[float, ...] | None, info: ValidationInfo
-    ) -> tuple[float, ...] | None:
-        plane = info.data.get("plane")
-        if value is not None and plane is not None and len(value) != len(plane):
+    def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
+        if plane is not None and not usual and len(value) != len(plane):
             raise PydanticCustomError(
                 "count", "must have {wanted} numbers, one for each of plane", {"wanted": len(plane)}
             )
@@ -92,8 +90,7 @@ class Basin(Block):
 
     @field_validator("upper")
     @classmethod
-    def _above_lower(cls, value: tuple[float, ...] | None, info: ValidationInfo) -> tuple[float, ...] | None:
-        lower = info.data.get("lower")
-        if value is not None and lower is not None and any(b <= a for a, b in zip(lower, value, strict=False)):
+    def _above_lower(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if any(b <= a for a, b in zip(info.data.get("lower", ()), value, strict=False)):
             raise PydanticCustomError("order", "must be above lower")
         return value

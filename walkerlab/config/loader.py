@@ -36,6 +36,20 @@ class LoadedConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class EarlierRun:
+    """A run that a config is taken from.
+
+    text   its resolved config
+    name   of its folder, in which the same config runs again
+    label  as messages name it
+    """
+
+    text: str
+    name: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
 class Template:
     """A config that is read but not yet typed, of which many variants are made.
 
@@ -50,20 +64,6 @@ class Template:
         """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
         tree = with_settings(self.tree, settings)
         return on_the_slope(typed(tree), tree)[0]
-
-
-@dataclass(frozen=True, slots=True)
-class EarlierRun:
-    """A run that a config is taken from.
-
-    text   its resolved config
-    name   of its folder, in which the same config runs again
-    label  as messages name it
-    """
-
-    text: str
-    name: str
-    label: str
 
 
 def load(

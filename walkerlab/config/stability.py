@@ -16,6 +16,7 @@ Fate = Literal[
     "lifted-off",
     "slid",
     "no-heel-strike",
+    "bent-knee",
     "budget-exhausted",
     "solver-failed",
     "rejected",

@@ -134,7 +134,7 @@ def entries(models: set[str], kinds: set[str], others: bool, attractor: bool) ->
         found.append(Line2D([], [], color=OTHER, linewidth=1.0, label="other gaits"))
     found.append(Line2D([], [], color=BLACK, linewidth=0.9, linestyle=STYLES[False], label="unstable"))
     if attractor:
-        found.append(Line2D([], [], color=BLACK, linestyle="none", marker=",", label="attractor"))
+        found.append(Line2D([], [], color=BLACK, linestyle="none", marker=".", markersize=3, label="attractor"))
     for kind, (marker, colour) in MARKS.items():
         if kind in kinds:
             found.append(Line2D([], [], color=colour, linestyle="none", marker=marker, markersize=4, label=kind))

@@ -154,9 +154,8 @@ def caption(results: Results) -> str:
         if row["cells"]
     ]
     if summary["unsettled_cells"]:
-        said.append(
-            f"{summary['unsettled_cells']:,} cells still walk, unsettled, after {summary['steps_wanted']} steps."
-        )
+        unsettled, steps = summary["unsettled_cells"], summary["steps_wanted"]
+        said.append(f"{unsettled:,} cells still walk after {steps} steps and have settled on no gait.")
     return " ".join(said)
 
 

@@ -38,8 +38,8 @@ ADVICE = {
     Outcome.FELL: "The hip came below half a leg above the slope; start nearer to a gait (start: fixed-point).",
     Outcome.OFF_PAD: "A foot met the flank of a pad below its top, or tripped over the pad it had left: the steps do "
     "not fit the pads; try contact.terrain: after-mid-swing, or another contact.pad_pitch.",
-    Outcome.LIFTED_OFF: "The ground would have had to pull on the foot; slow the start down, or stiffen or damp the "
-    "contact.",
+    Outcome.LIFTED_OFF: "The walker left the ground: no foot was in contact for a quarter of a pendulum time or, in "
+    "the rigid model, the ground would have had to pull; slow the start down, or stiffen or damp the contact.",
     Outcome.SLID: "The stance foot slid by more than a quarter of a step; raise friction or lower the stiction "
     "velocity.",
     Outcome.NO_HEEL_STRIKE: "The swing foot did not come down within ten pendulum times; the start is far from "

@@ -26,7 +26,8 @@ from walkerlab.hybrid.rigid_observer import (
 )
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.standing import Mode, NoKnee, Standing, rolled_distance, swing_foot
+from walkerlab.mechanics.links import spread
+from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing, rolled_distance, swing_foot
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
@@ -242,6 +243,13 @@ def step_lengths(walker: Standing, start: State, before: Array, after: Array) ->
     starts, ends = [start, *map(as_state, after[:-1])], [*map(as_state, before)]
     steps = zip(starts[: len(ends)], ends, strict=True)
     return np.array([swing_foot(walker, end)[1] + rolled_distance(walker, begun, end) for begun, end in steps])
+
+
+def with_scaled_rates(walker: Standing, state: State, swing: float, stance: float) -> State:
+    """A state just after heel strike with the velocities of swing and stance leg scaled."""
+    n = len(state) // 2
+    rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
+    return (*state[:n], *spread(walker.at_strike, tuple(rates)))
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

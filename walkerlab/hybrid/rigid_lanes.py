@@ -14,7 +14,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing
+from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing, rates
 from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
@@ -65,6 +65,19 @@ def two_legs(model: Standing) -> TwoLegs | None:
         math.acos(max(-1.0, lowest)),
         math.sqrt(model.leg_length / model.gravity),
     )
+
+
+class Swings(NamedTuple):
+    """The swing phases of one walker in all lanes."""
+
+    mode: Mode
+
+
+@derivative.case(Swings, woven=True)
+def swings_derivative(system: Swings, t: float, y: State) -> State:
+    """As that of the walker alone."""
+    alpha = rates(system.mode.model, system.mode.links, y)
+    return (y[2], y[3], alpha[0], alpha[1])
 
 
 class LaneMemory(NamedTuple):
@@ -197,7 +210,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     y, k1 = four(rows, START), four(rows, START_RATE)
     left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
     h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(Mode(walker.model, walker.model.bent), 0.0, y, k1, h)
+    used, end, end_rate = stages_of(Swings(Mode(walker.model, walker.model.bent)), 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))

@@ -15,7 +15,7 @@ belongs to both legs.
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import inlined, woven
 from walkerlab.mechanics.links import gathered, reduced, solve_linked, spread
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, with_centrifugal
 from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
@@ -127,7 +127,7 @@ def standing_torques(model: Standing, s: Vector, c: Vector, F: Vector, U: Vector
     return with_centrifugal(model.centrifugal, s, c, y, n, r)
 
 
-@inlined
+@woven
 def rates(model: Standing, links: Any, y: State) -> Vector:
     """Angular accelerations (n) in rad/s^2: M'^-1 r with the followers out of the way."""
     s, c = sines_cosines(model.tree, y, 0, model.slope)

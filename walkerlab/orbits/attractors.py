@@ -23,6 +23,7 @@ from walkerlab.orbits.step_maps import StepMap
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
 BLOCKS = 10
+SMALLER_STEPS = 8
 CANDIDATES = 4  # near returns that are tried, of one number of steps
 
 
@@ -88,16 +89,34 @@ def swept(
     kept: int,
     advance: Callable[[], None] = lambda: None,
 ) -> Attractors:
-    """The attractor that contains z at the first value, followed from value to value."""
+    """The attractor that contains z at the first value, followed from value to value.
+
+    Where a walk from one value's attractor does not settle at the next, it is led there in smaller steps.
+    """
     found: list[Attractor] = []
     for value in values:
         here = settled(step_map, z, float(value), transient, kept)
+        if isinstance(here, Outcome) and found:
+            here = led(step_map, found[-1], float(value), transient, kept)
         advance()
         if isinstance(here, Outcome):
             return Attractors(tuple(found), float(value), here.label)
         found.append(here)
         z = here.last
     return Attractors(tuple(found), None, "")
+
+
+def led(step_map: StepMap, last: Attractor, value: float, transient: int, kept: int) -> Attractor | Outcome:
+    """The attractor at a value, reached from that at another in a few steps of the parameter."""
+    z = last.last
+    here: Attractor | Outcome = last
+    for part in range(1, SMALLER_STEPS + 1):
+        between = last.value + part / SMALLER_STEPS * (value - last.value)
+        here = settled(step_map, z, between, transient, kept)
+        if isinstance(here, Outcome):
+            return here
+        z = here.last
+    return here
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:

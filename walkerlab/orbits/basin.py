@@ -27,6 +27,8 @@ NONE = -1  # no attractor
 LONGEST_PERIOD = 32  # steps; an attractor that repeats itself later, or never, is aperiodic
 REPEATS = 1e-7  # distance of states that are called the same
 SETTLING = 2_000  # steps after which walks are looked at
+SETTLING_AGAIN = 400  # at the tight tolerance, from where they were
+COMING_BACK = 1_000  # steps in which walks from around an attractor must come ten times nearer to it
 WATCHED = 32  # walks that are looked at
 CAPTURE = 1e-3  # distance from an attractor at which it is called reached
 NEARER, NARROWINGS = 0.25, 6
@@ -133,7 +135,7 @@ def find_attractors(walker: TwoLegs, starts: Floats, seed: int) -> Attractors:
     rough = arrivals(walker, Attractors(), starts, SETTLING)
     alive = np.flatnonzero(rough.outcome == Outcome.WALKED)
     distinct = distinct_points(rough.last[alive])[:WATCHED]
-    settled = arrivals(walker, Attractors(), distinct, SETTLING, tolerances=tight)
+    settled = arrivals(walker, Attractors(), distinct, SETTLING_AGAIN, tolerances=tight)
     cycles: list[Floats] = []
     aperiodic = False
     for point in settled.last[settled.outcome == Outcome.WALKED]:
@@ -185,7 +187,7 @@ def reach_of(walker: TwoLegs, points: Floats, cycles: Sequence[Floats], generato
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     for _ in range(NARROWINGS):
         around = np.repeat(points, AROUND, axis=0) + reach * ways
-        back = arrivals(walker, Attractors((Cycle(points, reach),)), around, SETTLING, share=0.1)
+        back = arrivals(walker, Attractors((Cycle(points, reach),)), around, COMING_BACK, share=0.1)
         if (back.attractor == 0).all():
             return reach
         reach *= NEARER

@@ -30,7 +30,7 @@ from walkerlab.orbits.families import BranchEnd, Span, why_lost
 from walkerlab.orbits.step_maps import Cycle, StepMap, walk_steps
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
-CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.05, turn=0.9, tolerance=1e-11)
+CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
 MAPS = 256  # of values of the second parameter, kept
 
 

@@ -36,6 +36,7 @@ from walkerlab.solvers.system import State
 Floats = NDArray[np.float64]
 # places in the state: along, height, the bodies' angles, and the velocities of these
 ALONG, HEIGHT, ANGLES = 0, 1, 2
+COORDINATES = 6  # of a walker with two straight legs
 NEWTON_STEPS = 20
 
 

@@ -256,8 +256,15 @@ class Follower:
             guess, normal, xi = onto_doubled(flip, form, 0.5**halving)
             found = corrected(doubled, guess, normal, self.control.tolerance)
             if isinstance(found, Solved) and np.linalg.norm(found.x - guess) < 0.5 * xi:
-                return found
+                return self.pointing_apart(found, period)
         return None
+
+    def pointing_apart(self, start: Solved[Cycle], period: int) -> Solved[Cycle]:
+        """A gait of twice `period` steps with its tangent turned so that the halves of its cycle part further."""
+        equations = self.equations(period)
+        half = equations.at(start.x)
+        parting = half.value @ (half.jacobian @ start.tangent)
+        return start if parting > 0.0 else replace(start, tangent=-start.tangent)
 
     def trace(self, start: Solved[Cycle], period: int) -> Branch:
         """The branch from a gait along its tangent until it ends."""

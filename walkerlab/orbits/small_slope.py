@@ -98,10 +98,13 @@ def has_small_gaits(walker: Standing) -> bool:
 def seeds(walker: Standing) -> tuple[Seed, ...]:
     """The small-slope gaits that `walker` has; its own slope plays no part."""
     modes = linear_modes(walker) if has_small_gaits(walker) else None
-    long = None if modes is None else long_period_seed(walker, modes)
-    if modes is None or long is None:
+    try:
+        long = None if modes is None else long_period_seed(walker, modes)
+        if modes is None or long is None:
+            return ()
+        short = short_period_seed(walker, modes, long.period)
+    except ZeroDivisionError:  # masses that all sit in one place leave a heel strike undetermined
         return ()
-    short = short_period_seed(walker, modes, long.period)
     return (long,) if short is None else (long, short)
 
 

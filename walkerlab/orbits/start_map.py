@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.solvers.registry import method_named
@@ -89,7 +89,7 @@ def rigid_map(
     for factor_2 in stance:
         row = []
         for factor_1 in swing:
-            start = (state[0], state[1], float(factor_1) * state[2], float(factor_2) * state[3])
+            start = with_scaled_rates(walker, state, float(factor_1), float(factor_2))
             walk = take_walk(walker, method, start, steps)
             row.append((int(walk.outcome), walk.steps, walk.steps == steps))
         rows.append(np.array(row, np.int64))

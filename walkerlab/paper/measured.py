@@ -131,7 +131,8 @@ class ContactModel:
 
     start         rad and rad/s, the rigid state it was started from; None if states were not stored
     step_length   m, mean over the last completed stride; None without one
-    energy_least  J, least and largest energy over the last five steps; None if energies were not stored
+    energy_least  J, least and largest sample of the energy over the last five steps; None if energies were not stored
+    x_p_steps     that it takes from x_p with its printed digits, of ten, and how that walk ends
     stiffness     and damping in the config's own units, named in `units`
     foot_radius   m
     """
@@ -151,6 +152,8 @@ class ContactModel:
     static_penetration: float
     damping_ratio: float
     foot_radius: float
+    x_p_steps: int
+    x_p_outcome: str
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ T_LEFT: Final = result_row("t_left", "left step period, t_left", "s", "0.60", "0
 T_RIGHT: Final = result_row("t_right", "right step period, t_right", "s", "0.79", "0.77")
 T_CYCLE: Final = result_row("t_cycle", "one cycle period, t_cycle", "s", "1.39", "1.38")
 V_COM: Final = result_row("v_com", "average velocity, v_com", "m/s", "0.0246", "0.0248")
-E_AVG: Final = result_row("E_avg", "average mechanical energy, E_avg", "J", "150.13", "150.14")
+E_AVG: Final = result_row("E_avg", "average mechanical energy (5 steps), E_avg", "J", "150.13", "150.14")
 TABLE_3: Final = (T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG)
 
 EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P of a stable gait", "1", "less than one")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from walkerlab.paper.arithmetic import MM, percent_of, readings_of_fig_4b
-from walkerlab.paper.measured import Measured
+from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import (
     COORDINATES,
     DAMPING,
@@ -111,13 +111,14 @@ def walked(measured: Measured) -> str:
 
 def lost_balance_row(measured: Measured) -> Row:
     """The failure from MATLAB's initial conditions."""
-    steps = measured.contact.steps
-    text = f"{walked(measured)}, {started(measured)}."
+    steps, outcome = measured.contact.x_p_steps, measured.contact.x_p_outcome
+    text = f"from x_p with its printed digits the contact model takes {steps} of {2 * CYCLES} steps ({outcome})."
     right = measured.corrected
     if right is not None and not measured.departures.rigid:
         short = 100.0 * (1.0 - X_P[3].value / right.state[3])
-        text += f" A start with {X_P[3].text} rad/s is {short:.1f}% slower than the gait of the right equations."
-    verdict, evidence = weigh(steps == LOST_BALANCE.value, Verdict.EXPLAINED, measured.departures.contact, text)
+        text += f" Its {X_P[3].text} rad/s are {short:.1f}% slower than the gait of the right equations."
+    agrees = outcome != "walked" and steps == LOST_BALANCE.value
+    verdict, evidence = weigh(agrees, Verdict.REFUTED, measured.departures.contact, text)
     return Row(LOST_BALANCE, None, None, float(steps), verdict, evidence)
 
 

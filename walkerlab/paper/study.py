@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from walkerlab.hybrid.comparison import Array
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
+from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.paper.measured import (
+    ENERGY_STEPS,
     Characteristics,
     RigidModel,
     characteristics,
@@ -38,6 +41,7 @@ from walkerlab.paper.printed import (
 )
 from walkerlab.solvers.system import State
 
+FALLING = 4  # samples, between which a falling hip's height is a cubic
 SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
 FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
 
@@ -82,7 +86,7 @@ class AdamsStart:
         strikes = "before any heel strike" if self.heel_strikes == 0 else "after a heel strike"
         return (
             f"{self.energy:.1f} J against {E_AVG.adams.text} J in Table 3; the ground carries {self.normal_force:.1f} "
-            f"of {self.weight:.1f} N at once and {pull}; the walk ends ({self.end}) at {self.end_time:.2f} s, {strikes}"
+            f"of {self.weight:.1f} N at once and {pull}; the walk ends ({self.end}) at {self.end_time:.3f} s, {strikes}"
         )
 
 
@@ -115,6 +119,7 @@ class PaperStudy:
 
     as_printed, corrected  the gaits that x_p settles to
     from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
+    five_steps_energy      J, time mean over the first five steps of these ten
     fastest                rad/s, largest angular velocity of the gait as printed
     largest_jump           rad/s, largest change of an angular velocity at its heel strike
     """
@@ -124,6 +129,7 @@ class PaperStudy:
     as_printed: RigidModel
     corrected: RigidModel
     from_x_p: Characteristics
+    five_steps_energy: float
     fastest: float
     largest_jump: float
     impact: Impact
@@ -137,6 +143,7 @@ def study_the_paper() -> PaperStudy:
     gaits = {name: settled(walker_of_the_paper(sign)) for name, sign in SIGNS.items()}
     one_step = take_walk(assembled(printed), tight_method(), gaits["as-printed"], 1, sampled=True)
     cycles = five_cycles(printed, fixed_point_as_printed())
+    five_steps = take_walk(assembled(printed), tight_method(), fixed_point_as_printed(), ENERGY_STEPS)
     slope, rounding = slope_of(*X_P[:2])
     return PaperStudy(
         slope=slope,
@@ -144,6 +151,7 @@ def study_the_paper() -> PaperStudy:
         as_printed=rigid_model(printed, gaits["as-printed"]),
         corrected=rigid_model(right, gaits["corrected"]),
         from_x_p=characteristics(cycles.periods, cycles.lengths, cycles.mean_energy),
+        five_steps_energy=five_steps.mean_energy,
         fastest=fastest_leg(one_step),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
         impact=misprinted_impact(printed, one_step),
@@ -216,8 +224,17 @@ def adams_start() -> AdamsStart:
         pull_from=first_below_zero(walk.samples.time, normal),
         heel_strikes=walk.steps,
         end=walk.outcome.label,
-        end_time=float(walk.samples.time[-1]),
+        end_time=end_time(walker, walk),
     )
+
+
+def end_time(walker: RigidWalker, walk: RecordedWalk) -> float:
+    """When a sampled walk ends (s): a fall lies behind the last sample, and is found by inverse interpolation."""
+    assert walk.samples is not None
+    time, hip = walk.samples.time, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
+    if walk.outcome is not Outcome.FELL:
+        return float(time[-1])
+    return float(np.polynomial.Polynomial.fit(hip[-FALLING:], time[-FALLING:], FALLING - 1)(0.0))
 
 
 def first_below_zero(time: Array, signal: Array) -> float | None:

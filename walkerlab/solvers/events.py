@@ -85,7 +85,7 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
             rising = stack[top + 1, 0] < 0.0
             turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
             if turned and direction != (FALLING if rising else RISING):
-                return bisect(stack, top + 1, size, low, high)
+                return regula_falsi(stack, top + 1, size, low, high)
             continue
         split(stack, top, size)
         middle = 0.5 * (low + high)
@@ -156,8 +156,8 @@ def split(stack: Any, piece: int, size: int) -> None:
 
 
 @inlined
-def bisect(stack: Any, piece: int, size: int, low: float, high: float) -> float:
-    """Fraction at which the only crossing of a piece lies: regula falsi (Illinois), kept inside its bracket."""
+def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
+    """Fraction at which the only crossing of a piece lies: the Illinois variant, kept inside its bracket."""
     a, b = 0.0, 1.0
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0

@@ -14,6 +14,7 @@ from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.orbits.basin import NONE, Attractors, Floats, Window, edge_cells, find_attractors
 from walkerlab.orbits.scaled_starts import scaled_starts
@@ -54,6 +55,11 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
     there is not.
     """
     gait = inputs["fixedpoint"].summary
+    if len(gait["state"]) != 1 + len(COORDINATES):
+        raise ConfigError(
+            "basin takes walkers of two straight legs: this one has more coordinates just after heel strike.",
+            "Take a walker of type compass or straight-legs without a torso.",
+        )
     window = window_of(config, [float(number) for number in gait["state"][1:]])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window)
@@ -142,14 +148,15 @@ def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQu
     scene = free_scene(config, float(gait["step_length_m"]), answer)
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
+    rigid = rigid_walker(config, config.equations)
+
     def start_of(swing: float, stance: float) -> tuple[float, ...]:
-        return start_state(scene, (state[0], state[1], swing * state[2], stance * state[3]))
+        return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
 
     starts = scaled_starts(scene.walker, scene.ground, start_of, config.basin.contact_steps, own)
     settings = config.solver.contact
     starts = replace(starts, rtol=settings.rtol, atol=settings.atol)
     usual = starts.walk(1.0, 1.0).evaluations
-    rigid = rigid_walker(config, config.equations)
     return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
 
 

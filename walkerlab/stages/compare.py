@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config, Equations
+from walkerlab.config.walkers import is_plain_compass
+from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import errata
 from walkerlab.paper.measured import (
+    CYCLES,
     ContactModel,
     EnergyRecord,
     Measured,
@@ -22,12 +26,15 @@ from walkerlab.paper.measured import (
     over_last_steps,
     rigid_model,
 )
+from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.result_rows import result_rows
 from walkerlab.paper.start_rows import start_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.paper.verdict import Row, Verdict
+from walkerlab.scene.contact import GAIT_ATOL, GAIT_METHOD, GAIT_RTOL, contact_scene, start_state
 from walkerlab.scene.rigid import compass
+from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
 from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
@@ -36,12 +43,15 @@ from walkerlab.store.content import Content
 
 STEPS_OF_A_STRIDE = 2
 SAMPLES_OF_A_MOTION = 2
+X_P_BUDGET = 2_000_000  # right-hand sides
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
 
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Compare the walks of both models, and hold both against the paper."""
+    """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
+    if not is_plain_compass(config.walker):
+        return models_compared(inputs, progress)
     progress.start("compare", 3)
     study = study_the_paper()
     progress.advance()
@@ -65,6 +75,33 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
             "left_out": left_out(inputs, measured, motion),
         },
     )
+
+
+def models_compared(inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """The walks of both models against each other alone."""
+    progress.start("compare", 1)
+    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
+    gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
+    summary = {
+        "steps": {
+            "rigid": last_step(rigid),
+            "contact": {**last_step(contact), "slip_m": float(contact["slip_per_step_m"])},
+            "gait": {"period_s": gait.get("period_s"), "length_m": gait.get("step_length_m")},
+        },
+        "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
+        "dissipated_J": contact["dissipated_J"],
+    }
+    progress.advance()
+    return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": [NOT_THE_PAPERS, *motion.left_out]})
+
+
+NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's compass"}
+
+
+def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
+    """Period (s) and length (m) of a walk's last step; None if it took none."""
+    periods, lengths = walk["step_periods_s"], walk["step_lengths_m"]
+    return {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
 
 
 def row_summary(row: Row) -> dict[str, Any]:
@@ -143,6 +180,7 @@ def contact_model(config: Config, walk: Content) -> ContactModel:
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
     stride = STEPS_OF_A_STRIDE * (lengths.size // STEPS_OF_A_STRIDE)
     energy = energy_of(walk)
+    from_x_p = walk_from_x_p(config, float(summary["pitch_m"]))
     return ContactModel(
         outcome=str(summary["outcome"]),
         steps=int(summary["steps"]),
@@ -159,7 +197,18 @@ def contact_model(config: Config, walk: Content) -> ContactModel:
         static_penetration=float(summary["static_penetration_m"]),
         damping_ratio=float(summary["damping_ratio"]),
         foot_radius=config.walker.foot_radius_m,
+        x_p_steps=int(from_x_p.touch_time_s.size),
+        x_p_outcome=from_x_p.outcome.label,
     )
+
+
+def walk_from_x_p(config: Config, pitch_m: float) -> ContactWalkResult:
+    """The contact model's walk from x_p with its printed digits, both feet on the config's slope."""
+    _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
+    scene = contact_scene(config, pitch_m, pitch_m)
+    start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
+    methods = MethodSettings(method_named(GAIT_METHOD), GAIT_RTOL, GAIT_ATOL, X_P_BUDGET)
+    return walk_contact(scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start, methods, 2 * CYCLES, None)
 
 
 def energy_of(walk: Content) -> EnergyRecord | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -108,7 +108,8 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     for model in models_of(block, config, asked):
         followed = FOLLOW[model](asked, progress)
         found.append(with_curves(followed, asked, progress) if block.second is not None else followed)
-    content = Content(groups(found, parameter, block), summary(found, parameter, block))
+    said = summary(found, parameter, block) | {"left_out": left_out(found, asked)}
+    content = Content(groups(found, parameter, block), said)
     if not any(followed.branches for followed in found):
         raise NoAnswer(
             f"no gait with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}",
@@ -118,12 +119,33 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     return content
 
 
+def left_out(found: Sequence[Followed], asked: Question) -> list[dict[str, str]]:
+    """What was not followed, and why."""
+    followed = {one.model: one for one in found}
+    entries = []
+    for model in wanted_models(asked.config.continuation):
+        if model not in followed:
+            entries.append((f"the {model} model's gaits", f"{asked.parameter.key} does not touch that model"))
+        elif not followed[model].branches:
+            entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
+        elif model == CONTACT and asked.periods > CONTACT_PERIODS:
+            what = f"the contact model's gaits of more than {CONTACT_PERIODS} steps"
+            entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
+    return [{"what": what, "why": why, "saves": ""} for what, why in entries]
+
+
+def wanted_models(block: Continuation) -> tuple[str, ...]:
+    """The models that are asked for."""
+    return (RIGID, CONTACT) if block.model == "both" else (block.model,)
+
+
 def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str, ...]:
     """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
     if block.model != RIGID and config.contact is None:
         raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
-    wanted = (RIGID, CONTACT) if block.model == "both" else (block.model,)
+    wanted = wanted_models(block)
     refuse_values(asked)
+    refuse_second(config)
     touched = tuple(model for model in wanted if touches(asked, model))
     if not touched:
         raise ConfigError(
@@ -141,6 +163,20 @@ def refuse_values(asked: Question) -> None:
                 f"continuation.{name}: {asked.parameter.key} cannot be {value:g} {asked.parameter.unit}",
                 f"`walkerlab schema {asked.parameter.key}` says what the key allows.",
             )
+
+
+def refuse_second(config: Config) -> None:
+    """Raise ConfigError if the second key is no number, or if its range leaves out the config's own value."""
+    block = config.continuation.second
+    if block is None:
+        return
+    second = parameter_of(block.over, config)
+    own = second.value_in(config)
+    if own not in Span(block.least, block.most):
+        raise ConfigError(
+            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
+            "Curves begin at the config's own value; choose a range around it.",
+        )
 
 
 def touches(asked: Question, model: str) -> bool:
@@ -167,11 +203,6 @@ def with_curves(followed: Followed, asked: Question, progress: Progress) -> Foll
         return None if changed is None else rigid_map(changed, asked.parameter, asked.span.size)
 
     own = second.value_in(asked.config)
-    if own not in plane[1]:
-        raise ConfigError(
-            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
-            "Curves begin at the config's own value; choose a range around it.",
-        )
     progress.start(f"continuation: curves of bifurcations of the {followed.model} model")
     found = []
     for branch in followed.branches:
@@ -185,16 +216,20 @@ def with_curves(followed: Followed, asked: Question, progress: Progress) -> Foll
 
 
 def follow_rigid(asked: Question, progress: Progress) -> Followed:
-    """Every branch of the rigid model, its cascades, attractor and exponents."""
+    """All of the rigid model: branches, cascades, attractor, exponents, and gaits of other numbers of steps."""
+    followed, follower = rigid_branches(asked, progress)
+    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+
+
+def rigid_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower]:
+    """Every branch of the rigid model's gaits of one step, and the cascades beyond their flips."""
     config, parameter, span = asked.config, asked.parameter, asked.span
     walker_at = rigid_walkers(config, parameter)
     step_map = rigid_map(config, parameter, span.size)
     progress.start("continuation: branches of the rigid model")
     follower = Follower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
     seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
-    branches = follower.family(seeds, asked.periods)
-    followed = Followed(RIGID, step_map, branches)
-    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+    return Followed(RIGID, step_map, follower.family(seeds, asked.periods)), follower
 
 
 def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
@@ -208,7 +243,12 @@ def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
 
 
 def follow_contact(asked: Question, progress: Progress) -> Followed:
-    """The contact model's branch, its first cascades and its attractor."""
+    """All of the contact model: its branch, its cascade, its attractor and exponents."""
+    return beyond_flips(contact_branches(asked, progress), asked, CONTACT_SAMPLES, progress)
+
+
+def contact_branches(asked: Question, progress: Progress) -> Followed:
+    """The branch of the contact model's gait, and the cascade beyond its flips."""
     from walkerlab.scene.contact import contact_gait
 
     progress.start("continuation: a gait of the contact model")
@@ -230,7 +270,7 @@ def follow_contact(asked: Question, progress: Progress) -> Followed:
         follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
         seed = Seed(step_map.of_section(found.gait.z, value), value)
         branches = follower.family([seed], min(asked.periods, CONTACT_PERIODS))
-        return beyond_flips(Followed(CONTACT, step_map, branches), asked, CONTACT_SAMPLES, progress)
+        return Followed(CONTACT, step_map, branches)
     return Followed(CONTACT, None, ())
 
 

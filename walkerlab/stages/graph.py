@@ -49,6 +49,7 @@ class Stage:
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
+    of_compass     whether it is about the paper's compass, and left out for other walkers
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
@@ -56,9 +57,9 @@ class Stage:
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
-    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -66,10 +67,10 @@ class Stage:
     module: str
     purpose: str
     reads: tuple[str, ...]
-    reads_of_paper: tuple[str, ...] = ()
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
+    of_compass: bool = False
     draws: bool = False
     walks: bool = False
     has_cells: bool = False
@@ -77,10 +78,11 @@ class Stage:
     campaign_of: str = ""
     on_demand: bool = False
     keeps_parts: bool = False
-    follows: bool = False
     alone: bool = False
     early_with: tuple[str, ...] = ()
+    follows: bool = False
     does_without: Lacks = nothing
+    reads_of_paper: tuple[str, ...] = ()
 
     @property
     def optional(self) -> bool:
@@ -165,6 +167,7 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
+        of_compass=True,
         has_cells=True,
     ),
     Stage(
@@ -190,6 +193,7 @@ PIPELINE = Graph(
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
         reads_of_paper=PAPERS_WALK,
+        of_compass=True,
         has_cells=True,
     ),
     Stage(

@@ -11,7 +11,7 @@ from walkerlab.config.canonical import only, slice_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import NO_CONTACT
+from walkerlab.stages.plan import why_unsuited
 from walkerlab.stages.progress import Progress, Silent
 from walkerlab.store.code import Sources
 from walkerlab.store.content import Content
@@ -22,9 +22,25 @@ REMEMBERED = 256
 
 
 def refuse_files(stage: Stage) -> None:
-    """Raise ConfigError for a stage that works with files of its run."""
-    if stage.draws or stage.keeps_parts:
-        raise ConfigError(f"{stage.name} works with the files of its run; it has no result without them.")
+    """Raise ConfigError for a stage that has no result but files of its run."""
+    if stage.draws:
+        raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
+
+
+class PartsInMemory:
+    """Stands in for the file in which a stage keeps parts of a long result (`store.parts`): nothing outlives it."""
+
+    def __init__(self) -> None:
+        """Nothing is kept."""
+        self.kept: dict[str, list[float]] = {}
+
+    def keep(self, name: str, numbers: list[float]) -> None:
+        """Add a part."""
+        self.kept[name] = numbers
+
+    def forget(self) -> None:
+        """Remove all parts."""
+        self.kept = {}
 
 
 class Keys:
@@ -47,9 +63,10 @@ class Keys:
         keys: dict[str, str] = {}
         for stage in self.graph.needed_for(target, config):
             refuse_files(stage)
-            if stage.needs_contact and config.contact is None:
+            unsuited = why_unsuited(stage, config)
+            if unsuited is not None:
                 raise ConfigError(
-                    f"{target} cannot be had: {NO_CONTACT}.",
+                    f"{target} cannot be had: {unsuited}.",
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}
@@ -108,6 +125,8 @@ class InMemory:
         run = importlib.import_module(stage.module).run
         inputs = {name: results[name] for name in stage.inputs(config)}
         extra: dict[str, Any] = {"jobs": 1} if stage.has_cells else {}
+        if stage.keeps_parts:
+            extra["parts"] = PartsInMemory()
         try:
             return Answer(run(only(config, stage.reads), inputs, progress, **extra))
         except NoAnswer as error:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
+from walkerlab.config.walkers import is_plain_compass
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
@@ -33,6 +34,16 @@ class LeftOut:
 NO_CONTACT = "the config has no contact block"
 STILL_COMPUTED = "still being computed"
 """Why a drawing made early has to do without a result."""
+
+
+ANOTHER_WALKER = "it is about the paper's compass, and this is another walker"
+
+
+def why_unsuited(stage: Stage, config: Config) -> str | None:
+    """Why a stage means nothing under a config; None if it does."""
+    if stage.needs_contact and config.contact is None:
+        return NO_CONTACT
+    return ANOTHER_WALKER if stage.of_compass and not is_plain_compass(config.walker) else None
 
 
 def left_out(stage: str, why: str) -> LeftOut:
@@ -172,8 +183,9 @@ class Planner:
         return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
 
     def _why_left_out(self, stage: Stage) -> str | None:
-        if stage.needs_contact and self.config.contact is None:
-            return NO_CONTACT
+        unsuited = why_unsuited(stage, self.config)
+        if unsuited is not None:
+            return unsuited
         if stage.draws:
             return None
         for name in stage.inputs(self.config):

@@ -14,7 +14,7 @@ from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.further import TITLES
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import STILL_COMPUTED, LeftOut
+from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, why_unsuited
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
@@ -95,8 +95,8 @@ def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
     stage = next((stage for stage in PIPELINE.stages if stage.name == name), None)
     if stage is None or name not in PIPELINE["report"].inputs(config):
         return False
-    without_contact = stage.needs_contact and config.contact is None
-    return not without_contact and left_out.isdisjoint(stage.inputs(config))
+    left_alone = why_unsuited(stage, config) is not None
+    return not left_alone and left_out.isdisjoint(stage.inputs(config))
 
 
 def blocks_of(sections: Sequence[Section]) -> list[object]:

@@ -15,7 +15,18 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.ahead import Ahead
 from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, Planner, Step, input_digest, left_out, no_answer, plan
+from walkerlab.stages.plan import (
+    ANOTHER_WALKER,
+    STILL_COMPUTED,
+    LeftOut,
+    Planner,
+    Step,
+    input_digest,
+    left_out,
+    no_answer,
+    plan,
+    why_unsuited,
+)
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.task import Compilation, Task, kernels_told_of, nothing_compiled_yet, task_of
 from walkerlab.store import artifact, provenance
@@ -89,7 +100,7 @@ def execute(
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
-    refuse_without_contact(graph[target], config)
+    refuse_unsuited(graph[target], config)
     stages = asked_for(target, config, graph, full)
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
@@ -120,7 +131,7 @@ def preview(
     Raises ConfigError if the config has not what the target needs.
     """
     started = time.perf_counter()
-    refuse_without_contact(graph[target], config)
+    refuse_unsuited(graph[target], config)
     planner = Planner(config, folder, graph, force)
     run = Run(planner, Silent(), jobs=1)
     for step in planner.plan(asked_for(target, config, graph, full)):
@@ -134,9 +145,14 @@ def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[St
     return (*stages, *graph.campaigns_of(target)) if full else stages
 
 
-def refuse_without_contact(stage: Stage, config: Config) -> None:
+def refuse_unsuited(stage: Stage, config: Config) -> None:
     """Raise ConfigError if a stage is asked for that the config leaves out."""
-    if stage.needs_contact and config.contact is None:
+    unsuited = why_unsuited(stage, config)
+    if unsuited == ANOTHER_WALKER:
+        raise ConfigError(
+            f"{stage.name} is left out: {unsuited}.", "`walkerlab compare` and `report` serve every walker."
+        )
+    if unsuited is not None:
         raise ConfigError(
             f"{stage.name} needs a contact block, and the config has none.",
             "Add one to the config; `walkerlab schema` lists its keys.",

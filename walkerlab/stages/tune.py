@@ -13,7 +13,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.orbits.scaled_starts import (
@@ -189,8 +189,7 @@ class Stage:
 
     def scaled_state(self, swing: float, stance: float) -> State:
         """The rigid start with its velocities scaled."""
-        theta_1, theta_2, omega_1, omega_2 = self.rigid_state
-        return (theta_1, theta_2, swing * omega_1, stance * omega_2)
+        return with_scaled_rates(self.rigid, self.rigid_state, swing, stance)
 
     def factors_at_the_end(self, walk: ContactWalkResult) -> tuple[float, float] | None:
         """Velocities of the last step of a walk, once the foot behind has lifted, over those of the rigid start."""

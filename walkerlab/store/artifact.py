@@ -84,7 +84,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
         raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
     image = hdf5.image(content.groups, {**root, **own})
     seal = hashlib.sha256(image).hexdigest()
-    write_atomically(path, image + f"\nwalkerlab sha256 {seal}\n".encode())
+    write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
     return Stored(
         groups=content.groups,
         summary=content.summary,

@@ -110,7 +110,8 @@ class Content:
         object.__setattr__(self, "groups", with_parents(self.groups))
         for path in filter(None, self.groups):
             above, _, name = path.rpartition("/")
-            check_name(name)
+            for part in path.split("/"):
+                check_name(part)
             parent = self.groups.get(above, Group({}))
             if name in parent.variables or name in parent.sizes:
                 raise ValueError(f"{path!r} is a group, and {name!r} a variable or dimension beside it")

@@ -58,8 +58,10 @@ def refused(path: Path, error: OSError) -> StorageError:
     return StorageError(f"{path} could not be stored: {error.strerror or error}.", advice)
 
 
-def write_atomically(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, *parts: bytes) -> None:
     """Put a file in place, complete and on the disk, or leave what was there untouched.
+
+    parts  of its content, one after another
 
     Raises StorageError if the system refuses (full disk, read-only folder, ...).
     """
@@ -69,7 +71,7 @@ def write_atomically(path: Path, data: bytes) -> None:
             raise StorageError(f"{path} could not be stored: its folder is not there any more.")
         try:
             with temporary.open("xb") as file:
-                file.write(data)
+                file.writelines(parts)
                 file.flush()
                 os.fsync(file.fileno())
             temporary.replace(path)

@@ -95,12 +95,13 @@ class Columns:
     def variables(
         self, inverse: NDArray[np.int64], shape: tuple[int, ...], dims: tuple[str, ...]
     ) -> Iterator[tuple[str, Variable]]:
-        """The variables over the points, by name.
+        """The variables over the points, by name; each is handed over, so that no two copies are held of all.
 
         inverse      which result each point has
         shape, dims  of the points
         """
-        for name, column in sorted(self._columns.items()):
+        for name in sorted(self._columns):
+            column = self._columns.pop(name)
             values = column.typed()[inverse]
             extra = values.shape[1:]
             own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))

@@ -208,7 +208,7 @@ class Sweep:
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
     """Raise ConfigError for a stage that cannot be swept."""
-    can = [stage.name for stage in graph.stages if not stage.draws and not stage.keeps_parts]
+    can = [stage.name for stage in graph.stages if not stage.draws]
     if name not in can:
         raise ConfigError(f"--stage {name}: cannot be swept.", f"Stages that can: {', '.join(can)}.")
 

@@ -1,0 +1,83 @@
+"""Figure 15 and the report's section on basins, of a grid made by hand."""
+
+import numpy as np
+import pytest
+from synthetic_walks import stored
+
+from walkerlab.config.loader import load
+from walkerlab.figures.figure_15 import FIGURE, attractor_name, sides_of
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.basin import NONE
+from walkerlab.report.results import Results
+from walkerlab.report.sections.basin import section
+from walkerlab.stages.basin import group_of, summary, window_of
+from walkerlab.stages.basin_pieces import Found
+
+CONFIG = load(None, ["basin.cells=[4,3]"]).config
+Z = [0.17, -0.6, -0.86]
+
+
+def basin(attractor, aperiodic=False, config=CONFIG):
+    """Cells walk where they have an attractor or -2, for none; the others fall."""
+    window = window_of(config, Z)
+    attractor = np.resize(attractor, window.size)
+    walks = attractor != NONE
+    found = Found(np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, 7, 1))
+    attractors = [{"period": 1}, {"period": 2}]
+    said = summary(config, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
+    return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}
+
+
+def test_it_says_how_much_of_the_window_walks_and_where_to():
+    results = basin([0, 0, 1, NONE])
+    drawing = FIGURE.drawn(results)
+    assert drawing.png.startswith(b"\x89PNG")
+    assert "75 % of the window walk" in drawing.caption
+    assert "The gait of 1 step is reached from 6 cells, after 7 steps in the median." in drawing.caption
+    for label in ("gait of 1 step", "gait of 2 steps", "fell", "rigid gait of one step"):
+        assert label in drawing.svg.decode()
+    assert drawing.svg == FIGURE.drawn(results).svg
+
+
+def test_walks_that_settle_nowhere_are_told_apart():
+    drawing = FIGURE.drawn(basin([-2, NONE], aperiodic=True))
+    assert "never repeats itself" in drawing.svg.decode()
+    assert "no walk settles on a gait" in drawing.svg.decode()
+    assert "6 cells still walk after 300 steps" in drawing.caption
+
+
+def test_of_three_coordinates_the_middle_plane_is_drawn():
+    config = load(None, ["basin.plane=[theta_2,dtheta_1,dtheta_2]", "basin.cells=[3,3,3]"]).config
+    assert "of which the middle plane is shown" in FIGURE.drawn(basin([0, NONE], config=config)).caption
+
+
+def test_attractors_of_one_period_have_letters():
+    rows = [{"period": 1}, {"period": 3}, {"period": 3}]
+    assert [attractor_name(number, rows) for number in range(3)] == [
+        "gait of 1 step",
+        "gait of 3 steps (a)",
+        "gait of 3 steps (b)",
+    ]
+
+
+def test_cells_are_drawn_around_their_middles():
+    assert sides_of(np.array([0.5, 1.5, 2.5])) == (0.0, 3.0)
+
+
+def test_without_a_basin_it_says_how_to_make_one():
+    why = FIGURE.why_left_out({}, {"basin": "it was not asked for; `walkerlab basin` makes it"})
+    assert why == "it needs basin: it was not asked for; `walkerlab basin` makes it"
+
+
+def test_the_report_has_its_shares_and_attractors():
+    made = section(Results(CONFIG, basin([0, 0, 1, NONE]), (), ()))
+    assert "75 % of the window walk" in made.blocks[0].text
+    assert [row[1].text for row in made.blocks[1].bodies[0].rows] == ["6", "3"]
+    assert section(Results(CONFIG, {}, (), ())) is None
+
+
+@pytest.mark.parametrize("stage", ["plot", "report"])
+def test_drawings_take_it_in_once_it_is_there(stage):
+    from walkerlab.stages.graph import PIPELINE
+
+    assert "basin" in PIPELINE[stage].if_current

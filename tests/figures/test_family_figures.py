@@ -1,0 +1,54 @@
+"""What the figures of families of gaits show."""
+
+import numpy as np
+import pytest
+from synthetic_families import END, FLIP, families
+
+from walkerlab.figures import figure_13, figure_14, figure_16
+from walkerlab.figures.bifurcation_diagram import MODELS, STYLES, curve_of
+from walkerlab.figures.canvas import styled
+
+FIGURES = [figure_13.FIGURE, figure_14.FIGURE, figure_16.FIGURE]
+
+
+def plotted(figure):
+    with styled():
+        return figure.plot(families())
+
+
+@pytest.mark.parametrize("figure", FIGURES, ids=[figure.name for figure in FIGURES])
+def test_the_same_families_give_the_same_bytes(figure):
+    assert figure.drawn(families()) == figure.drawn(families())
+
+
+def test_curves_over_two_parameters_are_left_out_where_none_were_asked_for():
+    why = figure_16.FIGURE.why_left_out(families(curves=False), {})
+    assert why == "continuation: no curves over two parameters (continuation.second)"
+
+
+def test_a_branch_is_solid_up_to_its_flip_and_dashed_beyond():
+    axes = plotted(figure_13.FIGURE).axes[0]
+    solid, dashed = (
+        [line for line in axes.lines if line.get_color() == MODELS["rigid"] and line.get_linestyle() == style]
+        for style in ("-", "--")
+    )
+    ends = sorted((float(line.get_xdata()[0]), float(line.get_xdata()[-1])) for line in solid)
+    assert ends[0] == (1.0, FLIP)
+    assert {ends[1], ends[2]} == {(FLIP, END)}
+    assert [(float(line.get_xdata()[0]), float(line.get_xdata()[-1])) for line in dashed] == [(FLIP, END)]
+    assert STYLES[True] == "-"
+
+
+def test_a_doubled_branch_begins_at_its_parents_flip_with_equal_steps():
+    group = families()["continuation"]["rigid/branch_1"]
+    curve = curve_of(group, "step_period")
+    assert curve.value[0] == FLIP
+    assert np.ptp(curve.quantity[0]) == 0.0
+    assert curve.stable.all()
+
+
+def test_the_captions_say_where_gaits_change():
+    results = families()
+    assert "first doubles its period at 4 deg" in figure_13.FIGURE.caption(results)
+    assert "a flip at 4" in figure_14.FIGURE.caption(results)
+    assert figure_16.FIGURE.caption(results).startswith("Curves of flips of the rigid model's gaits")

@@ -1,0 +1,74 @@
+"""A whole report of real results, kept short: sections and the results made by hand know the keys that stages store."""
+
+import pytest
+import synthetic_results as made
+from html_page import Page
+
+from walkerlab.benchmarks import ladder, references
+from walkerlab.benchmarks.trials import ContactTrial, RigidTrial
+from walkerlab.config.loader import load
+from walkerlab.report.registry import SECTIONS
+from walkerlab.report.results import Results
+from walkerlab.stages import stability
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.runner import execute
+from walkerlab.store import artifact
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.verification import cells
+from walkerlab.verification.catalogue import shipped
+
+SETS = ("strides=1", "tune.cells=2")
+JUDGED = ("paper", "rigid-no-hip-mass")
+STAGES = PIPELINE["report"].inputs(load().config)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The report of the paper's config: two steps, four cells of the map, two cases, two methods."""
+    with pytest.MonkeyPatch.context() as patch:
+        cases = tuple(case for case in shipped() if case.name in JUDGED)
+        assert len(cases) == len(JUDGED)
+        patch.setattr(stability, "judged", lambda own: cases)
+        patch.setattr(cells, "PROBLEMS", cells.PROBLEMS[:1])
+        for trial in (RigidTrial, ContactTrial):
+            patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
+        patch.setattr(ladder, "OWN_LADDER", (1e-3, 1e-6))
+        patch.setattr(ladder, "REPEATS", 1)
+        patch.setattr(references, "TIGHTEST", {"dop853": 1e-8, "radau5": 1e-9})
+        loaded = load(None, SETS)
+        folder = RunFolder(tmp_path_factory.mktemp("runs"), loaded.run_name)
+        return loaded.config, folder, execute(loaded.config, "report", folder)
+
+
+@pytest.fixture(scope="module")
+def results(run):
+    """What the report was made of."""
+    config, folder, _ = run
+    return Results(config, {name: artifact.read(folder.artifact(name)) for name in STAGES})
+
+
+def test_every_stage_ran_and_the_page_is_there(run):
+    _, folder, report = run
+    assert report.no_answer is None
+    assert {done.stage for done in report.steps if done.action == "run"} == {*STAGES, "report"}
+    page = Page((folder.path / report.summary["html"]).read_text(encoding="utf-8"))
+    assert len(report.summary["tables"]) > 10
+    assert len(report.summary["figures"]) > 8
+    assert not {"None", "nan", "inf"} & set(page.text.split())
+
+
+@pytest.mark.parametrize("make", SECTIONS, ids=lambda make: make.__module__.rpartition(".")[2])
+def test_a_section_has_something_to_show_of_real_results(results, run, make):
+    if make.__module__.endswith(("figures", "left_out")):
+        pytest.skip("of pictures and of what is missing")
+    section = make(results)
+    assert section is not None
+    assert section.blocks
+
+
+@pytest.mark.parametrize("stage", made.EVERYTHING)
+def test_results_made_by_hand_have_no_key_that_real_ones_lack(results, stage):
+    by_hand, real = made.EVERYTHING[stage](), results.stored[stage]
+    assert set(by_hand.summary) <= set(real.summary)
+    for name, group in by_hand.groups.items():
+        assert set(group.variables) <= set(real.groups[name].variables)

@@ -1,0 +1,117 @@
+"""The stage `continuation`: what it stores, in which unit, and which questions it turns away."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from walkerlab.config.canonical import only
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.scene.parameter import parameter_of
+from walkerlab.stages import continuation
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+
+
+def config(*sets):
+    return load(sets=[f"continuation.{one}" if one.split("=")[0] in KEYS else one for one in sets]).config
+
+
+KEYS = ("over", "from", "to", "model", "periods", "points", "second.over", "second.from", "second.to")
+
+
+def follow(*sets):
+    return continuation.run(only(config(*sets), PIPELINE["continuation"].reads), {}, Silent())
+
+
+@pytest.fixture(scope="module")
+def in_degrees():
+    return follow("over=slope_deg", "from=3", "to=5", "periods=2")
+
+
+def test_values_are_in_the_unit_of_the_key_that_was_asked_for(in_degrees):
+    (in_radians,) = [
+        one["value"]
+        for one in follow(f"from={math.radians(4)}", f"to={math.radians(4.6)}", "periods=1").summary["bifurcations"]
+        if one["kind"] == "flip"
+    ]
+    said = in_degrees.summary
+    (first,) = [one["value"] for one in said["bifurcations"] if one["kind"] == "flip" and one["period"] == 1]
+    assert (said["over"], said["unit"]) == ("slope_deg", "deg")
+    assert first == pytest.approx(math.degrees(in_radians), abs=1e-9)
+
+
+def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_degrees):
+    said = in_degrees.summary
+    assert set(said) >= {"branches", "bifurcations", "lyapunov", "over", "unit"}
+    for number, branch in enumerate(said["branches"]):
+        assert set(branch) >= {"model", "period", "from", "to", "points", "stable_range", "ends"}
+        group = in_degrees[f"rigid/branch_{number}"]
+        assert group["value"].size == branch["points"]
+        assert group["step_period"].shape == (branch["points"], branch["period"])
+    for one in said["bifurcations"]:
+        assert set(one) >= {"kind", "period", "value", "multiplier", "model"}
+        assert 3.0 <= one["value"] <= 5.0
+    for one in said["lyapunov"]:
+        assert set(one) >= {"value", "exponent", "uncertainty"}
+
+
+def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_degrees):
+    said = in_degrees.summary
+    (number,) = [i for i, branch in enumerate(said["branches"]) if branch["period"] == 2]
+    group = in_degrees[f"rigid/branch_{number}"]
+    assert group["mark_after"][0] == -1
+    assert group["mark_value"][0] == said["branches"][number]["from"]
+    assert np.ptp(group["mark_step_period"][0]) == 0.0
+
+
+def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value():
+    found = follow(
+        "over=slope_deg", "from=4", "to=4.8", "periods=1",
+        "second.over=walker.hip_mass_kg", "second.from=9.5", "second.to=10.5",
+    )  # fmt: skip
+    curve = found["rigid/curve_0"]
+    (flip,) = [one["value"] for one in found.summary["bifurcations"] if one["kind"] == "flip"]
+    order = np.argsort(curve["second"])
+    assert np.interp(10.0, curve["second"][order], curve["value"][order]) == pytest.approx(flip, abs=1e-9)
+
+
+def test_what_follows_from_a_key_follows_it():
+    own = config("walker={leg_length_m: 1.0}")
+    longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
+    assert longer.walker.foot_to_mass_m == 0.7  # half of the length, unless it is given
+    given = config("walker.foot_to_mass_m=0.5")
+    assert parameter_of("walker.leg_length_m", given).config_at(given, 1.4).walker.foot_to_mass_m == 0.5
+    assert parameter_of("walker.leg_length_m", given).config_at(given, -1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [
+        (["over=walker.type"], "not a number"),
+        (["over=walker"], "is a block of keys"),
+        (["over=strides"], "touches no model"),
+        (["over=slope_dge"], "did you mean slope_deg?"),
+        (["over=contact.stiffness", "from=1e5", "to=2e5"], "does not touch the rigid model"),
+        (["over=walker.hip_mass_kg", "from=-1", "to=2"], "cannot be -1 kg"),
+        (["contact=null", "model=contact"], "needs a contact block"),
+        (["contact=null", "over=contact.stiffness"], "the config has none"),
+        (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
+    ],
+)  # fmt: skip
+def test_bad_questions_end_in_words(sets, said):
+    with pytest.raises(ConfigError, match=re.escape(said)) as refused:
+        follow(*sets)
+    assert refused.value.advice
+
+
+def test_a_span_without_a_gait_has_no_answer():
+    with pytest.raises(NoAnswer, match="no gait with slope_deg from -3 to -1 deg"):
+        follow("over=slope_deg", "from=-3", "to=-1")
+
+
+def test_a_span_runs_upward():
+    with pytest.raises(ConfigError, match="must be above `from`"):
+        config("from=0.2", "to=0.1")

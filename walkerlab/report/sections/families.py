@@ -1,0 +1,91 @@
+"""Families of gaits over a parameter: what was found, in a paragraph, and the bifurcations in a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
+from walkerlab.report.numbers import count, number, quantity
+from walkerlab.report.results import Results
+
+MODELS = ("rigid", "contact")
+
+
+def section(results: Results) -> Section | None:
+    """Branches, their bifurcations and the chaos beyond; None if none were followed."""
+    summary = results.summary("continuation")
+    if summary is None or not summary.get("branches"):
+        return None
+    blocks: list[Block] = [Paragraph(" ".join(findings(summary)))]
+    if summary["bifurcations"]:
+        blocks.append(bifurcations(summary))
+    return Section("families", f"Families of gaits over {summary['over']}", tuple(blocks))
+
+
+def findings(summary: Mapping[str, Any]) -> list[str]:
+    """What there is to say, sentence by sentence."""
+    unit = str(summary["unit"])
+    said = []
+    for model in MODELS:
+        stable = [one for one in summary["branches"] if one["model"] == model and one["period"] == 1]
+        ranges = [pair for one in stable for pair in one["stable_ranges"]]
+        if ranges:
+            widest = max(ranges, key=lambda pair: pair[1] - pair[0])
+            said.append(
+                f"The {model} model's gait of one step is stable from {quantity(widest[0], unit, 4)} to "
+                f"{quantity(widest[1], unit, 6)}."
+            )
+    shift = first_flip(summary, "contact"), first_flip(summary, "rigid")
+    if shift[0] is not None and shift[1] is not None:
+        said.append(
+            f"Compliance and creep of the ground move its first flip by {quantity(shift[0] - shift[1], unit, 3)}."
+        )
+    said += [
+        f"From {count(cascade['period'], 'step')} on the {cascade['model']} model's period doubles "
+        f"{len(cascade['flips'])} times, with ratios of {', '.join(number(r, 4) for r in cascade['ratios'])} "
+        f"(Feigenbaum: 4.669); doublings accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
+        for cascade in summary["cascades"]
+        if "accumulates_at" in cascade
+    ]
+    for one in summary["attractors"]:
+        if one["aperiodic_from"] is not None:
+            said.append(f"Walks first settle on nothing periodic at {quantity(one['aperiodic_from'], unit, 4)}.")
+        if one["lost_at"] is not None:
+            said.append(
+                f"At {quantity(one['lost_at'], unit, 4)} the {one['model']} model leaves its attractor: {one['ended']}."
+            )
+    wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
+    if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
+        said.append(
+            f"The largest Lyapunov exponent found is {number(wild['exponent'], 3)} a step "
+            f"(standard error {number(wild['uncertainty'], 1)}), at {quantity(wild['value'], unit, 4)}."
+        )
+    return said
+
+
+def first_flip(summary: Mapping[str, Any], model: str) -> float | None:
+    """Where a model's gait of one step first doubles its period."""
+    found = [
+        one["value"]
+        for one in summary["bifurcations"]
+        if (one["model"], one["kind"], one["period"]) == (model, "flip", 1)
+    ]
+    return min(found, default=None)
+
+
+def bifurcations(summary: Mapping[str, Any]) -> Block:
+    """Every bifurcation that was located."""
+    unit = f" ({summary['unit']})" if summary["unit"] not in ("", "1") else ""
+    rows = [
+        [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), number(one["multiplier"][0], 6)]
+        for one in summary["bifurcations"]
+    ]
+    columns = [
+        Column("kind"),
+        Column("model"),
+        Column("steps of the gait", numeric=True),
+        Column(f"{summary['over']}{unit}", numeric=True),
+        Column("critical multiplier", numeric=True),
+    ]
+    return table("Bifurcations, as zeros of their test functions", columns, rows)
