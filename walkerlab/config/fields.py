@@ -97,7 +97,7 @@ def kind(annotation: Any) -> str:
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(kind(part) for part in get_args(annotation)))
+        return " or ".join(dict.fromkeys(kind(part) for part in get_args(annotation) if part is not types.NoneType))
     return "block"
 
 

@@ -28,7 +28,7 @@ def scene(config: Config, run: str) -> str:
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
         f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of {number(config.slope_rad)} rad "
-        f"({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
+        f"({number(math.degrees(config.slope_rad), 3)}°){equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
 
@@ -53,10 +53,12 @@ def walker_in_words(walker: Any) -> str:
 
 
 def equations(config: Config) -> str:
-    """Which equations of motion."""
+    """Which equations of motion, where there is more than one set of them."""
+    if config.walker.type != "compass":
+        return ""
     if config.equations == "as-printed":
-        return "equations of motion as the paper prints them, misprint of eq. A.5 included"
-    return "corrected equations of motion"
+        return ", with the equations of motion as the paper prints them, misprint of eq. A.5 included"
+    return ", with the corrected equations of motion"
 
 
 def state(start: tuple[float, ...]) -> str:

@@ -11,7 +11,7 @@ from walkerlab.report.results import Results
 
 HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
 ROUNDING = 1e-6
-"""Relative drift of an energy that counts as constant."""
+"""Relative drift of an energy that counts as constant, and depth, in leg lengths, that is no scuffing."""
 
 
 def section(results: Results) -> Section | None:
@@ -19,7 +19,7 @@ def section(results: Results) -> Section | None:
     summary = results.summary("simulate")
     if summary is None:
         return None
-    rows = [row for row in (pull(summary), grip(results, summary), scuff(summary), energy(summary)) if row]
+    rows = [row for row in (pull(summary), grip(results, summary), scuff(results, summary), energy(summary)) if row]
     if not rows:
         return None
     columns = [Column("assumption"), Column("measured", wide=True), Column("value", numeric=True), Column("verdict")]
@@ -62,13 +62,14 @@ def grip(results: Results, summary: Mapping[str, Any]) -> list[str | Cell] | Non
     return ["The stance foot does not slip", measured, number(ratio, 4), HOLDS if enough else FAILS]
 
 
-def scuff(summary: Mapping[str, Any]) -> list[str | Cell] | None:
+def scuff(results: Results, summary: Mapping[str, Any]) -> list[str | Cell] | None:
     """Scuffing is not considered."""
     depth = summary.get("max_scuff_depth_m")
     if depth is None:
         return None
     measured = "deepest that the swing foot passes below the ground in mid-swing"
-    return ["Scuffing is not considered", measured, length(depth, 3), NOTED if depth > 0 else HOLDS]
+    seen = depth > ROUNDING * results.config.walker.leg_length_m
+    return ["Scuffing is not considered", measured, length(depth if seen else 0.0, 3), NOTED if seen else HOLDS]
 
 
 def energy(summary: Mapping[str, Any]) -> list[str | Cell] | None:

@@ -17,10 +17,11 @@ def section(results: Results) -> Section | None:
     summary = results.summary("continuation")
     if summary is None or not summary.get("branches"):
         return None
-    blocks: list[Block] = [Paragraph(" ".join(findings(summary)))]
+    first, *others = findings(summary) or [f"{count(len(summary['branches']), 'branch', 'branches')} followed."]
+    blocks: list[Block] = [Paragraph(" ".join(others))] if others else []
     if summary["bifurcations"]:
         blocks.append(bifurcations(summary))
-    return Section("families", f"Families of gaits over {summary['over']}", tuple(blocks))
+    return Section("families", f"Families of gaits over {summary['over']}", tuple(blocks), first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
