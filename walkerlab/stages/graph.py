@@ -156,6 +156,14 @@ PIPELINE = Graph(
         has_cells=True,
     ),
     Stage(
+        "engines",
+        "walkerlab.stages.engines",
+        "Walk in other engines (MuJoCo, Drake, Exudyn): our law in their integrators, and their own contact.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact"),
+        inputs=gait_for_start_or_pads,
+        needs_contact=True,
+    ),
+    Stage(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
@@ -177,7 +185,7 @@ PIPELINE = Graph(
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune", "stability-maps"),
+        if_current=("accuracy", "engines", "tune", "stability-maps"),
         draws=True,
     ),
     Stage(
@@ -186,7 +194,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("stability-maps",),
+        if_current=("engines", "stability-maps"),
         draws=True,
     ),
 )
