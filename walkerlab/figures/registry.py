@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from walkerlab.figures import (
     accuracy,
+    engines,
     figure_02,
     figure_05,
     figure_06,
@@ -28,5 +29,6 @@ FIGURES: tuple[Illustration, ...] = (
     figure_11.FIGURE,
     figure_12.FIGURE,
     *accuracy.FIGURES,
+    *engines.FIGURES,
     *stability_maps.FIGURES,
 )

@@ -232,7 +232,7 @@ class Bench:
         omega = math.sqrt(self.task.target.gravity / self.task.target.penetration)
         ratio = self.task.target.damping_ratio
         slow = omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else omega * ratio
-        return 12.0 / slow
+        return 8.0 / slow
 
     def at_rest(self) -> float:
         """Penetration (m) of a ball that was dropped from the surface."""
@@ -241,7 +241,7 @@ class Bench:
     def damping_ratio(self, depth: float) -> float:
         """Of the oscillator that fits the ball's motion about its rest (least squares of accelerations)."""
         omega = math.sqrt(self.task.target.gravity / self.task.target.penetration)
-        motion = self.after(self.settling_s / 6.0, 0.0, depth, (0.0, -0.02 * depth * omega))
+        motion = self.after(self.settling_s / 4.0, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # means of two ends of a step stand for its middle, whatever the engine's own rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
