@@ -137,7 +137,8 @@ def caption_errors(scene: str, results: Results) -> str:
     return (
         f"{scene}: (a) the same law in every integrator, its end state after {reference['until_s']:.3g} s against "
         f"walkerlab's own at tight tolerance, which two methods agree on to {reference['agreement']:.1e}; (b) own "
-        f"contact, the last of ten steps. Runs that ended otherwise are left out. {summary['conclusions'][scene][SAME_LAW]}"
+        f"contact, the last of ten steps. Runs that ended otherwise are left out. "
+        f"{summary['conclusions'][scene][SAME_LAW]}"
     )
 
 

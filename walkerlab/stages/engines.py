@@ -318,7 +318,7 @@ SWING = {
     "step_s": ("s", "step size, the largest one where steps are adapted"),
     "tolerance": ("1", "relative tolerance where steps are adapted"),
     "error": ("1", "largest difference of the end state, rad and rad/s"),
-    "energy_drift_J": ("J", "change of the mechanical energy"),
+    "energy_drift_j": ("J", "change of the mechanical energy"),
     "order": ("1", "order observed against the run with twice the step"),
     "wall_s": ("s", "run time"),
 }

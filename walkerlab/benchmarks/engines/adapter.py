@@ -23,6 +23,7 @@ class Contact:
     mass             that stands on one foot (kg)
     gravity          towards the ground (m/s^2)
     penetration      under that weight at rest (m)
+    exponent         of the penetration that the force grows with
     damping_ratio    c / (2 sqrt(k m)) there
     friction         tangential over normal force of a foot that slides
     creep_load       tangential over normal force of a foot that stands
@@ -32,6 +33,7 @@ class Contact:
     mass: float
     gravity: float
     penetration: float
+    exponent: float
     damping_ratio: float
     friction: float
     creep_load: float

@@ -209,14 +209,12 @@ def assembled(plant: Any, model: PlanarModel, own: OwnContact | None) -> tuple[l
         plant.set_contact_model(ContactModel.kPoint)
         point = np.array((0.0, model.balls[0].ground_m, 0.0))
         pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), point)
-        floor = plant.RegisterCollisionGeometry(
-            plant.world_body(), pose, HalfSpace(), "floor", material(own, rigid=True)
-        )
+        floor = plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "floor", material(own))
         for number, ball in enumerate(model.balls):
             from pydrake.geometry import Sphere
 
             place = RigidTransform(np.array((*ball.centre_m, 0.0)))
-            sphere, surface = Sphere(ball.radius_m), material(own, rigid=False)
+            sphere, surface = Sphere(ball.radius_m), material(own)
             feet.append(plant.RegisterCollisionGeometry(bodies[ball.link], place, sphere, f"foot {number}", surface))
     plant_order = [start for joint in joints for start in joint]
     return plant_order, feet, floor
@@ -257,8 +255,8 @@ def inertia(link: Link) -> Any:
     )
 
 
-def material(own: OwnContact, rigid: bool) -> Any:
-    """Surface of a foot, or of the floor, which is stiff and adds no damping of its own."""
+def material(own: OwnContact) -> Any:
+    """Surface of a foot and of the floor alike: half of the compliance each."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
@@ -267,7 +265,7 @@ def material(own: OwnContact, rigid: bool) -> Any:
     friction = CoulombFriction(settings["friction"], settings["friction"])
     dissipation = settings.get("hunt_crossley_dissipation")
     stiffness = settings["point_contact_stiffness"]
-    # Drake puts the two surfaces' springs in series and weighs dissipation by the other's share
+    # two springs in series
     AddContactMaterial(
         properties=properties,
         dissipation=dissipation,

@@ -102,7 +102,7 @@ class SwingRow:
     step_s: float
     tolerance: float | None
     error: float
-    energy_drift_J: float
+    energy_drift_j: float
     order: float | None
     wall_s: float
 
@@ -266,8 +266,8 @@ def lost_row(
     """A run that was lost with its process, or that the engine refused."""
     outcome = Outcome.BUDGET_EXHAUSTED if lost.timed_out else Outcome.SOLVER_FAILED
     return Row(
-        scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None, 0.0,
-        None, None, None, 0, outcome.label, lost.why,
+        scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None,
+        0.0, None, None, None, 0, outcome.label, lost.why,
     )  # fmt: skip
 
 
@@ -282,7 +282,7 @@ def target_of(scene: EngineScene) -> Contact | None:
     stiffness = law.exponent * mass * g / depth
     creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.stiction_velocity)
     ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
-    return Contact(mass, g, depth, ratio, friction.dynamic, CREEP_LOAD, creep)
+    return Contact(mass, g, depth, law.exponent, ratio, friction.dynamic, CREEP_LOAD, creep)
 
 
 def bisected(function: Any, low: float, high: float) -> float:
@@ -405,7 +405,7 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
                     drift,
                     order,
                     answer.wall_s,
-                )  # fmt: skip
+                )
             )
             before = error
     return rows, lost

@@ -52,7 +52,7 @@ ENGINES = {
     for engine in (
         Engine("mujoco", "mujoco", "mujoco"),
         Engine("drake", "pydrake", "drake"),
-        # Engine("exudyn", "exudyn", "exudyn"),
+        Engine("exudyn", "exudyn", "exudyn"),
     )
 }
 

@@ -44,8 +44,8 @@ def introduction(summary: Mapping[str, Any]) -> str:
     versions = listed(f"{name} {version}" for name, version in summary["versions"].items())
     return (
         f"The walker went over from its parts into {versions}, with tilted gravity for the slope. On the same law, "
-        "this project's compiled contact force acts as an external force, and what is compared is the integrator. With its "
-        "own contact each engine was first tuned to the same static penetration, damping ratio and friction, and what "
+        "this project's compiled contact force acts as an external force, and what is compared is the integrator. With "
+        "its own contact each engine was first tuned to the same static penetration, damping ratio and friction, and what "
         "is compared is the model. Run times contain each engine's steps and the rules of the walk."
     )
 
@@ -182,7 +182,7 @@ def swings(summary: Mapping[str, Any]) -> Table:
                 str(best["promised_order"]),
                 ", ".join(orders) if orders else "adapted",
                 number(best["error"], 2),
-                number(best["energy_drift_J"], 2),
+                number(best["energy_drift_j"], 2),
             ]
         )
     note = "The walker hinged at its stance foot, without ground, against this project's equations and SciPy's DOP853."
