@@ -419,7 +419,7 @@ def swing_ladder(name: str, integrator: Integrator) -> Iterator[Stepping]:
         yield from (Stepping(name, h) for h in SWING_STEPS)
 
 
-def swing_truth(scene: EngineScene, start: Floats) -> tuple[Floats, Any]:
+def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
@@ -442,7 +442,7 @@ def swing_truth(scene: EngineScene, start: Floats) -> tuple[Floats, Any]:
         gravity = scene.ours.gravity_down * upward - scene.ours.gravity_along * forward
         return float(0.5 * y[n:] @ M @ y[n:] + gravity)
 
-    done = solve_ivp(rate, (0.0, SWING_S), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    done = solve_ivp(rate, (0.0, until_s), start, method="DOP853", rtol=1e-13, atol=1e-14)
     return np.asarray(done.y[:, -1]), energy
 
 

@@ -34,7 +34,7 @@ CANNOT_EXPRESS = (
     "a force that grows with a power of the penetration, or damping that does: its contact is linear",
     "stiffness in N/m: it is scaled by the contact's own effective mass",
     "two coefficients of friction: static and dynamic are one",
-    "point feet: a ball of a thousandth of a millimetre stands in for one",
+    "point feet: a ball of half a millimetre stands in for one",
 )
 IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
 AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}

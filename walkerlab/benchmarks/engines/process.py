@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import tempfile
 import traceback
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
@@ -92,7 +96,17 @@ class OwnProcess:
 
 
 def serve(pipe: Any) -> None:
-    """Do tasks until there are no more."""
+    """Do tasks until there are no more; in a folder of their own and unheard, since engines write logs and talk."""
+    sys.path[:] = [str(Path(entry).absolute()) for entry in sys.path]
+    with tempfile.TemporaryDirectory(prefix="walkerlab-engine-") as folder, Path(os.devnull).open("w") as nowhere:
+        os.chdir(folder)
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+        answer_all(pipe)
+
+
+def answer_all(pipe: Any) -> None:
+    """Do one task after the other until the pipe is closed."""
     while True:
         try:
             task = pipe.recv()

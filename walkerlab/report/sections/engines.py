@@ -45,8 +45,8 @@ def introduction(summary: Mapping[str, Any]) -> str:
     return (
         f"The walker went over from its parts into {versions}, with tilted gravity for the slope. On the same law, "
         "this project's compiled contact force acts as an external force, and what is compared is the integrator. With "
-        "its own contact each engine was first tuned to the same static penetration, damping ratio and friction, and what "
-        "is compared is the model. Run times contain each engine's steps and the rules of the walk."
+        "its own contact each engine was first tuned to the same static penetration, damping ratio and friction, and "
+        "what is compared is the model. Run times contain each engine's steps and the rules of the walk."
     )
 
 
