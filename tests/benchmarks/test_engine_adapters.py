@@ -61,14 +61,14 @@ def test_our_law_in_an_engine_is_our_walk(engine):
     until = 0.8
     truth = walked(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []
-    name, entry = next((name, entry) for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
-    for step in (8e-5, 4e-5):
+    name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
+    for step in (4e-5, 2e-5):
         task = WalkTask(engine.name, Stepping(name, until / round(until / step)), scene, 2, until, None, 50_000)
         answer = task.run()
         assert answer.outcome == "walked"
         errors.append(float(np.max(np.abs(answer.end - truth))))
     assert errors[1] < 0.5 * errors[0]
-    assert errors[1] < 5e-3
+    assert errors[1] < 1e-2
 
 
 def test_a_run_is_the_same_each_time(engine):

@@ -6,7 +6,6 @@ its values and velocities, so that a touch is located to the fourth order in the
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +26,7 @@ from walkerlab.hybrid.outcome import Outcome
 Floats = NDArray[np.float64]
 Feet = list[list[float]]
 HALVINGS = 60
+FAR_AWAY = 1e4  # m or rad: where only a run that has lost its numbers gets to
 
 
 @dataclass
@@ -49,6 +49,9 @@ class Follower:
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Take in the state at the end of a step; whether the ground under a foot may have changed."""
+        if not (np.isfinite(q).all() and np.abs(q).max() < FAR_AWAY):
+            self._end(int(Outcome.SOLVER_FAILED))
+            return False
         before, now = self.feet, self.look.feet(q, v)
         happened = self._happened(before, now)
         if happened:
@@ -116,9 +119,7 @@ class Follower:
                 self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
-        if not math.isfinite(hip_height):
-            self._end(int(Outcome.SOLVER_FAILED))
-        elif hip_height < FALLEN_HIP * ground.frame.leg_length:
+        if hip_height < FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
         elif t - self.ledger.times[LAST_TOUCH] > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))

@@ -224,7 +224,7 @@ class Bench:
         engine = self.adapter.simulation(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
-        return Motion(h, recorded(engine, steps, steps * h))
+        return Motion(recorded(engine, steps, steps * h))
 
     @property
     def settling_s(self) -> float:
@@ -245,7 +245,7 @@ class Bench:
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # means of two ends of a step stand for its middle, whatever the engine's own rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
-        (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / motion.step_s, rcond=None)
+        (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
         stiffness, damping = k / depth, c / (depth * omega)
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
@@ -256,7 +256,7 @@ class Bench:
         motion = self.after(1.25 * settled, 0.0, depth, (start, 0.0))
         watched = len(motion.v) // 5
         fall = motion.v[-1 - watched, 0] - motion.v[-1, 0]
-        return float(fall / (watched * motion.step_s * target.gravity))
+        return float(fall / ((motion.t[-1] - motion.t[-1 - watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
         """Velocity (m/s) at which a block that stands on an incline creeps down."""
@@ -265,10 +265,10 @@ class Bench:
 
 
 class Motion:
-    """A recorded motion: coordinates and velocities (steps, 2) at the ends of steps."""
+    """A recorded motion: times (steps,), coordinates and velocities (steps, 2) at the ends of steps."""
 
-    def __init__(self, step_s: float, seen: list[tuple[float, Floats, Floats]]) -> None:
+    def __init__(self, seen: list[tuple[float, Floats, Floats]]) -> None:
         """Stack what was seen."""
-        self.step_s = step_s
+        self.t = np.array([time_s for time_s, _, _ in seen])
         self.q = np.array([q for _, q, _ in seen])
         self.v = np.array([v for _, _, v in seen])
