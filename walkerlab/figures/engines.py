@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +19,9 @@ from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PURPLE, RIGID, VERMILLION
 
+if TYPE_CHECKING:
+    from matplotlib.typing import LineStyleType
+
 HEIGHT = 4.2  # in
 STAGE, GROUP = "engines", "rows"
 VARIABLES = ("scene", "engine", "experiment", "integrator", "start", "step_s", "error", "wall_s", "period_s", "outcome")
@@ -25,7 +29,13 @@ OURS, SAME_LAW, OWN_LAW = "walkerlab", "same-law", "own-law"
 COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
 OTHERS = (ORANGE, PURPLE, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
-DASHES = ("-", (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2)), (0.0, (5.0, 1.2, 1.0, 1.2)), (0.0, (2.0, 2.0)))
+DASHES: tuple[LineStyleType, ...] = (
+    "-",
+    (0.0, (3.2, 1.4)),
+    (0.0, (1.0, 1.2)),
+    (0.0, (5.0, 1.2, 1.0, 1.2)),
+    (0.0, (2.0, 2.0)),
+)
 
 
 @dataclass(frozen=True)
@@ -74,8 +84,10 @@ def series_of(scene: str, experiment: str, results: Results) -> Iterator[Series]
     engines = [key[2] for key in here]
     for number, key in enumerate(here):
         mine = np.array([other == key for other in keys]) & (start == 1.0)
-        numbers = [np.asarray(rows[name], float)[mine] for name in ("step_s", "error", "wall_s", "period_s")]
-        yield Series(key[2], key[3], engines[:number].count(key[2]), *numbers, walked[mine])
+        step, error, wall, period = (
+            np.asarray(rows[name], float)[mine] for name in ("step_s", "error", "wall_s", "period_s")
+        )
+        yield Series(key[2], key[3], engines[:number].count(key[2]), step, error, wall, period, walked[mine])
 
 
 def plot_errors(scene: str, results: Results) -> Figure:

@@ -228,9 +228,10 @@ def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dic
 def largest_good_step(mine: Sequence[Row], experiment: str, wanted: float | None) -> float | None:
     """The largest step, going up from the smallest, with three correct digits; None if the smallest has not."""
     good = None
-    for row in mine if wanted is not None else ():
-        full = row.outcome == "walked"
-        if not full or row.period_s is None or abs(row.period_s / wanted - 1.0) > THREE_DIGITS:
+    if wanted is None:
+        return None
+    for row in mine:
+        if row.outcome != "walked" or row.period_s is None or abs(row.period_s / wanted - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
     finest_only = experiment == OWN_LAW and good == mine[0].step_s

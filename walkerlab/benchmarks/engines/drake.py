@@ -103,7 +103,7 @@ class Run:
         self._plant.Finalize()
         if own is not None and "stiction_tolerance" in own.settings:
             self._plant.set_stiction_tolerance(own.settings["stiction_tolerance"])
-        if law is not None and own is None:
+        if not isinstance(law, OwnContact) and law is not None:
             apply(builder, self._plant, law, order)
         diagram = builder.Build()
         self._simulator = Simulator(diagram)

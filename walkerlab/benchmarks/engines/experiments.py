@@ -392,7 +392,7 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
                 break
             error = float(np.max(np.abs(answer.end - truth)))
             drift = abs(energy(answer.end) - energy(start))
-            order = None if before is None or error == 0.0 or entry.adapts else math.log2(before / error)
+            order: float | None = None if before is None or error == 0.0 or entry.adapts else math.log2(before / error)
             rows.append(
                 SwingRow(
                     scene.name,

@@ -87,7 +87,7 @@ class Run:
                 numberOfODE2Coordinates=n,
             )
         )
-        tree, places = assembled(self._system, model, node, None if own is not None else law)
+        tree, places = assembled(self._system, model, node, None if isinstance(law, OwnContact) else law)
         self._contacts = [] if own is None else list(contacts(self._system, model, tree, places, own))
         self._system.Assemble()
 

@@ -76,7 +76,7 @@ class Run:
         self._model.opt.integrator = getattr(mujoco.mjtIntegrator, MODES[stepping.integrator])
         self._data = mujoco.MjData(self._model)
         self._data.qpos[:], self._data.qvel[:] = q, v
-        mujoco.set_mjcb_passive(None if law is None or own is not None else applied(law))
+        mujoco.set_mjcb_passive(None if law is None or isinstance(law, OwnContact) else applied(law))
 
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""

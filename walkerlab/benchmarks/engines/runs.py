@@ -144,8 +144,8 @@ class SwingTask:
     def run(self) -> SwingAnswer:
         """Swing."""
         n = len(self.chain)
-        q = np.linalg.solve(self.chain, self.start[:n] + self.slope)
-        v = np.linalg.solve(self.chain, self.start[n:])
+        q: Floats = np.linalg.solve(self.chain, self.start[:n] + self.slope).astype(np.float64)
+        v: Floats = np.linalg.solve(self.chain, self.start[n:]).astype(np.float64)
         engine = ENGINES[self.engine].adapter().simulation(self.model, self.stepping, q, v, None)
         begun = time.perf_counter()
         last = recorded(engine, self.most, self.until_s)[-1]
