@@ -134,7 +134,8 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: Forces | None)
     from exudyn.itemInterface import ObjectKinematicTree
 
     kinds = {"along": exu.JointType.PrismaticX, "height": exu.JointType.PrismaticY, "turn": exu.JointType.RevoluteZ}
-    joints, parents, offsets, centres, masses, inertias = [], [], [], [], [], []
+    joints: list[Any] = []
+    parents, offsets, centres, masses, inertias = [], [], [], [], []
     places: list[int] = []
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
