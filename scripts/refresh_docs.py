@@ -133,6 +133,7 @@ def paper_and_ours(results: Results) -> str:
         beside("mean energy, E_avg (J)", ends["E_avg"], 2),
         printed_once("largest multiplier", single["largest eigenvalue of P of a stable gait"]),
         ["slip of the stance foot in a step (mm)", *[""] * 4, number(1e3 * walk["slip_per_step_m"], 2)],
+        ["rolling of the stance foot in a step (mm)", *[""] * 4, number(1e3 * walk["rolling_per_step_m"], 2)],
         ["steps", *[""] * 4, f"{walk['steps']}, {walk['outcome']}"],
     ]
     head = ["", "paper: MATLAB", "rigid, as printed", "rigid, corrected", "paper: ADAMS", "contact as in ADAMS"]

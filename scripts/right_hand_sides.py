@@ -12,15 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import walkerlab.mechanics.rigid_swing  # noqa: F401  (registers the right-hand side of the rigid walker)
+import walkerlab.paper.appendix_a  # noqa: F401  (registers the right-hand side of the rigid walker)
 from walkerlab.config import loader
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.motion import OnGround, ground_wrench
 from walkerlab.ground.walker import ContactWalker, Foot, FootMotion, foot_force, foot_motion
 from walkerlab.kernels import inlined, kernel
-from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
 from walkerlab.mechanics.tree import mass_matrix, sines_cosines, with_centrifugal
 from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.paper.appendix_a import RigidWalker, step_length
 from walkerlab.scene.contact import contact_scene, hinged_walker
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State, blank, derivative

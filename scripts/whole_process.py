@@ -14,7 +14,7 @@ BARE = """
 import sys
 import h5py
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker
 from walkerlab.solvers.dop853 import new_dop853
 
 walker = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)

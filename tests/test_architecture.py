@@ -13,7 +13,9 @@ from walkerlab.kernels import KERNEL_HOMES
 PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
 LAYERS = (
+    "api",
     "cli",
+    "sweeps",
     "stages",
     "report",
     "figures",

@@ -1,4 +1,4 @@
-"""The campaigns of scripts/, cut short: killed runs, runs at once, fuzzed configs, damaged results."""
+"""The campaigns of scripts/, cut short: killed runs, runs at once, fuzzed configs, damaged results, random walkers."""
 
 import importlib.util
 import sys
@@ -64,6 +64,10 @@ def test_runs_killed_while_each_result_is_made_lose_nothing(kill):
 
 def test_two_runs_at_once_do_not_disturb_each_other(kill):
     assert kill.together("simulate", "rigid-only", [2]) == []
+
+
+def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
+    assert script("gait_campaign").campaign(25, seed=1) == []
 
 
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])

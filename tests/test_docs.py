@@ -33,7 +33,7 @@ def code_in(path):
 
 
 def commands():
-    names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean"}
+    names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean", "sweep"}
     found = {command.strip() for path in DOCUMENTS for code in code_in(path) for command in COMMAND.findall(code)}
     return sorted(command for command in found if shlex.split(command)[1] in names)
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from walkerlab import kernels
+
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
 from walkerlab.kernels import CACHE_FOLDER
@@ -44,9 +46,9 @@ def copy(tmp_path):
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     (package / "orbits" / "trial_of_code.py").write_text(CALLER)
     (package / "mechanics" / "trial_of_code.py").write_text(CALLED)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
 
     def run():
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
         done = subprocess.run(
             [sys.executable, "-c", CALL], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
         )
@@ -80,12 +82,68 @@ def test_code_that_is_as_before_is_not_compiled_again(copy):
     assert compiled(package.parent / "cache" / folder) == kept
 
 
-def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(copy):
-    package, run = copy
-    _, folder = run()
-    with (package / "errors.py").open("a") as file:
-        file.write("\n# a remark\n")
-    assert run()[1] == folder
+@pytest.fixture
+def digest_after_an_edit(tmp_path, monkeypatch):
+    """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
+    package = tmp_path / "walkerlab"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(kernels, "PACKAGE", package)
+
+    def digests(path):
+        before = kernels.sources_digest()
+        with (package / path).open("a") as file:
+            file.write("\n# a remark\n")
+        return before, kernels.sources_digest()
+
+    return digests
+
+
+@pytest.mark.parametrize("path", ["errors.py", "paper/errata.py", "orbits/small_slope.py", "mechanics/parts.py"])
+def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after_an_edit, path):
+    before, after = digest_after_an_edit(path)
+    assert after == before
+
+
+@pytest.mark.parametrize("path", ["solvers/dop853_tableau.py", "solvers/vectors.py", "hybrid/outcome.py", "kernels.py"])
+def test_an_edit_of_what_kernels_are_made_of_compiles_them_anew(digest_after_an_edit, path):
+    before, after = digest_after_an_edit(path)
+    assert after != before
+
+
+def test_each_processor_has_compiled_code_of_its_own(copy, monkeypatch):
+    _, run = copy
+    _, here = run()
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", "")
+    _, elsewhere = run()
+    assert "-generic-" in elsewhere
+    assert here.partition("-py")[0] == elsewhere.partition("-py")[0]
+    assert here != elsewhere
+
+
+NOTEBOOK = """
+import numba
+import walkerlab.kernels
+
+@numba.njit(cache=True)
+def own(x):
+    return x + 1.0
+
+print(own(1.0), own._cache.cache_path)
+"""
+
+
+@pytest.mark.usefixtures("copy")
+def test_what_another_program_caches_stays_where_it_was(tmp_path):
+    program = tmp_path / "elsewhere" / "program.py"
+    program.parent.mkdir()
+    program.write_text(NOTEBOOK)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+    done = subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True, check=True)
+    value, folder = done.stdout.split()
+    assert float(value) == 2.0
+    assert Path(folder) == program.parent / "__pycache__"
+    assert list(Path(folder).glob("*.nbc"))
 
 
 FOREIGN = """

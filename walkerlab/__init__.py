@@ -1,3 +1,37 @@
-"""Passive-dynamic walking as a reproducible experiment; see README.md."""
+"""Passive-dynamic walking as a reproducible experiment; see README.md, and docs/python.md for use from Python.
+
+What is listed in `__all__` is loaded when it is first asked for: importing the package takes no time.
+"""
+
+from typing import Any
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "compass",
+    "contact",
+    "dataset",
+    "find_gait",
+    "open_run",
+    "run",
+    "simulate",
+    "sweep",
+    "walker",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what the package offers when it is first asked for."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # Not by an import statement: what stages are made of is read off those, and none of them needs this.
+    from importlib import import_module
+
+    value = getattr(import_module(".api", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """What the package offers."""
+    return sorted([*globals(), *__all__])

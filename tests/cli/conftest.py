@@ -1,5 +1,6 @@
 """The command line in processes of its own: of the real pipeline and of the toy one."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -56,3 +57,16 @@ def toy(tmp_path):
 def walker(tmp_path):
     """The real command line, in an empty folder."""
     return Program("walkerlab", tmp_path)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """The toy pipeline's command line in a folder with one sweep, and what that printed."""
+    folder = tmp_path_factory.mktemp("sweep")
+    shutil.copytree(TOY, folder / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "work").mkdir()
+    toy = Program("toy", folder / "work", folder / "source")
+    over = ("--over", "gravity_m_s2=1:9:3", "--over", "slope_rad=[0.1, 1.2]")
+    done = toy("sweep", "--stage", "drop", "--jobs", "1", *over, "--json", "--csv")
+    assert done.returncode == 0, done.stderr
+    return toy, json.loads(done.stdout)

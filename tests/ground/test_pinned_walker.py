@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from walkerlab.ground.compliant import compass_assembly, pinned_walker
 from walkerlab.ground.pinned import floating_state
 from walkerlab.ground.walker import foot_motion
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker, accelerations
 from walkerlab.mechanics.tree import sines_cosines
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, accelerations
 from walkerlab.solvers.system import blank, derivative, jacobian
 
 states = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))

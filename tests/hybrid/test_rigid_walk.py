@@ -5,21 +5,41 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, far_from, take_walk
-from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.mechanics.heel_strike import impact
-from walkerlab.mechanics.rigid_compass import (
+from walkerlab.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, far_from
+from walkerlab.hybrid.recorded_walk import take_walk as take_walk_of_model
+from walkerlab.hybrid.rigid_measures import energies as energies_of_model
+from walkerlab.hybrid.rigid_measures import reactions as reactions_of_model
+from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
+from walkerlab.paper.appendix_a import (
     AS_PRINTED,
     CORRECTED,
     RigidWalker,
     accelerations,
+    assembled,
     ground_reaction,
+    impact,
     kinetic_energy,
     potential_energy,
     swing_foot_height,
 )
-from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.solvers.registry import METHODS, method_named
+
+
+def find_gaits(walker, *rest, **options):
+    return find_gaits_of_model(assembled(walker), *rest, **options)
+
+
+def take_walk(walker, *rest, **options):
+    return take_walk_of_model(assembled(walker), *rest, **options)
+
+
+def energies(walker, *rest, **options):
+    return energies_of_model(assembled(walker), *rest, **options)
+
+
+def reactions(walker, *rest, **options):
+    return reactions_of_model(assembled(walker), *rest, **options)
+
 
 ONE_DEGREE = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, np.deg2rad(1.0), CORRECTED)
 PAPER = ONE_DEGREE._replace(slope=0.0174)

@@ -3,9 +3,24 @@
 import numpy as np
 import pytest
 
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
-from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, linear_modes, seeds, symmetric_half_period
+from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
+from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, symmetric_half_period
+from walkerlab.orbits.small_slope import linear_modes as linear_modes_of_model
+from walkerlab.orbits.small_slope import seeds as seeds_of_model
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
+
+
+def find_gaits(walker, *rest, **options):
+    return find_gaits_of_model(assembled(walker), *rest, **options)
+
+
+def seeds(walker, *rest, **options):
+    return seeds_of_model(assembled(walker), *rest, **options)
+
+
+def linear_modes(walker, *rest, **options):
+    return linear_modes_of_model(assembled(walker), *rest, **options)
+
 
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 # all mass at the hip, the rest in the feet

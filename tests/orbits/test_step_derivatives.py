@@ -9,14 +9,24 @@ import pytest
 from walkerlab.config import loader
 from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import SIGNALS
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.hybrid.rigid_walk import EVENTS
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait, step_from_section
-from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.step_map import evaluate, new_shooting, newton
+from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
+from walkerlab.orbits.step_map import evaluate, newton
+from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.contact import contact_scene
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for, method_named
+
+
+def find_gaits(walker, *rest, **options):
+    return find_gaits_of_model(assembled(walker), *rest, **options)
+
+
+def new_shooting(walker, *rest, **options):
+    return new_shooting_of_model(assembled(walker), *rest, **options)
+
 
 # central differences of order six, the Richardson extrapolation of those of order two with steps 1, 2 and 3
 STENCIL = {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}
@@ -52,7 +62,7 @@ OFF_THE_GAIT = {"at the gait": (0.0, 0.0, 0.0), "wider": (5e-3, -2e-2, 1e-2), "s
 
 def shooting(walker):
     method = new_dop853(16, 1e-13, 1e-15, 10**5)
-    return new_shooting(walker, method, finder_for(method, SIGNALS))
+    return new_shooting(walker, method, finder_for(method, EVENTS))
 
 
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)

@@ -7,8 +7,7 @@ import numpy_walker
 import pytest
 from numpy.testing import assert_allclose
 
-from walkerlab.mechanics.heel_strike import impact
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, impact
 from walkerlab.paper.arithmetic import percent_of, resting_foot, speed_difference
 from walkerlab.paper.errata import errata
 from walkerlab.paper.misprints import (

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walkerlab.mechanics.rigid_compass import CORRECTED
+from walkerlab.paper.appendix_a import CORRECTED
 from walkerlab.paper.measured import (
     Characteristics,
     ContactModel,

@@ -84,6 +84,16 @@ def drive(method, system, start, t_end):
 
 
 @kernel
+def start(method, system, y):
+    begin(method, system, 0.0, y, 0.0)
+
+
+@kernel
+def step(method, system, t_end):
+    return advance(method, system, t_end)
+
+
+@kernel
 def half_way(method, system, out):
     prepare_dense(method, system)
     y = interpolate(method, system, 0.5)
@@ -200,6 +210,30 @@ def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
     assert method.clock[T] == event
     exact = driven("dop853", 1e-13, event)[0].y
     assert method.y == pytest.approx(exact, abs=1e-4)
+
+
+@every_method
+def test_steps_that_a_deadline_cuts_short_leave_no_gap_and_do_not_overlap(name):
+    """Deadlines every few thousandths of the orbit, and each third step taken back halfway, as events do."""
+    rtol, t_end = 1e-8, 0.1 * PERIOD
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
+    called(name, start, method, ORBIT, START)
+    t, y, steps = 0.0, np.array(START), 0
+    for deadline in np.linspace(0.0, t_end, 38)[1:].tolist():
+        while method.clock[T] < deadline:
+            assert called(name, step, method, ORBIT, deadline) == STEP_DONE
+            if steps % 3 == 0:
+                event = 0.5 * (method.clock[T_OLD] + method.clock[T])
+                assert called(name, once_more, method, ORBIT, event) == STEP_DONE
+            assert method.clock[T_OLD] == t
+            assert method.y_old.tolist() == y.tolist()
+            t, y, steps = float(method.clock[T]), method.y.copy(), steps + 1
+        assert t == deadline
+    whole, _ = driven(name, rtol, t_end)
+    assert y == pytest.approx(whole.y, abs=1e-3)
+    if not METHODS[name].compiled:
+        # a library's solver goes its own way: cutting its steps short is no work for it
+        assert method.counts[ACCEPTED] == whole.counts[ACCEPTED]
 
 
 @every_method

@@ -51,7 +51,19 @@ def truth():
     times = np.array((0.7, 0.7 + PERIOD, 0.7 + 2 * PERIOD))
     along = LENGTH * np.arange(1.0, 4.0)
     walk = ContactWalkResult(
-        Outcome.WALKED, times, along, np.zeros(3), 2.2, (0.0,) * 8, 1e-4, 0.0, np.zeros(3), np.zeros(4, np.int64), None
+        outcome=Outcome.WALKED,
+        touch_time_s=times,
+        touch_along_m=along,
+        slip_m=np.zeros(3),
+        rolling_m=np.zeros(3),
+        end_time_s=2.2,
+        end_state=(0.0,) * 8,
+        max_penetration_m=1e-4,
+        energy_balance_residual_J=0.0,
+        dissipated_J=np.zeros(5),
+        knee_strike_s=np.zeros(0),
+        work=np.zeros(4, np.int64),
+        samples=None,
     )
     return Truth(2.0, np.zeros(8), times[:2], 2e-12, walk)
 

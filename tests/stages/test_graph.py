@@ -4,10 +4,13 @@ from pathlib import Path
 
 import pytest
 
+from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
-from walkerlab.config.files import builtin_names
+from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.stages.graph import PIPELINE, STAGES, Graph, Stage, results_of
+from walkerlab.stages.plan import config_slice
+from walkerlab.store.key import differences
 
 NAMES = [stage.name for stage in STAGES]
 EXPLICIT = "start=[-0.2, 0.17, -0.6, -0.86]"
@@ -28,6 +31,17 @@ def test_inputs_stand_earlier_in_the_table(stage, config):
 @pytest.mark.parametrize("stage", STAGES, ids=NAMES)
 def test_what_a_stage_reads_is_in_the_config(stage, config):
     slice_of(load(Path(config)).config, stage.reads)
+
+
+@pytest.mark.parametrize("stage", ["stability", "stability-maps"])
+def test_a_change_of_the_paper_config_changes_the_keys_of_the_cases_that_stand_on_it(tmp_path, monkeypatch, stage):
+    config = load(Path("rigid-only")).config
+    before = config_slice(config, PIPELINE[stage])
+    text = (BUILTIN_FOLDER / "paper.yaml").read_text()
+    (tmp_path / "paper.yaml").write_text(text.replace("hip_mass_kg: 10", "hip_mass_kg: 11"))
+    monkeypatch.setattr(files, "BUILTIN_FOLDER", tmp_path)
+    after = config_slice(config, PIPELINE[stage])
+    assert list(differences("", before, after)) == ["paper.walker.hip_mass_kg 10.0 -> 11.0"]
 
 
 def test_the_fixed_stages_are_there_in_order():

@@ -307,3 +307,40 @@ def test_a_second_run_imports_no_stage(toy):
     code = EXECUTE + "print([name for name in ('toy.drop', 'toy.physics', 'filelock') if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code, toy.runs], env=toy.environment, capture_output=True, text=True)
     assert done.stdout.splitlines() == ['{"reused": true}', "[]"], done.stderr
+
+
+def test_a_result_with_the_same_key_is_taken_over_from_another_run(toy, listener):
+    toy.execute("bounce")
+    config, folder = toy.loaded("strides=7")
+    assert toy.preview("bounce", "strides=7").reused
+    assert not folder.path.exists()
+    report = execute(config, "roll", folder, graph=toy.graph, reporter=listener)
+    assert actions(report) == {"drop": "reuse", "roll": "run"}
+    assert reasons(report)["drop"] == f"the same as in {toy.runs / 'paper'}"
+    assert f"drop: reused (the same as in {toy.runs / 'paper'})" in listener.notes
+    assert (folder.path / "drop.h5").samefile(toy.runs / "paper" / "drop.h5")
+    assert reasons(toy.execute("roll", "strides=7"))["drop"] == "up to date"
+
+
+def test_a_result_elsewhere_is_copied_where_the_system_has_no_links(toy, monkeypatch):
+    toy.execute("drop")
+    monkeypatch.setattr(os, "link", lambda *_: (_ for _ in ()).throw(OSError("no links here")))
+    report = toy.execute("drop", "strides=7")
+    assert report.reused
+    assert read(report.artifact).seal == read(toy.runs / "paper" / "drop.h5").seal
+    assert not report.artifact.samefile(toy.runs / "paper" / "drop.h5")
+
+
+def test_a_damaged_result_elsewhere_is_passed_over(toy):
+    path = toy.execute("drop").artifact
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    assert actions(toy.execute("drop", "strides=7")) == {"drop": "run"}
+
+
+def test_what_is_forced_or_drawn_is_not_taken_over(toy):
+    toy.execute("picture")
+    report = toy.execute("picture", "strides=7")
+    assert actions(report) == {"drop": "reuse", "roll": "run", "bounce": "reuse", "picture": "run"}
+    assert actions(toy.execute("drop", "strides=9", force=True)) == {"drop": "run"}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from walkerlab.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.mechanics.heel_strike import impact
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.paper.appendix_a import impact
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.rigid_case import Prepared, energy_won, kinetic, momentum_change

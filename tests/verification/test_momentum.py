@@ -8,14 +8,16 @@ from walkerlab.verification import momentum
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.contact_start import prepared
 from walkerlab.verification.momentum import (
+    MEASURE,
     MOST_UNKNOWN,
     impulse,
     momentum_balance,
-    momentum_findings,
+    momentum_finding,
     split,
     unsettled,
     with_middles,
 )
+from walkerlab.verification.verdict import NotMeasured
 
 CASES = {case.name: case for case in shipped()}
 
@@ -40,39 +42,43 @@ def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
 def test_a_walker_that_is_a_little_another_one_does_not_balance(changed):
     ready, config, case = ready_for("paper")
     other = config.model_copy(update={"walker": config.walker.model_copy(update=changed)})
-    (finding,) = momentum_findings(ready, other, case)
+    finding = momentum_finding(ready, other, case)
     assert not finding.ok
 
 
 def test_a_ground_that_pushes_a_little_more_does_not_balance():
     ready, config, case = ready_for("paper")
     heavier = config.model_copy(update={"gravity_m_s2": 1.001 * config.gravity_m_s2})
-    (finding,) = momentum_findings(ready, heavier, case)
+    finding = momentum_finding(ready, heavier, case)
     assert not finding.ok
 
 
-def test_a_hinge_pushes_too_so_nothing_is_said():
+def test_beside_a_hinge_that_pushes_too_it_is_not_measured():
     case = Case(name="x", expected=("walked",), reason="r", config={"contact": {"stance": "pinned"}})
     config = config_of(case)
-    assert momentum_findings(prepared(config, case), config, case) == []
+    assert momentum_finding(prepared(config, case), config, case) == NotMeasured(MEASURE, "the hinge pushes too")
 
 
-def test_where_friction_hangs_on_slips_below_the_tolerance_nothing_is_said():
+def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():
     ready, config, case = ready_for("stiction-1e-7")
     found = momentum_balance(ready, config, case)
     assert found.unresolved > MOST_UNKNOWN > found.unsure
-    assert momentum_findings(ready, config, case) == []
+    said = momentum_finding(ready, config, case)
+    assert isinstance(said, NotMeasured)
+    assert "below the tolerance" in said.why
 
 
-def test_where_the_sums_do_not_settle_nothing_is_said(monkeypatch):
+def test_where_the_sums_do_not_settle_it_is_not_measured(monkeypatch):
     monkeypatch.setattr(momentum, "MOST_UNKNOWN", 1e-9)
-    assert momentum_findings(*ready_for("paper")) == []
+    said = momentum_finding(*ready_for("paper"))
+    assert isinstance(said, NotMeasured)
+    assert "do not settle" in said.why
 
 
 def test_feet_at_a_thousand_kilometres_a_second_are_measured_by_their_own_momentum():
     case = Case(name="x", expected=("lifted-off",), reason="r", config={"start": [-0.2, 0.16, 1e6, 1e6]})
     config = config_of(case)
-    (finding,) = momentum_findings(prepared(config, case), config, case)
+    finding = momentum_finding(prepared(config, case), config, case)
     assert finding.ok
 
 

@@ -16,8 +16,9 @@ from walkerlab.stages.stability import cases_group, known_group, summary_of, ver
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.cells import CaseCell, cells_of, run_cells
 from walkerlab.verification.contact_case import judge_contact
+from walkerlab.verification.contact_start import prepared
 from walkerlab.verification.known import Known
-from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, NotMeasured
 
 GOOD = CaseResult(
     "good", "own", "contact", "because", ("walked",), "walked", 4, 1e-9, 100, 0.1, (Finding("x", 0.5, 1.0),)
@@ -184,3 +185,20 @@ def test_the_verdict_names_what_failed():
     results = Results(load().config, {"stability": SimpleNamespace(summary=summary, groups={})})
     first = verdict_section.section(results).blocks[0]
     assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")
+
+
+def test_own_pads_on_ground_without_pads_are_walked_as_contact_sim_walks_them():
+    ground = {"terrain": "after-mid-swing", "pad_pitch": "own"}
+    case = Case(name="x", expected=("walked",), reason="r", steps=2, config={"slope_deg": 4.0, "contact": ground})
+    plain = case.model_copy(update={"config": {"slope_deg": 4.0, "contact": {"terrain": "after-mid-swing"}}})
+    own, rigid = (prepared(config_of(one), one) for one in (case, plain))
+    assert own.start == rigid.start
+    assert own.scene.ground == rigid.scene.ground
+
+
+def test_what_could_not_be_measured_is_told_with_the_reason():
+    missed = replace(GOOD, not_measured=(NotMeasured("momentum", "the hinge pushes too"),))
+    summary = summary_of([missed], [], [])
+    assert summary["cases"][0]["not_measured"] == [{"measure": "momentum", "why": "the hinge pushes too"}]
+    table = next(block for block in report_of(summary).blocks if isinstance(block, Table))
+    assert "Not measured: momentum: the hinge pushes too (good)." in table.note

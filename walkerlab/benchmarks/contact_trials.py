@@ -8,7 +8,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import Ground
-from walkerlab.mechanics.rigid_compass import step_length
+from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 
@@ -41,7 +41,7 @@ def near_rigid_trial(config: Config, state: tuple[float, ...], length_m: float |
 def scene_for(config: Config, state: tuple[float, ...], length_m: float | None) -> ContactScene:
     """The config's scene on pads of the rigid step length, or of the start's own if there is no gait."""
     rigid = rigid_walker(config, config.equations)
-    length = length_m or abs(step_length(rigid, state[0], state[1]))
+    length = length_m or abs(swing_foot(rigid, state)[1])
     return contact_scene(config, length, own_pitch_m=length)
 
 

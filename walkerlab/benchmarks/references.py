@@ -74,8 +74,8 @@ def first_end(trial: Trial) -> End:
 
     Raises WalkEndsError if the walk does not reach its end.
     """
-    if isinstance(trial, RigidTrial) and taylor_reference.is_installed():
-        return End(taylor_reference.NAME, taylor_reference.walk_by_taylor(trial.walker, trial.start, trial.steps))
+    if isinstance(trial, RigidTrial) and trial.compass is not None and taylor_reference.is_installed():
+        return End(taylor_reference.NAME, taylor_reference.walk_by_taylor(trial.compass, trial.start, trial.steps))
     return tightest(trial, "dop853")
 
 

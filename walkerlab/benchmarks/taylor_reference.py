@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.mechanics.heel_strike import impact
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.paper.appendix_a import RigidWalker, impact
 
 NAME = "heyoka-taylor"
 

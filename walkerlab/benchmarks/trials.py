@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import SIGNALS as RIGID_SIGNALS
+from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.hybrid.rigid_walk import walk
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing
+from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import METHODS, Method, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
 
@@ -58,15 +59,16 @@ class Trial(Protocol):
 class RigidTrial:
     """Steps of the rigid model; the end state is that after the last impact."""
 
-    walker: RigidWalker
+    walker: Standing
     start: tuple[float, ...]
     steps: int
+    compass: RigidWalker | None = None  # the walker as Appendix A has it, which a user's script is for
     name: str = "rigid"
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Every method, and what a user would write."""
-        return (*METHODS, USER_SCRIPT)
+        return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
@@ -77,21 +79,24 @@ class RigidTrial:
 
     def _prepared(self, entry: Method, rtol: float, atol: float, budget: int) -> Callable[[], TrialRun]:
         """The walk with memory that its runs share, as a program that walks often would have it."""
-        method = entry.new(4, rtol, atol, budget)
-        finder = finder_for(method, RIGID_SIGNALS)
-        strikes, before, after = np.zeros(self.steps), np.zeros((self.steps, 4)), np.zeros((self.steps, 4))
+        n = len(self.walker.blank)
+        method = entry.new(n, rtol, atol, budget)
+        finder = finder_for(method, RIGID_EVENTS)
+        strikes, knees = np.zeros(self.steps), np.zeros(self.steps)
+        before, after = np.zeros((self.steps, n)), np.zeros((self.steps, n))
         stride = walk if entry.compiled else uncompiled(walk)
 
         def run() -> TrialRun:
             clear_counts(method)
             method.clock[H_NEXT] = 0.0
-            status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after)
+            status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after, knees)
             return finished(Outcome(status), after[-1], method.counts)
 
         return run
 
     def _as_a_script(self, rtol: float, atol: float, budget: int) -> TrialRun:
-        state, evaluations = walk_as_a_script(self.walker, self.start, self.steps, rtol, atol, budget)
+        assert self.compass is not None, "the script is not among this walker's methods"
+        state, evaluations = walk_as_a_script(self.compass, self.start, self.steps, rtol, atol, budget)
         outcome = Outcome.BUDGET_EXHAUSTED if state is None else Outcome.WALKED
         return TrialRun(outcome.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
 

@@ -28,6 +28,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
     @app.command()
     def status(
+        run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="Name or folder of a run.")] = None,
         config: ConfigFile = None,
         sets: Sets = None,
         strides: Strides = None,
@@ -37,12 +38,16 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> None:
-        """Say of each stage whether its result is current, and if not, why."""
+        """Say of each stage whether its result is current, and if not, why; and which runs there are."""
         with exit_on_failure("status", as_json):
             from walkerlab.cli.request import Request
-            from walkerlab.cli.status import print_status
+            from walkerlab.cli.status import print_status, print_status_of_run
 
-            print_status(Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose), graph, check)
+            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
+            if run is None:
+                print_status(request, graph, check)
+            else:
+                print_status_of_run(request, graph, check, run)
 
     @app.command()
     def show(

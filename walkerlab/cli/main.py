@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from walkerlab import __version__
-from walkerlab.cli import housekeeping
+from walkerlab.cli import housekeeping, runs, sweep
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
     RUNS,
@@ -15,13 +15,18 @@ from walkerlab.cli.options import (
     ConfigFile,
     DryRun,
     Force,
+    From,
     Full,
     Jobs,
+    Model,
     NoWait,
+    Over,
+    Periods,
     Quiet,
     Runs,
     Sets,
     Strides,
+    To,
     Verbose,
 )
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
@@ -46,6 +51,8 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     for stage in graph.stages:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
+    sweep.add_to(app, graph)
+    runs.add_to(app, graph)
     return app
 
 
@@ -71,6 +78,11 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
         config: ConfigFile = None,
         sets: Sets = None,
         strides: Strides = None,
+        over: Over = None,
+        begin: From = None,
+        end: To = None,
+        model: Model = None,
+        periods: Periods = None,
         runs: Runs = RUNS,
         jobs: Jobs = 1,
         full: Full = False,
@@ -86,15 +98,27 @@ def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
             from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
+            asked = following(over, begin, end, model, periods)
+            request = Request(config, (*(sets or ()), *asked), strides, runs, as_json, quiet, verbose)
             run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=jobs, full=full)
 
     meant = {"strides": stage.walks, "jobs": uses_jobs(stage, graph), "full": bool(graph.campaigns_of(stage.name))}
+    meant |= dict.fromkeys(("over", "begin", "end", "model", "periods"), stage.follows)
     meaningless = {name for name, has in meant.items() if not has}
     signature = inspect.signature(command)
     options = [option for name, option in signature.parameters.items() if name not in meaningless]
     command.__signature__ = signature.replace(parameters=options)  # type: ignore[attr-defined]
     return command
+
+
+def following(
+    over: str | None, begin: float | None, end: float | None, model: str | None, periods: int | None
+) -> tuple[str, ...]:
+    """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
+    if over is not None and (begin is None or end is None):
+        raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+    given = {"over": over, "from": begin, "to": end, "model": model, "periods": periods}
+    return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)
 
 
 def uses_jobs(stage: Stage, graph: Graph) -> bool:

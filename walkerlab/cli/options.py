@@ -25,6 +25,11 @@ NoWait = Annotated[bool, typer.Option("--no-wait", help="Give up (exit 6) if ano
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")]
+Over = Annotated[str | None, typer.Option("--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.")]
+From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
+To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
+Model = Annotated[str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits to follow.")]
+Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
 Check = Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 

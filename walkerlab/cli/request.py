@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from walkerlab.cli.console import Console
-from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.loader import LoadedConfig, Template, template
 from walkerlab.config.schema import Config
 from walkerlab.store.runfolder import RunFolder
 
@@ -36,9 +36,10 @@ class Request:
         return Console(self.quiet, self.verbose)
 
     @cached_property
-    def loaded(self) -> LoadedConfig:
-        """The config, its warnings said; ConfigError if it is not usable."""
-        loaded = load(self.config, self.sets, self.strides)
+    def template(self) -> Template:
+        """The config, ready to be varied, its warnings said; ConfigError if it is not usable."""
+        read = template(self.config, self.sets, self.strides)
+        loaded = read.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 
@@ -46,7 +47,12 @@ class Request:
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {self.runs / loaded.run_name}")
-        return loaded
+        return read
+
+    @property
+    def loaded(self) -> LoadedConfig:
+        """The config as it is."""
+        return self.template.base
 
     @property
     def resolved(self) -> Config:

@@ -3,23 +3,53 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import typer
 
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
+from walkerlab.cli.runs import rows_of_runs, run_object
 from walkerlab.cli.text import aligned
+from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import Step, survey
+from walkerlab.stages.runs import RunSummary, config_of, run_named, runs_in
+from walkerlab.store.runfolder import RunFolder
 
 NOT_CURRENT = ("stale", "missing", "damaged")
 
 
 def print_status(request: Request, graph: Graph, check: bool) -> None:
-    """Print the state of each stage; with `check`, typer.Exit(5) if one is stale, missing or damaged."""
-    folder = request.folder
-    steps = survey(request.resolved, folder, graph)
+    """Print the state of each stage, and all runs unless one config was asked about.
+
+    With `check`, typer.Exit(5) if a stage's result is stale, missing or damaged.
+    """
+    asked = request.config is not None or request.sets or request.strides is not None
+    listed = None if asked else list(runs_in(request.runs, graph))
+    show(request, request.resolved, request.folder, graph, check, listed)
+
+
+def print_status_of_run(request: Request, graph: Graph, check: bool, name: str) -> None:
+    """The same of a run folder, under the config that it was made with; StaleError if there is none."""
+    folder = run_named(name, request.runs)
+    config = config_of(folder, graph)
+    if config is None:
+        raise StaleError(f"{folder.path} has no result that tells its config.", "`walkerlab status` lists all runs.")
+    show(request, config, folder, graph, check, None)
+
+
+def show(
+    request: Request,
+    config: Config,
+    folder: RunFolder,
+    graph: Graph,
+    check: bool,
+    listed: list[RunSummary] | None,
+) -> None:
+    """Print the state of each stage and the runs that are listed."""
+    steps = survey(config, folder, graph)
     error = failing(steps, graph.stages[-1].name)
     if request.as_json:
         rows = [
@@ -31,11 +61,15 @@ def print_status(request: Request, graph: Graph, check: bool) -> None:
             }
             for step in steps
         ]
-        status = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
+        status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
+        if listed is not None:
+            status["runs"] = [run_object(run) for run in listed]
         print_json(status | ({"error": described(error)} if check and error is not None else {}))
     else:
         print(f"{folder.path}:")
         print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), s.reason] for s in steps)])))
+        if listed:
+            print("\n".join([f"\nall runs in {request.runs}:", *aligned(rows_of_runs(listed))]))
     if check and error is not None:
         say(error)
         raise typer.Exit(error.exit_code)
@@ -49,7 +83,7 @@ def state_of(step: Step) -> str:
         return "current" if step.found is not None and step.found.complete else "no answer"
     if step.damaged:
         return "damaged"
-    if step.stage.campaign_of:
+    if step.stage.optional:
         return "not run" if step.found is None else "outdated"
     return "missing" if step.found is None else "stale"
 

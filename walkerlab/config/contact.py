@@ -95,11 +95,12 @@ class Contact(Block):
         ),
     ] = 1000.0
     terrain: Annotated[
-        Literal["checkerboard", "after-mid-swing"],
+        Literal["checkerboard", "after-mid-swing", "plane"],
         key(
             "",
             "checkerboard: a lane of raised pads per leg; "
-            "after-mid-swing: a swing foot touches only once it has passed the stance foot",
+            "after-mid-swing: a swing foot touches only once it has passed the stance foot; "
+            "plane: ordinary ground, for feet that clear it",
             _SECTION_4,
         ),
     ] = "checkerboard"

@@ -6,7 +6,7 @@ import types
 from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, Tag
 from pydantic.fields import FieldInfo
 
 from walkerlab.config.numbers import short
@@ -47,21 +47,32 @@ def key(
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """The block that a key holds, or None if it holds a value."""
+    """The block that a key holds, the first of several kinds; None if it holds a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
-    return None
+    return next(iter(kinds_of(field).values()), None)
+
+
+def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
+    """The blocks that a key may hold, by the word that tells them apart; empty if there is at most one."""
+    found = {}
+    for candidate in get_args(field.annotation):
+        for tag in get_args(candidate)[1:]:
+            if isinstance(tag, Tag) and isinstance(get_args(candidate)[0], type):
+                found[tag.tag] = get_args(candidate)[0]
+    return {tag: block for tag, block in found.items() if issubclass(block, Block)}
 
 
 def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Path and field of every value in `block`, in the order of the schema."""
+    """Path and field of every value in `block`, in the order of the schema; of a block of several kinds each kind's."""
     for name, field in block.model_fields.items():
-        inner = block_of(field)
-        if inner is None:
-            yield (*prefix, name), field
-        else:
-            yield from leaves(inner, (*prefix, name))
+        kinds: list[type[Block] | None] = [*kinds_of(field).values()] or [block_of(field)]
+        for inner in kinds:
+            if inner is None:
+                yield (*prefix, name), field
+            else:
+                yield from leaves(inner, (*prefix, name))
 
 
 def extra(field: FieldInfo, name: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.layers import Setting, parse_settings, stacked, strides_setting, with_settings
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
@@ -32,6 +32,23 @@ class LoadedConfig:
     source: str
 
 
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A config that is read but not yet typed, of which many variants are made.
+
+    base   the config as it is
+    tree   what it was typed from
+    """
+
+    base: LoadedConfig
+    tree: Mapping
+
+    def variant(self, settings: Sequence[Setting]) -> Config:
+        """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
+        tree = with_settings(self.tree, settings)
+        return on_the_slope(typed(tree), tree)[0]
+
+
 def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None) -> LoadedConfig:
     """Load a config.
 
@@ -41,6 +58,11 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
 
     Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
     """
+    return template(path, sets, strides).base
+
+
+def template(path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None) -> Template:
+    """The same config as `load` gives, ready to be varied; raises ConfigError as that."""
     file = builtin(DEFAULT) if path is None else find(path)
     tree = _named(stacked(read_layers(file)), file)
     settings = parse_settings(sets)
@@ -51,7 +73,8 @@ def load(path: Path | None = None, sets: Sequence[str] = (), strides: int | None
     base = typed(tree) if settings else changed
     refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
-    return LoadedConfig(config, run_name(base, changed, _degrees(changed_tree)), warnings, file.label)
+    name = run_name(base, changed, _degrees(changed_tree))
+    return Template(LoadedConfig(config, name, warnings, file.label), changed_tree)
 
 
 def _named(tree: Mapping, file: ConfigFile) -> Mapping:

@@ -15,6 +15,11 @@ from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
 from walkerlab.config.validation import typed
 
 
+def paper_config() -> Config:
+    """The built-in paper config."""
+    return over_paper({}, "the paper's")
+
+
 def over_paper(lines: Keys[str, Any], source: str) -> Config:
     """The built-in paper config with `lines` over it.
 

@@ -9,29 +9,49 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact, ContactSI
+from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
+from walkerlab.config.sweep import Sweep
+from walkerlab.config.walkers import (
+    LIGHTEST_CONTACT,
+    CompassWalker,
+    Kneed,
+    PartsWalker,
+    StraightLegs,
+    Walker,
+    is_plain_compass,
+    rigid_bodies,
+)
 
 __all__ = [
     "METHODS",
     "OUTPUTS",
+    "Basin",
     "Case",
     "CompassWalker",
     "Config",
     "Contact",
     "ContactSI",
     "ContactSolver",
+    "Continuation",
     "Equations",
+    "Kneed",
     "Method",
     "Output",
+    "PartsWalker",
     "RigidSolver",
     "SlopeInDegrees",
     "SolverSettings",
     "Solvers",
     "Stability",
     "State",
+    "StraightLegs",
+    "Sweep",
     "Tune",
+    "Walker",
 ]
 
 Equations = Literal["corrected", "as-printed"]
@@ -77,85 +97,21 @@ Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
 State = tuple[SwingAngle, StanceAngle, Rate, Rate]
 
 
+LongState = tuple[Rate, ...]  # of walkers with more bodies than two legs
+
+
 def _start_kind(value: Any) -> str:
-    return "state" if isinstance(value, list | tuple) else "word"
+    if not isinstance(value, list | tuple):
+        return "word"
+    return "state" if len(value) <= 4 else "long"
 
 
 Start = Annotated[
-    Annotated[Literal["fixed-point"], Tag("word")] | Annotated[State, Field(strict=False), Tag("state")],
+    Annotated[Literal["fixed-point"], Tag("word")]
+    | Annotated[State, Field(strict=False), Tag("state")]
+    | Annotated[LongState, Field(strict=False), Tag("long")],
     Discriminator(_start_kind),
 ]
-
-
-def _middle_of_the_leg(data: dict[str, Any]) -> float:
-    return float(data.get("leg_length_m", 1.0)) / 2
-
-
-class CompassWalker(Block):
-    """Two straight legs, each with a mass on it, and a mass at the hip."""
-
-    type: Annotated[Literal["compass"], key("", "kind of walker", "Fig. 1")] = "compass"
-    leg_length_m: Annotated[float, key("m", "L, from foot to hip", "Table 1", ge=1e-3, le=1e3)] = 1.0
-    foot_to_mass_m: Annotated[
-        float,
-        key(
-            "m",
-            "a, from foot to leg mass; b = L - a is the rest",
-            "section 2: 'in the middle of the legs'",
-            bounds="between 0 and leg_length_m, both excluded",
-            default="leg_length_m / 2",
-            gt=0.0,
-        ),
-    ] = Field(default_factory=_middle_of_the_leg)
-    leg_mass_kg: Annotated[float, key("kg", "m, mass of one leg", "Table 1", ge=1e-6, le=1e6)] = 5.0
-    hip_mass_kg: Annotated[float, key("kg", "M_H, mass at the hip", "Table 1", ge=0.0, le=1e6)] = 10.0
-    leg_inertia_kg_m2: Annotated[
-        float,
-        key("kg m^2", "inertia of one leg about its own centre of mass", "section 4: point masses", ge=0.0, le=1e9),
-    ] = 0.0
-    foot_radius_m: Annotated[
-        float,
-        key(
-            "m",
-            "radius of the ball foot of the physical model, 0 is a point; its centre is L - r from the hip",
-            "section 4: 'beveled with a radius of 1 mm'",
-            bounds="from 0 to below leg_length_m / 2",
-            ge=0.0,
-        ),
-    ] = 0.001
-
-    @field_validator("foot_to_mass_m")
-    @classmethod
-    def _mass_lies_on_the_leg(cls, value: float, info: ValidationInfo) -> float:
-        length = info.data.get("leg_length_m")
-        if length is None or value < length:
-            return value
-        if value == length:
-            reason = (
-                "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
-                "must be below leg_length_m, {length}"
-            )
-        else:
-            reason = "must be below leg_length_m, {length}"
-        raise PydanticCustomError("off-leg", reason, {"length": f"{length:g}"})
-
-    @field_validator("foot_radius_m")
-    @classmethod
-    def _foot_is_smaller_than_half_a_leg(cls, value: float, info: ValidationInfo) -> float:
-        length = info.data.get("leg_length_m")
-        if length is not None and value >= length / 2:
-            raise PydanticCustomError("foot", "must be below half of leg_length_m, {half}", {"half": f"{length / 2:g}"})
-        return value
-
-    @property
-    def mass_to_hip_m(self) -> float:
-        """b = L - a, m."""
-        return self.leg_length_m - self.foot_to_mass_m
-
-    @property
-    def total_mass_kg(self) -> float:
-        """Two legs and the hip, kg."""
-        return 2 * self.leg_mass_kg + self.hip_mass_kg
 
 
 Factor = Annotated[float, Field(ge=-10.0, le=10.0)]
@@ -264,7 +220,7 @@ class Config(Block):
         ),
         Field(pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$"),
     ] = "paper"
-    walker: CompassWalker = CompassWalker()
+    walker: Annotated[Walker, key("", "the walker; its keys depend on its type", "Fig. 1")] = CompassWalker()
     gravity_m_s2: Annotated[float, key("m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)] = 9.81
     slope_rad: Annotated[
         float,
@@ -296,11 +252,52 @@ class Config(Block):
     solver: Solvers = Solvers()
     stability: Stability = Stability()
     tune: Tune = Tune()
+    continuation: Continuation = Continuation()
+    basin: Basin = Basin()
+    sweep: Sweep | None = None
     outputs: Annotated[
         tuple[Output, ...],
         key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
     ] = OUTPUTS
     seed: Annotated[int, key("1", "seed of everything that is drawn at random", "this project", ge=0, le=2**32 - 1)] = 0
+
+    @field_validator("start")
+    @classmethod
+    def _start_fits_the_walker(cls, value: Any, info: ValidationInfo) -> Any:
+        walker = info.data.get("walker")
+        if isinstance(value, str) or walker is None:
+            return value
+        numbers = 2 * rigid_bodies(walker)
+        if len(value) != numbers:
+            raise PydanticCustomError(
+                "start",
+                "has {given} numbers, and this walker's state has {numbers}",
+                {"given": len(value), "numbers": numbers},
+            )
+        return value
+
+    @field_validator("equations")
+    @classmethod
+    def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
+        walker = info.data.get("walker")
+        if value == "as-printed" and walker is not None and not is_plain_compass(walker):
+            raise PydanticCustomError("printed", "as-printed are a compass's equations; this walker is another")
+        return value
+
+    @field_validator("contact")
+    @classmethod
+    def _feet_have_mass(cls, value: Contact | None, info: ValidationInfo) -> Contact | None:
+        walker = info.data.get("walker")
+        if value is not None and isinstance(walker, CompassWalker):
+            share = walker.leg_mass_kg / walker.total_mass_kg
+            if share < LIGHTEST_CONTACT:
+                raise PydanticCustomError(
+                    "massless",
+                    "the walker's feet have next to no mass ({share} of the whole): on compliant ground they would "
+                    "have to be infinitely fast; leave the contact block out, or give the legs mass",
+                    {"share": f"{share:.1g}"},
+                )
+        return value
 
     @field_validator("outputs")
     @classmethod

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from walkerlab.config.fields import Block, allowed, block_of, leaves, words_of
+from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
 from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence, plain
@@ -29,6 +29,7 @@ _REASONS: Final = {
     "missing": "has too few values",
     "too_long": "has too many values",
     "string_pattern_mismatch": "is not safe as a name",
+    "union_tag_invalid": "is of no known type",
 }
 MAX_PROBLEMS: Final = 100
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
@@ -67,10 +68,12 @@ def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list
 
 
 def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem:
-    location = detail["loc"]
+    location = without_kinds(model, detail["loc"])
+    if detail["type"] == "union_tag_invalid":
+        return _unknown_kind(location, tree, model)
     if detail["type"] == "extra_forbidden":
         return _unknown_key(location, tree)
-    path, field = _field_at(model, location)
+    path, field = _field_at(model, location, tree)
     node, position = _node_at(tree, location)
     if node is None and detail["type"] == "missing":
         return Problem(position, f"{'.'.join(path)}: is missing", allowed(field))
@@ -81,12 +84,46 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant if meant != word else "")
 
 
+def without_kinds(model: type[Block], location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """A location without the words that tell a block's kinds apart, which pydantic puts into it."""
+    path: list[int | str] = []
+    block: type[Block] | None = model
+    kinds: dict[str, type[Block]] = {}
+    for part in location:
+        if part in kinds:
+            block, kinds = kinds[str(part)], {}
+            continue
+        path.append(part)
+        if isinstance(part, str) and block is not None and part in block.model_fields:
+            field = block.model_fields[part]
+            block, kinds = block_of(field), kinds_of(field)
+    return tuple(path)
+
+
+def _kinds_in(tree: Mapping, path: tuple[int | str, ...], field: FieldInfo) -> type[Block] | None:
+    """The block that a key holds in this tree, by its `type`."""
+    kinds = kinds_of(field)
+    node, _ = _node_at(tree, path)
+    if not kinds or not isinstance(node, Mapping):
+        return block_of(field)
+    chosen = node.entries.get("type")
+    return kinds.get(str(chosen.value) if isinstance(chosen, Scalar) else "", block_of(field))
+
+
+def _unknown_kind(location: tuple[int | str, ...], tree: Mapping, model: type[Block]) -> Problem:
+    kinds = kinds_of(model.model_fields[str(location[0])])
+    node, position = _node_at(tree, (*location, "type"))
+    word = str(node.value) if isinstance(node, Scalar) else ""
+    text = f"{location[0]}.type: {shown(word)} is of no known type"
+    return Problem(position, text, f"one of {', '.join(kinds)}", nearest(word, kinds))
+
+
 def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
     path = tuple(part for part in location if isinstance(part, str))  # without places in lists
     block: type[Block] = Config
-    for above in path[:-1]:
+    for depth, above in enumerate(path[:-1]):
         if above in block.model_fields:
-            block = block_of(block.model_fields[above]) or block
+            block = _kinds_in(tree, path[: depth + 1], block.model_fields[above]) or block
     name = path[-1]
     parent, _ = _node_at(tree, location[:-1])
     position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
@@ -111,12 +148,12 @@ def _elsewhere(name: str) -> str:
     return paths[found] if found else ""
 
 
-def _field_at(model: type[Block], location: tuple[int | str, ...]) -> tuple[list[str], FieldInfo]:
+def _field_at(model: type[Block], location: tuple[int | str, ...], tree: Mapping) -> tuple[list[str], FieldInfo]:
     """Key and field that a location is in; what lies deeper (an item of a list, a kind of value) is left away."""
     path = [str(location[0])]
     field = model.model_fields[path[0]]
     for part in location[1:]:
-        block = block_of(field)
+        block = _kinds_in(tree, tuple(path), field)
         if isinstance(part, int) and block is not None:
             continue  # an item of a list of blocks
         if block is None or str(part) not in block.model_fields:

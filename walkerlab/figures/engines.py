@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import blank, legend_above
@@ -100,7 +100,7 @@ def plot_errors(scene: str, results: Results) -> Figure:
     for one in own:
         draw(right, one, one.wall_s, one.error)
     for axes in (left, right):
-        axes.set_xscale("log")
+        few_ticks(axes)
         axes.set_yscale("log")
         axes.set_xlabel("run time (s)")
         axes.yaxis.set_major_locator(LogLocator(numticks=20))
@@ -111,6 +111,17 @@ def plot_errors(scene: str, results: Results) -> Figure:
     right.set_title("(b) each engine's own contact")
     legend_above(figure, [one.line for one in (*same, *own) if np.isfinite(one.error).any()])
     return figure
+
+
+def few_ticks(axes: Axes) -> None:
+    """A logarithmic axis of costs, labelled at every decade, or at 1, 2 and 5 where it spans less than two."""
+    axes.set_xscale("log")
+    least, most = axes.get_xlim()
+    short = most < 100.0 * least
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=20))
+    axes.xaxis.set_minor_locator(NullLocator())
+    if short:
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
 
 
 def draw(axes: Axes, one: Series, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
@@ -135,7 +146,7 @@ def plot_periods(scene: str, results: Results) -> Figure:
         rigid = axes.axhline(reference["rigid_period_s"], color=RIGID.colour, linewidth=1.2, linestyle=":")
         rigid.set_label("rigid gait")
         levels.append(rigid)
-    axes.set_xscale("log")
+    few_ticks(axes)
     axes.set_xlabel("step size (s)")
     axes.set_ylabel("period of the last step (s)")
     legend_above(figure, [*levels, *(one.line for one in every if one.walked.any())])

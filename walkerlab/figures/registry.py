@@ -14,6 +14,10 @@ from walkerlab.figures import (
     figure_10,
     figure_11,
     figure_12,
+    figure_13,
+    figure_14,
+    figure_15,
+    figure_16,
     stability_maps,
 )
 from walkerlab.figures.illustration import Illustration
@@ -28,6 +32,10 @@ FIGURES: tuple[Illustration, ...] = (
     figure_10.FIGURE,
     figure_11.FIGURE,
     figure_12.FIGURE,
+    figure_13.FIGURE,
+    figure_14.FIGURE,
+    figure_15.FIGURE,
+    figure_16.FIGURE,
     *accuracy.FIGURES,
     *engines.FIGURES,
     *stability_maps.FIGURES,

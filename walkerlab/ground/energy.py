@@ -46,14 +46,12 @@ def book_energy(walker: ContactWalker, carried: tuple[bool, bool], y: State) -> 
 
 
 @inlined
-def dissipated_power(walker: ContactWalker, carried: tuple[bool, bool], y: State) -> tuple[float, float]:
-    """Power (W) lost in the normal direction, (F_n - k d^e) d', and to friction."""
+def dissipated_power(walker: ContactWalker, foot: int, y: State) -> tuple[float, float, float]:
+    """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
     s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    damping, friction = 0.0, 0.0
-    for foot in range(2):
-        motion = foot_motion(walker, walker.feet[foot], s, c, y)
-        if carried[foot] and motion.height < 0.0:
-            force = foot_force(walker, motion)
-            damping -= (force.normal.force - force.normal.spring) * motion.climb
-            friction -= force.along * motion.slip
-    return damping, friction
+    motion = foot_motion(walker, walker.feet[foot], s, c, y)
+    if motion.height >= 0.0:
+        return 0.0, 0.0, 0.0
+    force = foot_force(walker, motion)
+    damping = -(force.normal.force - force.normal.spring) * motion.climb
+    return damping, -force.along * motion.slip, force.normal.force

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.held import Independent, NoKnees
 from walkerlab.ground.motion import OnGround, all_wrenches
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import ContactWalker, Foot, foot_motion
@@ -18,7 +19,7 @@ from walkerlab.mechanics.tuples import put
 from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
 
-LEVER_X, LEVER_Y, ROLLING = range(3)  # rows of each foot in `levers`
+LEGS = ((0,), (1,))  # of no consequence to the feet
 
 
 def in_arrays(walker: ContactWalker) -> tuple[Any, Any, Coulomb | Frictionless]:
@@ -35,7 +36,9 @@ def from_arrays(levers: Any, numbers: Any, friction: Any, state: State, angles: 
     second = Foot(load(levers, 3, angles), load(levers, 4, angles), load(levers, 5, angles), numbers[2])
     normal = NormalLaw(numbers[3], numbers[4], numbers[5], numbers[6])
     tree = Tree(0.0, angles, angles, angles, angles)
-    return ContactWalker(tree, (first, second), normal, friction, 0.0, 0.0, numbers[0], state)
+    return ContactWalker(
+        tree, (first, second), normal, friction, 0.0, 0.0, numbers[0], Independent(), NoKnees(), LEGS, state
+    )
 
 
 @inlined

@@ -2,16 +2,16 @@
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.held import divide_by_held_mass, knee_gradients, knee_torques, turned_by
 from walkerlab.ground.walker import ContactWalker, Foot, foot_force, foot_motion
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.tree import (
-    divide_by_mass,
     mass_matrix,
     sines_cosines,
     tree_gradients,
     with_centrifugal,
 )
-from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.tuples import Vector, put
 from walkerlab.solvers.system import State, blank, derivative, jacobian
 
 
@@ -20,6 +20,8 @@ class OnGround(NamedTuple):
 
     walker: ContactWalker
     carried: tuple[bool, bool]
+    held: tuple[bool, ...] = ()  # (n) which bodies follow others now; none for a walker whose bodies are independent
+    stops: tuple[bool, ...] = ()  # (2) which knees are in their stops; none for a walker without knees
 
 
 @blank.case(OnGround)
@@ -66,7 +68,8 @@ def on_ground_derivative(system: OnGround, t: float, y: State) -> State:
     n = len(tree.arm_x)
     s, c = sines_cosines(tree, y, 2, walker.slope)
     wrench = all_wrenches(system, s, c, y)
-    alpha = solve_symmetric(mass_matrix(tree, s, c), with_centrifugal(tree, s, c, y, 4 + n, wrench[2]))
+    torques = knee_torques(walker.knees, system.stops, y, 2, with_centrifugal(tree, s, c, y, 4 + n, wrench[2]))
+    alpha = turned_by(walker.held, system.held, mass_matrix(tree, s, c), torques)
     rate = walker.blank
     for i in range(2 + n):
         rate = put(rate, i, y[2 + n + i])
@@ -137,8 +140,10 @@ def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
         ground_gradients(walker, walker.feet[1], s, c, y, J)
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, 4 + n, all_wrenches(system, s, c, y)[2])
-    tree_gradients(tree, s, c, y, 2, solve_symmetric(M, torques), J)
-    divide_by_mass(tree, M, J)
+    torques = knee_torques(walker.knees, system.stops, y, 2, torques)
+    knee_gradients(walker.knees, system.stops, y, 2, J)
+    tree_gradients(tree, s, c, y, 2, turned_by(walker.held, system.held, M, torques), J)
+    divide_by_held_mass(walker.held, system.held, tree, M, J)
     for j in range(4 + 2 * n):
         J[2 + n, j] /= tree.mass
         J[3 + n, j] /= tree.mass

@@ -6,6 +6,7 @@ neither that a foot must come from above nor that a walk can end. The walks of t
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.held import always_held, no_stops
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import carried_in_cell, cell_at
 from walkerlab.ground.walker import ContactWalker, foot_motion
@@ -30,7 +31,7 @@ def over_pads(system: OnPads, y: State) -> OnGround:
     second = foot_motion(walker, walker.feet[1], s, c, y).along
     over_first = carried_in_cell(terrain, cell_at(terrain, 0, first))
     over_second = carried_in_cell(terrain, cell_at(terrain, 1, second))
-    return OnGround(walker, (over_first, over_second))
+    return OnGround(walker, (over_first, over_second), always_held(walker.held), no_stops(walker.knees))
 
 
 @blank.case(OnPads)

@@ -6,17 +6,17 @@ ground while the leg turns over it.
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.held import divide_by_held_mass, knee_gradients, knee_torques, turned_by
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.tree import (
     Tree,
-    divide_by_mass,
     mass_matrix,
     sines_cosines,
     tree_gradients,
     with_centrifugal,
 )
-from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.tuples import Vector, put
 from walkerlab.solvers.system import State, blank, derivative, jacobian
 
 
@@ -28,6 +28,8 @@ class Pinned(NamedTuple):
     foot: int  # which foot is hinged
     along: float  # m, where
     blank: State
+    held: tuple[bool, ...] = ()  # as of OnGround
+    stops: tuple[bool, ...] = ()
 
 
 @blank.case(Pinned)
@@ -55,7 +57,8 @@ def pinned_derivative(system: Pinned, t: float, y: State) -> State:
     n = len(tree.arm_x)
     s, c = sines_cosines(tree, y, 0, system.walker.slope)
     torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
-    alpha = solve_symmetric(mass_matrix(tree, s, c), torques)
+    torques = knee_torques(system.walker.knees, system.stops, y, 0, torques)
+    alpha = turned_by(system.walker.held, system.held, mass_matrix(tree, s, c), torques)
     rate = system.blank
     for k in range(n):
         rate = put(rate, k, y[n + k])
@@ -78,8 +81,10 @@ def pinned_jacobian(system: Pinned, t: float, y: State, J: Any) -> None:
         J[n + k, k] = walker.gravity_down * upward - walker.gravity_along * forward
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
-    tree_gradients(tree, s, c, y, 0, solve_symmetric(M, torques), J)
-    divide_by_mass(tree, M, J)
+    torques = knee_torques(walker.knees, system.stops, y, 0, torques)
+    knee_gradients(walker.knees, system.stops, y, 0, J)
+    tree_gradients(tree, s, c, y, 0, turned_by(walker.held, system.held, M, torques), J)
+    divide_by_held_mass(walker.held, system.held, tree, M, J)
 
 
 @inlined

@@ -1,7 +1,8 @@
-"""What ground there is for each foot: pads laid in one lane a leg, or a plane that lets scuffing feet through.
+"""What ground there is for each foot: pads laid in one lane a leg, a plane that lets scuffing feet through, a plane.
 
 Straight legs scuff, so the paper walks on a checkerboard: in the plane, one lane of raised pads for each leg. A lane is
-cut into cells, pads (even numbers) and gaps (odd); a plane is one endless cell.
+cut into cells, pads (even numbers) and gaps (odd); a plane is one endless cell. Feet that clear the ground need no
+pads.
 """
 
 import math
@@ -23,6 +24,17 @@ class AfterMidSwing(NamedTuple):
     """A plane that a foot can touch only once it has been above the ground ahead of the other foot."""
 
     step_length: float  # [S] m, what a step ahead is measured by
+
+
+class Plane(NamedTuple):
+    """Ordinary ground: it carries any foot that touches it."""
+
+    step_length: float  # [S] m, what a step ahead is measured by
+
+
+@by_type
+def has_pads(terrain: Any) -> bool:
+    """Whether the ground has edges, and pads that a foot can trip over."""
 
 
 @by_type
@@ -51,18 +63,24 @@ def carried_in_cell(terrain: Any, cell: int) -> bool:
 
 
 @by_type
-def carried_after_lift(terrain: Any, carried: bool, ahead: bool) -> bool:
-    """Whether the ground still carries a foot that has just lifted."""
+def carried_in_air(terrain: Any, carried: bool, stands: bool, ahead: bool) -> bool:
+    """Whether ground would carry a foot that is above it.
 
-
-@by_type
-def carried_in_air(terrain: Any, carried: bool, ahead: bool) -> bool:
-    """Whether the ground carries a foot that is above it and ahead of the other foot, or not."""
+    carried  whether it would have until now
+    stands   whether it is the stance foot
+    ahead    whether it is ahead of the other foot
+    """
 
 
 @by_type
 def order_matters(terrain: Any) -> bool:
     """Whether it matters which foot is ahead."""
+
+
+@has_pads.case(Checkerboard)
+def checkerboard_pads(terrain: Checkerboard) -> bool:
+    """Yes."""
+    return True
 
 
 @cell_at.case(Checkerboard)
@@ -96,15 +114,9 @@ def checkerboard_carries(terrain: Checkerboard, cell: int) -> bool:
     return cell % 2 == 0
 
 
-@carried_after_lift.case(Checkerboard)
-def checkerboard_after_lift(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
-    """A pad stays where it is."""
-    return carried
-
-
 @carried_in_air.case(Checkerboard)
-def checkerboard_in_air(terrain: Checkerboard, carried: bool, ahead: bool) -> bool:
-    """The other foot does not matter."""
+def checkerboard_in_air(terrain: Checkerboard, carried: bool, stands: bool, ahead: bool) -> bool:
+    """A pad stays where it is."""
     return carried
 
 
@@ -114,21 +126,31 @@ def checkerboard_order(terrain: Checkerboard) -> bool:
     return False
 
 
+@has_pads.case(AfterMidSwing)
+@has_pads.case(Plane)
+def plane_pads(terrain: Any) -> bool:
+    """No."""
+    return False
+
+
 @cell_at.case(AfterMidSwing)
-def plane_cell(terrain: AfterMidSwing, foot: int, along: float) -> int:
+@cell_at.case(Plane)
+def plane_cell(terrain: Any, foot: int, along: float) -> int:
     """One plane."""
     return 0
 
 
 @cell_edges.case(AfterMidSwing)
-def plane_edges(terrain: AfterMidSwing, foot: int, cell: int) -> tuple[float, float]:
+@cell_edges.case(Plane)
+def plane_edges(terrain: Any, foot: int, cell: int) -> tuple[float, float]:
     """None within reach."""
     return -FAR, FAR
 
 
 @stride_measure.case(AfterMidSwing)
-def plane_measure(terrain: AfterMidSwing) -> float:
-    """The rigid gait's step length."""
+@stride_measure.case(Plane)
+def plane_measure(terrain: Any) -> float:
+    """The reference step length."""
     return terrain.step_length
 
 
@@ -139,24 +161,37 @@ def plane_start(terrain: AfterMidSwing, is_stance: bool) -> bool:
 
 
 @carried_in_cell.case(AfterMidSwing)
-def plane_carries(terrain: AfterMidSwing, cell: int) -> bool:
+@carried_in_cell.case(Plane)
+def plane_carries(terrain: Any, cell: int) -> bool:
     """Never asked: the plane has no edges."""
     return True
 
 
-@carried_after_lift.case(AfterMidSwing)
-def plane_after_lift(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
-    """A foot that lifts behind the other swings through; one that bounces ahead comes down again."""
-    return carried and ahead
-
-
 @carried_in_air.case(AfterMidSwing)
-def plane_in_air(terrain: AfterMidSwing, carried: bool, ahead: bool) -> bool:
-    """Ahead and above the ground: from here on it can touch. Fallen back: no longer."""
-    return ahead
+def plane_in_air(terrain: AfterMidSwing, carried: bool, stands: bool, ahead: bool) -> bool:
+    """A swing foot above the ground can touch while it is ahead; the stance foot, when it bounces, anywhere."""
+    return stands or ahead
 
 
 @order_matters.case(AfterMidSwing)
 def plane_order(terrain: AfterMidSwing) -> bool:
     """Yes."""
     return True
+
+
+@starts_carried.case(Plane)
+def any_start(terrain: Plane, is_stance: bool) -> bool:
+    """Both are."""
+    return True
+
+
+@carried_in_air.case(Plane)
+def any_in_air(terrain: Plane, carried: bool, stands: bool, ahead: bool) -> bool:
+    """Wherever it is."""
+    return True
+
+
+@order_matters.case(Plane)
+def any_order(terrain: Plane) -> bool:
+    """No."""
+    return False

@@ -33,6 +33,9 @@ class ContactWalker(NamedTuple):
     gravity_along: float  # m/s^2
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # rad
+    held: Any  # Independent or Held: which bodies follow others
+    knees: Any  # NoKnees or Knees
+    legs: tuple[tuple[int, ...], tuple[int, ...]]  # bodies of either leg, from the hip down
     blank: State  # a state of zeros
 
 

@@ -1,13 +1,15 @@
 """The signals whose zeros are the events of a walk on compliant ground, sampled along a step.
 
-Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). The others are joins of
-the force law, where its derivatives jump: a step that ends there keeps the method's order.
+Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). Of these the walk knows
+on which side of zero they are, and the event is that they leave it: of events at one time none can hide another. The
+others are joins of the force law, where its derivatives jump: a step that ends there keeps the method's order.
 """
 
 import math
 from typing import Any, NamedTuple
 
 from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.held import BENT, STOPPING, Knees, NoKnees, extension, extension_rate
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.pinned import Pinned, floating_state
@@ -15,18 +17,21 @@ from walkerlab.ground.terrain import cell_edges, stride_measure
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing
 from walkerlab.solvers.system import State
 
 # signals of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
-ALONG = 9  # no event: where the foot is
-PER_FOOT = 10
+MATERIAL, CLIMB = 9, 10  # no events: where the foot's material is, and how fast its height grows
+PER_FOOT = 11
 # signals of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
-SIGNALS = 2 * PER_FOOT + 3
-FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot from its foothold
+# signals of both knees: how far beyond straight, and how fast it gets there
+EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
+SIGNALS = SLIDE + 5
+NO_SIDE = 0  # of a signal that may cross zero either way
+FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 
 
@@ -74,11 +79,41 @@ def hinged_feels(system: Pinned, carried: bool, height: float) -> bool:
     return False
 
 
+@by_type
+def is_free(system: Any, foot: int) -> bool:
+    """Whether a foot may touch and lift."""
+
+
+@is_free.case(OnGround)
+def free_both(system: OnGround, foot: int) -> bool:
+    """Both may."""
+    return True
+
+
+@is_free.case(Pinned)
+def free_other(system: Pinned, foot: int) -> bool:
+    """The hinged one may not."""
+    return foot != system.foot
+
+
 @inlined
 def feet_motion(walker: ContactWalker, y: State) -> tuple[FootMotion, FootMotion]:
     """Both feet of the free walker's state."""
     s, c = sines_cosines(walker.tree, y, 2, walker.slope)
     return foot_motion(walker, walker.feet[0], s, c, y), foot_motion(walker, walker.feet[1], s, c, y)
+
+
+@inlined
+def material_along(walker: ContactWalker, foot: int, along: float, y: State) -> float:
+    """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
+
+    The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
+    velocity; so is its way the contact point's plus radius times the change of the angle.
+    """
+    rolling = walker.feet[foot].rolling
+    for k in range(len(rolling)):
+        along += rolling[k] * y[2 + k]
+    return along
 
 
 @inlined
@@ -99,7 +134,7 @@ def sample_signals(
     frame: Frame,
     cells: Any,
     stance: int,
-    foothold: float,
+    touched: float,
     state: State,
     node: int,
     finder: CrossingFinder,
@@ -107,17 +142,20 @@ def sample_signals(
     """Values of all signals at one node of a step, where the system's state is `state`."""
     y = walker_state(system, state)
     feet = feet_motion(walker, y)
-    sample_foot(walker, feet[0], cell_edges(terrain, 0, cells[0]), 0, node, finder)
-    sample_foot(walker, feet[1], cell_edges(terrain, 1, cells[1]), PER_FOOT, node, finder)
+    for foot in range(2):
+        first = foot * PER_FOOT
+        sample_foot(walker, feet[foot], cell_edges(terrain, foot, cells[foot]), first, node, finder)
+        finder.values[first + MATERIAL, node] = material_along(walker, foot, feet[foot].along, y)
     finder.values[PASSING, node] = feet[1].along - feet[0].along
     finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
-    away = finder.values[stance * PER_FOOT + ALONG, node] - foothold
+    away = finder.values[stance * PER_FOOT + MATERIAL, node] - touched
     finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+    sample_knees(walker.knees, y, node, finder)
 
 
 @inlined
 def farthest_slide(terrain: Any) -> float:
-    """How far from its foothold a loaded stance foot may get (m)."""
+    """How far a loaded stance foot may slip (m)."""
     return FARTHEST_SLIDE * stride_measure(terrain)
 
 
@@ -128,12 +166,72 @@ def sample_foot(
     """One foot's signals at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
-    values[first + ALONG, j] = motion.along
+    values[first + CLIMB, j] = motion.climb
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
     values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
     sample_slip(walker.friction, motion.slip, first, j, finder)
+
+
+@by_type
+def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
+    """The knees' signals at node j."""
+
+
+@sample_knees.case(NoKnees)
+def sample_no_knees(knees: NoKnees, y: State, j: int, finder: CrossingFinder) -> None:
+    """Nothing."""
+
+
+@sample_knees.case(Knees)
+def sample_both_knees(knees: Knees, y: State, j: int, finder: CrossingFinder) -> None:
+    """Extension and its rate."""
+    for knee in range(2):
+        finder.values[EXTENSION + knee, j] = extension(knees, knee, y, 2)
+        finder.values[EXTENSION_RATE + knee, j] = extension_rate(knees, knee, y, 2)
+
+
+@by_type
+def knee_crossing(
+    knees: Any, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """Fraction of the step at which a knee locks, latches or is to be released, and which signal's that is.
+
+    knee       (2,) what each knee is doing
+    releasing  whether the trailing knee is released when the stance foot stops sinking in
+    """
+
+
+@knee_crossing.case(NoKnees)
+def no_knee_crossing(
+    knees: NoKnees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """None."""
+    return NO_CROSSING, -1
+
+
+@knee_crossing.case(Knees)
+def first_knee_crossing(
+    knees: Knees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in."""
+    best, signal = NO_CROSSING, -1
+    for k in range(2):
+        at, index = NO_CROSSING, EXTENSION + k
+        if knee[k] == BENT:
+            at = leaves_side(finder, index, -1, at_zero[index] != 0)
+        elif knee[k] == STOPPING:
+            index = EXTENSION_RATE + k
+            at = leaves_side(finder, index, 1, at_zero[index] != 0)
+        if at < best:
+            best, signal = at, index
+    if releasing:
+        index = stance * PER_FOOT + CLIMB
+        at = leaves_side(finder, index, -1, at_zero[index] != 0)
+        if at < best:
+            best, signal = at, index
+    return best, signal
 
 
 @by_type
@@ -164,7 +262,7 @@ def joins(law: Any) -> int:
 @joins.case(Coulomb)
 def coulomb_joins(law: Coulomb) -> int:
     """All."""
-    return ALONG
+    return MATERIAL
 
 
 @joins.case(Frictionless)
@@ -181,7 +279,11 @@ def earliest_crossing(
     watch_order: bool,
     carried: Any,
     stance: int,
+    sides: Any,
     at_zero: Any,
+    pads: bool,
+    knee: Any,
+    releasing: bool,
     finder: CrossingFinder,
 ) -> tuple[float, int]:
     """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none.
@@ -189,10 +291,16 @@ def earliest_crossing(
     watch_order  whether it matters that the feet pass each other
     carried      (2,) whether there is ground under each foot
     stance       the stance foot, which may slide
+    sides        (signals,) on which side of zero each signal is known to be: 1, -1, or NO_SIDE
     at_zero      (signals,) which signals the last event left at zero
+    pads         whether the ground has edges
+    knee         (2,) what each knee is doing
+    releasing    whether the trailing knee is released when the stance foot stops sinking in
     """
     best, signal = NO_CROSSING, -1
     for foot in range(2):
+        if not is_free(system, foot):
+            continue
         first = foot * PER_FOOT
         # a foot that an event left on the surface is inside or outside by rounding there
         lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
@@ -201,25 +309,45 @@ def earliest_crossing(
         inside = feels_ground(system, carried[foot] != 0, lowest)
         last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
         for index in range(first, first + last):
-            edge = index == first + LEFT_EDGE or index == first + RIGHT_EDGE
-            at = first_crossing(finder, index, FALLING if edge else 0, 0.0, at_zero[index] != 0)
+            if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
+                continue
+            at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
-        if inside and foot == stance:
-            at = first_crossing(finder, SLIDE, FALLING, 0.0, at_zero[SLIDE] != 0)
+        if foot == stance and sides[first + HEIGHT] < 0 and feels_ground(system, carried[foot] != 0, -1.0):
+            at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
                 best, signal = at, SLIDE
     if watch_order:
-        at = first_crossing(finder, PASSING, 0, 0.0, at_zero[PASSING] != 0)
+        at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if at < best:
             best, signal = at, PASSING
-    at = first_crossing(finder, FALL, FALLING, 0.0, at_zero[FALL] != 0)
+    at, index = knee_crossing(walker.knees, knee, releasing, stance, at_zero, finder)
+    if at < best:
+        best, signal = at, index
+    at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
     if at < best:
         best, signal = at, FALL
     return best, signal
 
 
 @inlined
+def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: bool) -> float:
+    """Fraction at which a signal crosses to the other side of zero than it is known to be on.
+
+    At once if it is there already: the step before, which ended for another event, went past its zero.
+    """
+    if side != NO_SIDE:
+        beyond = zero_at_start or side * finder.values[signal, 0] < 0.0
+        if zero_at_start:
+            for j in range(1, finder.nodes.size):
+                beyond = beyond and side * finder.values[signal, j] < 0.0
+        if beyond:
+            return 0.0
+    return first_crossing(finder, signal, -side, 0.0, zero_at_start)
+
+
+@inlined
 def is_join(signal: int) -> bool:
     """Whether an event is a mere join of the force law."""
-    return signal < 2 * PER_FOOT and signal % PER_FOOT >= RELEASE
+    return signal < 2 * PER_FOOT and RELEASE <= signal % PER_FOOT < MATERIAL

@@ -3,15 +3,17 @@
 from typing import Any, NamedTuple
 
 from walkerlab.ground.energy import book_energy, dissipated_power, foot_elastic_energy
+from walkerlab.ground.held import Knees, NoKnees, knee_energy, knee_power
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import feet_motion, walker_state
+from walkerlab.hybrid.contact_events import CLIMB, HEIGHT, PER_FOOT, feet_motion, walker_state
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_type, inlined
+from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.stepping import T_OLD, T, end_state, interpolate
 from walkerlab.solvers.system import State
 
 # indices into `books`
-DAMPING, FRICTION, EDGES, BOOKS = 0, 1, 2, 3
+DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, BOOKS = 0, 1, 2, 3, 4, 5
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY = 0, 1, 2
 # nodes and weights of the Radau quadrature on a step: exact to the order of the method of that name
@@ -27,29 +29,46 @@ class ContactObserver(NamedTuple):
     states: Any  # (samples, 8)
     carried: Any  # (samples, 2)
     stance: Any  # (samples,)
-    sampled_books: Any  # (samples, 3) J dissipated so far, by channel
+    knees: Any  # (samples, 2) what each knee is doing
+    sampled_books: Any  # (samples, 5) J dissipated so far, by channel
     recorded: Any  # (1,)
-    books: Any  # (3,) J dissipated so far
+    books: Any  # (5,) J dissipated so far
     extremes: Any  # (3,) deepest penetration m, largest residual of the energy balance J, energy at the start J
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
 
 
 @inlined
 def observe(
-    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, carried: Any, stance: int
+    observer: ContactObserver,
+    method: Any,
+    system: Any,
+    walker: ContactWalker,
+    finder: CrossingFinder,
+    carried: Any,
+    knee: Any,
+    stance: int,
 ) -> None:
-    """Take note of the last step, which stands: samples, books, tangent."""
+    """Take note of the last step, which stands and whose signals are sampled: samples, books, tangent."""
     mode = (carried[0] != 0, carried[1] != 0)
-    record_samples(observer, method, system, walker, mode, stance)
+    record_samples(observer, method, system, walker, mode, knee, stance)
     if observer.booked:
         keep_books(observer, method, system, walker, mode)
+        for foot in range(2):
+            if mode[foot]:
+                note_depth(observer, method, system, walker, finder, foot)
     if observer.tangent.Phi.shape[1] > 0:
         carry_tangent(observer.tangent, method, system)
 
 
 @inlined
 def record_samples(
-    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, mode: tuple[bool, bool], stance: int
+    observer: ContactObserver,
+    method: Any,
+    system: Any,
+    walker: ContactWalker,
+    mode: tuple[bool, bool],
+    knee: Any,
+    stance: int,
 ) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
@@ -59,10 +78,13 @@ def record_samples(
         y = walker_state(system, interpolate(method, system, fraction))
         for i in range(len(y)):
             observer.states[index, i] = y[i]
-        damping, friction = work_until(method, system, walker, mode, fraction)
-        observer.sampled_books[index, DAMPING] = observer.books[DAMPING] + damping
-        observer.sampled_books[index, FRICTION] = observer.books[FRICTION] + friction
-        observer.sampled_books[index, EDGES] = observer.books[EDGES]
+        damping, friction, stops = work_until(method, system, walker, mode, fraction)
+        for channel in range(BOOKS):
+            observer.sampled_books[index, channel] = observer.books[channel]
+        observer.sampled_books[index, DAMPING] += damping
+        observer.sampled_books[index, FRICTION] += friction
+        observer.sampled_books[index, KNEE_STOP] += stops
+        observer.knees[index, 0], observer.knees[index, 1] = knee[0], knee[1]
         observer.carried[index, 0], observer.carried[index, 1] = mode
         observer.stance[index] = stance
         index += 1
@@ -73,18 +95,32 @@ def record_samples(
 def keep_books(
     observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, mode: tuple[bool, bool]
 ) -> None:
-    """What the last step dissipated, how deep the feet are at its end, and how well the energy balances there."""
-    damping, friction = work_until(method, system, walker, mode, 1.0)
+    """What the last step dissipated, and how well the energy balances at its end."""
+    damping, friction, stops = work_until(method, system, walker, mode, 1.0)
     observer.books[DAMPING] += damping
     observer.books[FRICTION] += friction
+    observer.books[KNEE_STOP] += stops
     end = walker_state(system, end_state(method, system))
-    feet = feet_motion(walker, end)
-    for foot in range(2):
-        if mode[foot]:
-            observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], -feet[foot].height)
-    lost = observer.books[DAMPING] + observer.books[FRICTION] + observer.books[EDGES]
-    residual = book_energy(walker, mode, end) + lost - observer.extremes[START_ENERGY]
+    lost = 0.0
+    for channel in range(BOOKS):
+        lost += observer.books[channel]
+    held = book_energy(walker, mode, end) + knee_energy(walker.knees, system.stops, end, 2)
+    residual = held + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
+
+
+@inlined
+def note_depth(
+    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, finder: CrossingFinder, foot: int
+) -> None:
+    """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
+    end, first = finder.nodes.size - 1, foot * PER_FOOT
+    deepest = -finder.values[first + HEIGHT, end]
+    if finder.values[first + CLIMB, 0] < 0.0 < finder.values[first + CLIMB, end]:
+        at = first_crossing(finder, first + CLIMB, RISING, 0.0, False)
+        lowest = feet_motion(walker, walker_state(system, interpolate(method, system, min(at, 1.0))))
+        deepest = max(deepest, -lowest[foot].height)
+    observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
 
 
 @inlined
@@ -97,13 +133,56 @@ def observe_edge(observer: ContactObserver, walker: ContactWalker, foot: int, ca
 @inlined
 def work_until(
     method: Any, system: Any, walker: ContactWalker, carried: tuple[bool, bool], fraction: float
-) -> tuple[float, float]:
-    """Work (J) lost to damping and to friction in the first part of the last step."""
-    span = fraction * (method.clock[T] - method.clock[T_OLD])
+) -> tuple[float, float, float]:
+    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step."""
     damping, friction = 0.0, 0.0
+    for foot in range(2):
+        if carried[foot]:
+            lost = foot_work(method, system, walker, foot, fraction)
+            damping += lost[0]
+            friction += lost[1]
+    return damping, friction, stop_work(walker.knees, method, system, fraction)
+
+
+@by_type
+def stop_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
+    """Work (J) lost in the knees' stops."""
+
+
+@stop_work.case(NoKnees)
+def no_work(knees: NoKnees, method: Any, system: Any, fraction: float) -> float:
+    """None."""
+    return 0.0
+
+
+@stop_work.case(Knees)
+def work_in_stops(knees: Knees, method: Any, system: Any, fraction: float) -> float:
+    """That of their damping."""
+    span, work = fraction * (method.clock[T] - method.clock[T_OLD]), 0.0
+    if system.stops[0] or system.stops[1]:
+        for i in range(3):
+            y = walker_state(system, interpolate(method, system, fraction * NODES[i]))
+            work += span * WEIGHTS[i] * knee_power(knees, system.stops, y, 2)
+    return work
+
+
+@inlined
+def foot_work(method: Any, system: Any, walker: ContactWalker, foot: int, fraction: float) -> tuple[float, float]:
+    """Work (J) lost under a foot that there is ground for.
+
+    Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
+    quadrature likes; steps end where it lets go.
+    """
+    span = fraction * (method.clock[T] - method.clock[T_OLD])
+    damping, friction, let_go = 0.0, 0.0, True
     for i in range(3):
         y = walker_state(system, interpolate(method, system, fraction * NODES[i]))
-        power = dissipated_power(walker, carried, y)
+        power = dissipated_power(walker, foot, y)
         damping += span * WEIGHTS[i] * power[0]
         friction += span * WEIGHTS[i] * power[1]
+        let_go = let_go and (i == 2 or power[2] == 0.0)
+    if let_go:
+        start, end = interpolate(method, system, 0.0), interpolate(method, system, fraction)
+        damping = foot_elastic_energy(walker, foot, walker_state(system, start))
+        damping -= foot_elastic_energy(walker, foot, walker_state(system, end))
     return damping, friction

@@ -2,15 +2,29 @@
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.held import (
+    BENT,
+    FLEXED,
+    LOCKED,
+    RELEASED,
+    STOPPING,
+    IdealLock,
+    Knees,
+    NoKnees,
+    extension,
+)
+from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import (
-    carried_after_lift,
     carried_in_air,
     carried_in_cell,
-    order_matters,
+    has_pads,
     stride_measure,
 )
 from walkerlab.ground.walker import ContactWalker, FootMotion
 from walkerlab.hybrid.contact_events import (
+    CLIMB,
+    EXTENSION,
+    EXTENSION_RATE,
     FALL,
     HEIGHT,
     LEFT_EDGE,
@@ -20,15 +34,17 @@ from walkerlab.hybrid.contact_events import (
     SLIDE,
     farthest_slide,
     feet_motion,
+    material_along,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
-TRIP = 0.25  # of the stride measure: how far from its foothold a foot must come down to have tripped
+TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
+BENT_KNEE = int(Outcome.BENT_KNEE)
 GOES_ON = -1
 
 # indices into Ledger.times
@@ -43,10 +59,19 @@ class Ledger(NamedTuple):
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     slip: Any  # (steps,) m, net slip of the stance foot of each step
+    rolling: Any  # (steps,) m, how far it rolled
     carried: Any  # (2,) whether there is ground under a foot
     cells: Any  # (2,) which cell of its lane a foot is over
     left_cells: Any  # (2,) the cell where it last stood
     foothold: Any  # (2,) m, where it touched
+    touched: Any  # (2,) m, where its material was then
+    stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
+    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
+    held: Any  # (n) which bodies follow others
+    knee: Any  # (2,) what each knee is doing
+    releasing: Any  # (1,) whether the trailing knee is still to be released
+    knee_strike: Any  # (steps,) s, when the knee of the step's swing leg locked; -1 if it has not
+    sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
     times: Any  # (2,) see the indices above
     feet: Any  # (2,) see the indices above
@@ -59,21 +84,26 @@ def happen(
     """Let an event change the ledger; returns an outcome if it ends the walk."""
     if signal == FALL:
         return FELL
-    feet = feet_motion(walker, y)
-    ledger.at_zero[signal] = 1
     if signal == SLIDE:
-        stance = ledger.feet[STANCE]
-        return SLID if ledger.carried[stance] != 0 and feet[stance].height < 0.0 else GOES_ON
+        return SLID
+    ledger.at_zero[signal] = 1
+    if signal >= EXTENSION:
+        knee_stops(walker.knees, ledger, signal, t)
+        return GOES_ON
+    feet = feet_motion(walker, y)
     if signal == PASSING:
+        ledger.sides[PASSING] = -ledger.sides[PASSING]
         for foot in range(2):
-            pass_by(terrain, ledger, feet, foot)
+            pass_by(terrain, ledger, foot)
         return GOES_ON
     foot = signal // PER_FOOT
     kind = signal % PER_FOOT
     if kind == HEIGHT:
-        if feet[foot].climb < 0.0:
-            return touch(terrain, ledger, feet, foot, t)
-        lift(terrain, ledger, feet, foot)
+        ledger.sides[signal] = -ledger.sides[signal]
+        if is_above(ledger, foot):
+            lift(walker, terrain, ledger, feet, foot, y)
+        else:
+            return touch(walker, terrain, ledger, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
         ledger.at_zero[signal] = 0
         ledger.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
@@ -81,44 +111,71 @@ def happen(
         if not carried_in_cell(terrain, ledger.cells[foot]):
             observe_edge(observer, walker, foot, ledger.carried[foot] != 0, y)
             ledger.carried[foot] = 0
-        elif feet[foot].height < 0.0:
-            return OFF_PAD
-        else:
+        elif is_above(ledger, foot):
             ledger.carried[foot] = 1
+        else:
+            return OFF_PAD
+    elif kind == CLIMB:
+        ledger.at_zero[signal] = 0
+        release(walker.knees, ledger, 1 - foot)
     return GOES_ON
 
 
 @inlined
-def is_ahead(feet: tuple[FootMotion, FootMotion], foot: int) -> bool:
-    """Whether a foot is further along than the other."""
-    return feet[foot].along > feet[1 - foot].along
+def is_above(ledger: Ledger, foot: int) -> bool:
+    """Whether a foot is above the ground."""
+    return ledger.sides[foot * PER_FOOT + HEIGHT] > 0
 
 
 @inlined
-def pass_by(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int) -> None:
+def is_ahead(ledger: Ledger, foot: int) -> bool:
+    """Whether a foot is further along than the other; known where the order of the feet is watched."""
+    return (ledger.sides[PASSING] > 0) == (foot == 1)
+
+
+@inlined
+def pass_by(terrain: Any, ledger: Ledger, foot: int) -> None:
     """The feet changed places: one that is in the air may find ground, or lose it."""
-    if feet[foot].height > 0.0:
-        carried = carried_in_air(terrain, ledger.carried[foot] != 0, is_ahead(feet, foot))
+    if is_above(ledger, foot):
+        stands = foot == ledger.feet[STANCE]
+        carried = carried_in_air(terrain, ledger.carried[foot] != 0, stands, is_ahead(ledger, foot))
         ledger.carried[foot] = 1 if carried else 0
 
 
 @inlined
-def lift(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int) -> None:
+def lift(
+    walker: ContactWalker, terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State
+) -> None:
     """A foot rose above the ground: from its stance, or out of a scuff."""
-    if ledger.carried[foot] != 0:
-        ahead = is_ahead(feet, foot)
-        ledger.carried[foot] = 1 if carried_after_lift(terrain, True, ahead) else 0
-        if foot != ledger.feet[STANCE] and ledger.cells[foot] == ledger.left_cells[foot] and not ahead:
+    stands = foot == ledger.feet[STANCE]
+    if stands or ledger.leaving[foot] != 0:
+        note_slip(walker, ledger, feet, foot, y)
+        if not stands:
             step = ledger.feet[STEPS] - 1
-            if step >= 0:
-                ledger.slip[step] = feet[foot].along - ledger.foothold[foot]
-    else:
-        carried = carried_in_air(terrain, False, is_ahead(feet, foot))
-        ledger.carried[foot] = 1 if carried else 0
+            ledger.slip[step], ledger.rolling[step] = ledger.stood[foot, 0], ledger.stood[foot, 1]
+        ledger.leaving[foot] = 0
+    carried = carried_in_air(terrain, ledger.carried[foot] != 0, stands, is_ahead(ledger, foot))
+    ledger.carried[foot] = 1 if carried else 0
 
 
 @inlined
-def touch(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, t: float) -> int:
+def note_slip(walker: ContactWalker, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foot: int, y: State) -> None:
+    """How far a foot has slipped and rolled since it touched."""
+    slip = material_along(walker, foot, feet[foot].along, y) - ledger.touched[foot]
+    ledger.stood[foot, 0] = slip
+    ledger.stood[foot, 1] = feet[foot].along - ledger.foothold[foot] - slip
+
+
+@inlined
+def touch(
+    walker: ContactWalker,
+    terrain: Any,
+    ledger: Ledger,
+    feet: tuple[FootMotion, FootMotion],
+    foot: int,
+    t: float,
+    y: State,
+) -> int:
     """A foot came down on ground.
 
     It ends the step if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
@@ -127,21 +184,143 @@ def touch(terrain: Any, ledger: Ledger, feet: tuple[FootMotion, FootMotion], foo
     stance = ledger.feet[STANCE]
     if ledger.carried[foot] == 0:
         return GOES_ON
+    material = material_along(walker, foot, feet[foot].along, y)
     if foot == stance:
-        away = abs(feet[foot].along - ledger.foothold[foot])
-        return SLID if away > farthest_slide(terrain) else GOES_ON
+        return SLID if abs(material - ledger.touched[foot]) > farthest_slide(terrain) else GOES_ON
     measure = stride_measure(terrain)
-    if not order_matters(terrain) and ledger.cells[foot] == ledger.left_cells[foot]:
-        return OFF_PAD if abs(feet[foot].along - ledger.foothold[foot]) > TRIP * measure else GOES_ON
+    if has_pads(terrain) and ledger.cells[foot] == ledger.left_cells[foot]:
+        away = abs(feet[foot].along - ledger.foothold[foot] - ledger.stood[foot, 1])
+        return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
         return GOES_ON
+    if not is_straight(walker.knees, ledger, foot):
+        return BENT_KNEE
     step = ledger.feet[STEPS]
     ledger.touch_time[step] = t
     ledger.touch_along[step] = feet[foot].along
-    ledger.slip[step] = feet[stance].along - ledger.foothold[stance]
+    if not is_above(ledger, stance):
+        note_slip(walker, ledger, feet, stance, y)
+        ledger.leaving[stance] = 1
+    ledger.slip[step], ledger.rolling[step] = ledger.stood[stance, 0], ledger.stood[stance, 1]
     ledger.foothold[foot] = feet[foot].along
+    ledger.touched[foot] = material
     ledger.left_cells[foot] = ledger.cells[foot]
+    ledger.leaving[foot] = 0
     ledger.times[LAST_TOUCH] = t
     ledger.feet[STANCE] = foot
     ledger.feet[STEPS] = step + 1
+    pass_by(terrain, ledger, stance)
+    follow_strike(walker.knees, ledger, stance)
     return GOES_ON
+
+
+@by_type
+def knee_stops(knees: Any, ledger: Ledger, signal: int, t: float) -> None:
+    """A knee got straight, or turned back in its stop."""
+
+
+@by_type
+def release(knees: Any, ledger: Ledger, knee: int) -> None:
+    """A knee is free again."""
+
+
+@by_type
+def is_straight(knees: Any, ledger: Ledger, foot: int) -> bool:
+    """Whether a foot may come down: its knee is locked."""
+
+
+@by_type
+def follow_strike(knees: Any, ledger: Ledger, trailing: int) -> None:
+    """The other foot has touched: the trailing knee is released, or is to be."""
+
+
+@by_type
+def note_flexion(knees: Any, ledger: Ledger, y: State) -> None:
+    """A released knee that has bent is caught when it straightens."""
+
+
+@by_type
+def catches(stop: Any) -> bool:
+    """Whether a knee that gets straight locks at once."""
+
+
+@catches.case(IdealLock)
+def lock_catches(stop: IdealLock) -> bool:
+    """Yes."""
+    return True
+
+
+@catches.case(NormalLaw)
+def stop_catches(stop: NormalLaw) -> bool:
+    """Its stop turns it back first."""
+    return False
+
+
+@knee_stops.case(NoKnees)
+def nothing_stops(knees: NoKnees, ledger: Ledger, signal: int, t: float) -> None:
+    """Nothing."""
+
+
+@release.case(NoKnees)
+def nothing_is_released(knees: NoKnees, ledger: Ledger, knee: int) -> None:
+    """Nothing."""
+
+
+@is_straight.case(NoKnees)
+def always_straight(knees: NoKnees, ledger: Ledger, foot: int) -> bool:
+    """Yes."""
+    return True
+
+
+@follow_strike.case(NoKnees)
+def nothing_follows(knees: NoKnees, ledger: Ledger, trailing: int) -> None:
+    """Nothing."""
+
+
+@note_flexion.case(NoKnees)
+def nothing_flexes(knees: NoKnees, ledger: Ledger, y: State) -> None:
+    """Nothing."""
+
+
+@knee_stops.case(Knees)
+def knee_locks(knees: Knees, ledger: Ledger, signal: int, t: float) -> None:
+    """It locks, or meets its stop, where it latches when it turns back."""
+    knee = (signal - EXTENSION) % 2
+    if signal < EXTENSION_RATE and not catches(knees.stop):
+        ledger.knee[knee] = STOPPING
+        return
+    ledger.at_zero[signal] = 0
+    ledger.knee[knee] = LOCKED
+    ledger.held[knees.shanks[knee]] = 1
+    ledger.knee_strike[ledger.feet[STEPS]] = t
+
+
+@release.case(Knees)
+def knee_is_released(knees: Knees, ledger: Ledger, knee: int) -> None:
+    """Its shank turns on its own."""
+    ledger.releasing[0] = 0
+    ledger.knee[knee] = RELEASED
+    ledger.held[knees.shanks[knee]] = 0
+
+
+@is_straight.case(Knees)
+def knee_is_straight(knees: Knees, ledger: Ledger, foot: int) -> bool:
+    """Its knee is locked."""
+    return ledger.knee[foot] == LOCKED
+
+
+@follow_strike.case(Knees)
+def knee_follows(knees: Knees, ledger: Ledger, trailing: int) -> None:
+    """At once, or when the leading foot stops sinking in."""
+    if knees.release_at_touch:
+        release(knees, ledger, trailing)
+    else:
+        ledger.releasing[0] = 1
+
+
+@note_flexion.case(Knees)
+def knees_flex(knees: Knees, ledger: Ledger, y: State) -> None:
+    """Either may."""
+    for knee in range(2):
+        if ledger.knee[knee] == RELEASED and extension(knees, knee, y, 2) < -FLEXED:
+            ledger.knee[knee] = BENT

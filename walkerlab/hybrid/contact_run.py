@@ -9,18 +9,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.energy import book_energy, kinetic_energy, potential_energy
+from walkerlab.ground.held import (
+    BENT,
+    FLEXED,
+    LOCKED,
+    RELEASED,
+    Held,
+    Knees,
+    always_held,
+    extension,
+    knee_energy,
+    no_stops,
+    stop_flags,
+)
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
-from walkerlab.ground.walker import ContactWalker, foot_force
+from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import (
+    FALL,
     FALLEN_HIP,
     HEIGHT,
+    LEFT_EDGE,
+    PASSING,
     PER_FOOT,
+    RIGHT_EDGE,
     SIGNALS,
+    SLIDE,
     Frame,
     feet_motion,
     hip_height,
+    material_along,
 )
 from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
 from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
@@ -35,9 +54,11 @@ from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
 
 Floats = NDArray[np.float64]
-
+CHANNELS = ("damping", "friction", "edges", "knee_strikes", "knee_stop")
+OF_STRAIGHT_LEGS = 3  # channels
 
 NEVER = -1
+ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 
 
@@ -67,7 +88,7 @@ class Stopped:
 class Ground(NamedTuple):
     """What a walk happens on and is judged by."""
 
-    terrain: Any  # Checkerboard or AfterMidSwing
+    terrain: Any  # Checkerboard, AfterMidSwing or Plane
     frame: Frame
 
 
@@ -87,7 +108,7 @@ def walk_free(
 
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
     """
-    system = OnGround(walker, (True, True))
+    system = OnGround(walker, (True, True), always_held(walker.held), no_stops(walker.knees))
     return walk_part(
         system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after
     )
@@ -110,13 +131,14 @@ def walk_hinged(
 
 
 @kernel
-def sampled_energies(walker: ContactWalker, states: Any, carried: Any, energies: Any) -> None:
+def sampled_energies(walker: ContactWalker, states: Any, carried: Any, knees: Any, energies: Any) -> None:
     """Kinetic, potential and book energy (J) of every sampled state into energies (samples, 3)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
         energies[i, 0] = kinetic_energy(walker, y)
         energies[i, 1] = potential_energy(walker, y)
         energies[i, 2] = book_energy(walker, (carried[i, 0] != 0, carried[i, 1] != 0), y)
+        energies[i, 2] += knee_energy(walker.knees, stop_flags(walker.knees, knees[i]), y, 2)
 
 
 @kernel
@@ -139,10 +161,11 @@ class ContactSamples:
     """A walk at evenly spaced times."""
 
     time_s: Floats  # (samples,)
-    states: Floats  # (samples, 8)
+    states: Floats  # (samples, 4 + 2 n)
     carried: NDArray[np.int8]  # (samples, 2)
     stance: NDArray[np.int64]  # (samples,)
-    dissipated_J: Floats  # (samples, 3) by damping, by friction, at edges
+    knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
+    dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
 
 
 @dataclass(frozen=True)
@@ -152,12 +175,14 @@ class ContactWalkResult:
     outcome: Outcome
     touch_time_s: Floats  # (steps,)
     touch_along_m: Floats  # (steps,)
-    slip_m: Floats  # (steps,)
+    slip_m: Floats  # (steps,) of the stance foot's material
+    rolling_m: Floats  # (steps,) how far the stance foot rolled
     end_time_s: float
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
-    dissipated_J: Floats  # (3,)
+    dissipated_J: Floats  # (5,)
+    knee_strike_s: Floats  # (steps,) when the knee of each step's swing leg locked; of straight legs, none
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     samples: ContactSamples | None
 
@@ -180,22 +205,72 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
     for foot in range(2):
         on_pad = carried_in_cell(terrain, int(cells[foot]))
         carried[foot] = on_pad and starts_carried(terrain, foot == stance)
-    at_zero = np.zeros(SIGNALS, np.int8)
-    at_zero[[HEIGHT, PER_FOOT + HEIGHT]] = 1
-    foothold = np.array([motion.along for motion in feet])
-    touch_time, touch_along, slip = (np.zeros(steps) for _ in range(3))
+    sides, at_zero = known_sides(walker, feet, stance, y)
+    held, knee = held_at_start(walker, stance, y)
     return Ledger(
-        touch_time,
-        touch_along,
-        slip,
-        carried,
-        cells,
-        cells.copy(),
-        foothold,
-        at_zero,
-        np.zeros(2),
-        np.array([stance, 0]),
+        touch_time=np.zeros(steps),
+        touch_along=np.zeros(steps),
+        slip=np.zeros(steps),
+        rolling=np.zeros(steps),
+        carried=carried,
+        cells=cells,
+        left_cells=cells.copy(),
+        foothold=np.array([motion.along for motion in feet]),
+        touched=np.array([material_along(walker, foot, feet[foot].along, y) for foot in range(2)]),
+        stood=np.zeros((2, 2)),
+        held=held,
+        knee=knee,
+        releasing=np.zeros(1, np.int8),
+        knee_strike=np.full(steps, -1.0),
+        leaving=np.zeros(2, np.int8),
+        sides=sides,
+        at_zero=at_zero,
+        times=np.zeros(2),
+        feet=np.array([stance, 0]),
     )
+
+
+def held_at_start(walker: ContactWalker, stance: int, y: State) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Which bodies follow others, and what each knee is doing: that of the stance leg is locked, the other is not."""
+    knee = np.full(2, RELEASED, np.int8)
+    held = np.array(walker.held.always if isinstance(walker.held, Held) else (), np.int8)
+    if isinstance(walker.knees, Knees):
+        held[walker.knees.shanks[stance]], knee[stance] = 1, LOCKED
+        if extension(walker.knees, 1 - stance, y, 2) < -FLEXED:
+            knee[1 - stance] = BENT
+    return held, knee
+
+
+def known_sides(
+    walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
+) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """On which side of zero every signal is at the start, and which are at zero, by rounding at most.
+
+    Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
+    foot is the one ahead.
+    """
+    sides, at_zero = np.zeros(SIGNALS, np.int8), np.zeros(SIGNALS, np.int8)
+    sides[[FALL, SLIDE]] = 1
+    n = len(walker.tree.arm_x)
+    size = max(abs(float(x)) for x in (*walker.feet[0].lever_x, *walker.feet[0].lever_y))
+    speed = max(abs(float(x)) for x in y[2 + n :])
+    for foot in range(2):
+        first = foot * PER_FOOT
+        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
+        signs = (feet[foot].height, feet[foot].climb)
+        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
+    rates = [feet[k].slip - sum(r * w for r, w in zip(walker.feet[k].rolling, y[4 + n :], strict=True)) for k in (0, 1)]
+    order = (feet[1].along - feet[0].along, rates[1] - rates[0])
+    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
+    return sides, at_zero
+
+
+def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
+    """On which side of zero something is, or goes to if it is zero to rounding; whether it is zero."""
+    for number, scale in zip(value_and_rate, scales, strict=True):
+        if abs(number) > ROUNDING * scale:
+            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
+    return otherwise, True
 
 
 def new_observer(
@@ -221,6 +296,7 @@ def new_observer(
         np.zeros((samples, len(walker.blank))),
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
+        np.zeros((samples, 2), np.int8),
         np.zeros((samples, BOOKS)),
         np.zeros(1, np.int64),
         np.zeros(BOOKS),
@@ -286,6 +362,7 @@ def run_parts(
         outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
+        release_hinge(walker, pinned.foot, ledger, y)
         if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
             return outcome, Stopped(t, y, spent)
     method = methods.new(len(walker.blank))
@@ -293,6 +370,21 @@ def run_parts(
     free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
     outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
     return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+
+
+def by_channel(walker: ContactWalker, books: Floats) -> dict[str, float]:
+    """What was dissipated (J), by name; the knees' channels only where there are knees."""
+    count = len(CHANNELS) if isinstance(walker.knees, Knees) else OF_STRAIGHT_LEGS
+    return dict(zip(CHANNELS[:count], books[:count].tolist(), strict=True))
+
+
+def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) -> None:
+    """A hinged foot has neither slipped nor rolled; it is on the ground, about to leave."""
+    steps = ledger.feet[STEPS]
+    ledger.slip[:steps], ledger.rolling[:steps] = 0.0, 0.0
+    ledger.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
+    ledger.stood[foot] = 0.0
+    ledger.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
 def gather(
@@ -307,6 +399,7 @@ def gather(
             observer.states[:seen],
             observer.carried[:seen],
             observer.stance[:seen],
+            observer.knees[:seen],
             observer.sampled_books[:seen],
         )
     return ContactWalkResult(
@@ -314,11 +407,13 @@ def gather(
         ledger.touch_time[:done],
         ledger.touch_along[:done],
         ledger.slip[:done],
+        ledger.rolling[:done],
         stopped.time_s,
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),
         float(observer.extremes[RESIDUAL]),
         observer.books.copy(),
+        ledger.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
         stopped.work,
         samples,
     )

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from walkerlab.ground.terrain import has_pads
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_signals
 from walkerlab.kernels import by_type, inlined, kernel
@@ -18,7 +19,7 @@ class Scene(NamedTuple):
     """What does not change while a walk goes on."""
 
     walker: ContactWalker
-    terrain: Any  # Checkerboard or AfterMidSwing
+    terrain: Any  # Checkerboard, AfterMidSwing or Plane
     frame: Frame
     watch_order: bool  # whether it matters that the feet pass each other
 
@@ -28,24 +29,38 @@ class Feet(NamedTuple):
 
     carried: Any  # (2,) whether there is ground under each
     cells: Any  # (2,) which cell of its lane each is over
+    sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
-    foothold: Any  # (2,) m, where each touched
+    touched: Any  # (2,) m, where the material of each was when it touched
     order: Any  # (2,) the stance foot, and how many steps it is
+    knee: Any  # (2,) what each knee is doing
+    releasing: Any  # (1,) whether the trailing knee is still to be released
 
 
 @inlined
 def sample(system: Any, scene: Scene, feet: Feet, state: State, node: int, finder: CrossingFinder) -> None:
     """All signals at one node of the step."""
     stance = feet.order[0]
-    foothold = feet.foothold[stance]
-    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, foothold, state, node, finder)
+    touched = feet.touched[stance]
+    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, touched, state, node, finder)
 
 
 @inlined
 def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
     """The first event of the sampled step."""
     return earliest_crossing(
-        system, scene.walker, scene.frame, scene.watch_order, feet.carried, feet.order[0], feet.at_zero, finder
+        system,
+        scene.walker,
+        scene.frame,
+        scene.watch_order,
+        feet.carried,
+        feet.order[0],
+        feet.sides,
+        feet.at_zero,
+        has_pads(scene.terrain),
+        feet.knee,
+        feet.releasing[0] != 0,
+        finder,
     )
 
 

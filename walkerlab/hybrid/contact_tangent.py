@@ -2,8 +2,8 @@
 
 On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
 method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
-is continuous at its joins and at touch and lift, so no jump enters there; a foot that leaves its pad under load would
-need one, and a gait has none.
+is continuous at its joins and at touch and lift, so no jump enters there; where a knee locks or is released one does. A
+foot that leaves its pad under load would need one, and a gait has none.
 """
 
 from typing import Any, NamedTuple
@@ -99,3 +99,30 @@ def carry_direction(tangent: Tangent, direction: int, h: float) -> None:
     for row in range(n):
         change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
         tangent.Phi[row, direction] += h * change
+
+
+@inlined
+def jump(tangent: Tangent) -> None:
+    """Carry Phi over an event: R Phi + (f+ - R f-) (g Phi) / (g f-).
+
+    R is in stages[3]; f- and f+, the rates before and after, and g, the derivative of the event function, in `rates`.
+    """
+    n = tangent.Phi.shape[0]
+    reset, rates = tangent.stages[3], tangent.rates
+    speed = 0.0
+    for i in range(n):
+        speed += rates[2 * n + i] * rates[i]
+    for i in range(n):
+        for k in range(n):
+            rates[n + i] -= reset[i, k] * rates[k]
+    for direction in range(tangent.Phi.shape[1]):
+        later = 0.0
+        for k in range(n):
+            later += rates[2 * n + k] * tangent.Phi[k, direction]
+        for i in range(n):
+            total = rates[n + i] * later / speed
+            for k in range(n):
+                total += reset[i, k] * tangent.Phi[k, direction]
+            rates[i] = total
+        for i in range(n):
+            tangent.Phi[i, direction] = rates[i]

@@ -5,6 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
+from walkerlab.ground.held import held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned
 from walkerlab.ground.terrain import (
@@ -20,8 +21,18 @@ from walkerlab.hybrid.contact_events import (
     is_join,
     walker_state,
 )
+from walkerlab.hybrid.contact_knee import cross_knee
 from walkerlab.hybrid.contact_observer import ContactObserver, observe
-from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, GOES_ON, LAST_TOUCH, STANCE, STEPS, Ledger, happen
+from walkerlab.hybrid.contact_rules import (
+    AIRBORNE_SINCE,
+    GOES_ON,
+    LAST_TOUCH,
+    STANCE,
+    STEPS,
+    Ledger,
+    happen,
+    note_flexion,
+)
 from walkerlab.hybrid.contact_scan import Feet, Scene, scan
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type, inlined
@@ -58,13 +69,16 @@ def in_mode(system: Any, ledger: Ledger) -> Any:
 @in_mode.case(OnGround)
 def free_mode(system: OnGround, ledger: Ledger) -> OnGround:
     """Each foot finds ground or not."""
-    return OnGround(system.walker, (ledger.carried[0] != 0, ledger.carried[1] != 0))
+    walker, carried = system.walker, (ledger.carried[0] != 0, ledger.carried[1] != 0)
+    return OnGround(walker, carried, held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee))
 
 
 @in_mode.case(Pinned)
 def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
-    """The hinge does not ask."""
-    return system
+    """The hinge does not ask for ground."""
+    walker = system.walker
+    held, stops = held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee)
+    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops)
 
 
 @by_type
@@ -110,36 +124,50 @@ def walk_part(
     target = deadline(frame, ledger)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
     scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
-    feet = Feet(ledger.carried, ledger.cells, ledger.at_zero, ledger.foothold, ledger.feet)
+    feet = Feet(
+        ledger.carried,
+        ledger.cells,
+        ledger.sides,
+        ledger.at_zero,
+        ledger.touched,
+        ledger.feet,
+        ledger.knee,
+        ledger.releasing,
+    )
     while ledger.feet[STEPS] < ledger.touch_time.size:
         status = advance(method, mode, target)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
         prepare_dense(method, mode)
         fraction, found = scan(method, mode, scene, feet, finder)
-        if arriving and method.clock[T] < target:
-            arriving = False
-        if not arriving:
-            signal = found
-            if fraction <= 1.0:
-                wait = fraction * (method.clock[T] - method.clock[T_OLD])
+        happens = fraction <= 1.0
+        if happens:
+            if not arriving:
                 latest = method.clock[T]
-                target = method.clock[T_OLD] + max(wait, EVENT_TIME)
-                arriving, refinements = True, 0
-                if target < method.clock[T] and rewinds < REWINDS:
-                    rewinds += 1
-                    rewind(method, mode)
-                    continue
-        elif refinements < REFINEMENTS and rewinds < REWINDS:
+            if found != signal or not arriving:
+                signal, refinements = found, 0
+            wait = max(fraction * (method.clock[T] - method.clock[T_OLD]), EVENT_TIME)
+            early = method.clock[T_OLD] + wait < method.clock[T] - EVENT_TIME
+            arriving = True
+            if early and refinements <= REFINEMENTS and rewinds < REWINDS:
+                target = method.clock[T_OLD] + wait
+                refinements += 1
+                rewinds += 1
+                rewind(method, mode)
+                continue
+        elif arriving and method.clock[T] >= target:
             wait = time_to_zero(method, finder, signal)
-            if abs(wait) > EVENT_TIME and method.clock[T_OLD] < target + wait <= latest:
+            happens = abs(wait) <= EVENT_TIME
+            again = refinements <= REFINEMENTS and rewinds < REWINDS
+            if not happens and again and method.clock[T_OLD] < target + wait <= latest:
                 target += wait
                 refinements += 1
                 rewinds += 1
                 rewind(method, mode)
                 continue
         rewinds = 0
-        observe(observer, method, mode, walker, ledger.carried, ledger.feet[STANCE])
+        observe(observer, method, mode, walker, finder, ledger.carried, ledger.knee, ledger.feet[STANCE])
+        note_flexion(walker.knees, ledger, walker_state(mode, end_state(method, mode)))
         outcome = judge(mode, scene, method, finder, ledger)
         if outcome != GOES_ON:
             return outcome
@@ -147,7 +175,8 @@ def walk_part(
             # of events at one and the same time each is found once
             for i in range(ledger.at_zero.size):
                 ledger.at_zero[i] = 0
-        if arriving:
+        arriving = False
+        if happens:
             end = walker_state(mode, end_state(method, mode))
             steps = ledger.feet[STEPS]
             outcome = happen(walker, terrain, observer, ledger, signal, method.clock[T], end)
@@ -157,9 +186,9 @@ def walk_part(
             if released or (signal == PASSING and 0 <= stop_passing_after <= ledger.feet[STEPS]):
                 return WALKED
             if not is_join(signal):
-                mode = in_mode(system, ledger)
-                begin(method, mode, method.clock[T], end_state(method, mode), method.clock[H_NEXT])
-            arriving = False
+                before, mode = mode, in_mode(system, ledger)
+                y = cross_knee(walker.knees, observer, method, before, mode, signal)
+                begin(method, mode, method.clock[T], y, method.clock[H_NEXT])
         target = deadline(frame, ledger)
     return WALKED
 

@@ -15,6 +15,7 @@ class Outcome(IntEnum):
     BUDGET_EXHAUSTED = 6
     SOLVER_FAILED = 7
     REJECTED = 8
+    BENT_KNEE = 9
 
     @property
     def label(self) -> str:
@@ -46,5 +47,7 @@ ADVICE = {
     Outcome.BUDGET_EXHAUSTED: "The run used up its right-hand sides; loosen solver.*.rtol, soften the contact, or ask "
     "for fewer strides.",
     Outcome.SOLVER_FAILED: "The step size fell to rounding; loosen solver.*.rtol or choose another solver.*.method.",
+    Outcome.BENT_KNEE: "A foot came down on a knee that had not locked; start nearer to a gait (start: fixed-point), "
+    "or, on compliant ground, release the trailing knee by compression (walker.knee.release).",
     Outcome.REJECTED: "The start is not a state this walker can be in.",
 }

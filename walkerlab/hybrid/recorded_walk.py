@@ -24,9 +24,9 @@ from walkerlab.hybrid.rigid_observer import (
     new_observer,
     observe_start,
 )
-from walkerlab.hybrid.rigid_walk import LONGEST_SWING, SIGNALS, hip_above_fall, walk
+from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
+from walkerlab.mechanics.standing import Mode, NoKnee, Standing, rolled_distance, swing_foot
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
@@ -38,7 +38,6 @@ SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
 Array = NDArray[np.float64]
-NO_STATES = np.zeros((0, 4))
 
 
 class Work(NamedTuple):
@@ -54,8 +53,9 @@ class Samples:
     """A walk in time: a regular grid, and both sides of every heel strike."""
 
     time: Array  # (samples,) s, strictly rising; the state before a heel strike is one rounding earlier than after
-    state: Array  # (samples, 4) rad, rad/s, swing leg first
+    state: Array  # (samples, 2 n) rad, rad/s, swing leg first
     step: NDArray[np.int64]  # (samples,) from 0
+    bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +65,11 @@ class RecordedWalk:
     outcome: Outcome
     start: State
     heel_strikes: Array  # (steps,) s
-    before: Array  # (steps, 4) states just before the heel strikes
-    after: Array  # (steps, 4) just after, roles changed
+    before: Array  # (steps, 2 n) states just before the heel strikes
+    after: Array  # (steps, 2 n) just after, roles changed
     periods: Array  # (steps,) s
-    lengths: Array  # (steps,) m
+    lengths: Array  # (steps,) m, from touch to touch
+    knee_strikes: Array | None  # (steps,) s; None for legs without knees
     min_normal_force: float  # N, of the ground on the stance foot
     max_friction_ratio: float  # tangential over normal force, where the ground pushes
     max_scuff_depth: float  # m, of the swing foot below the slope
@@ -89,12 +90,12 @@ class RecordedWalk:
 
 
 def as_state(values: Any) -> State:
-    """Four numbers as compiled code takes a state."""
-    return (float(values[0]), float(values[1]), float(values[2]), float(values[3]))
+    """Numbers as compiled code takes a state."""
+    return tuple(float(value) for value in values)
 
 
 def take_walk(
-    walker: RigidWalker,
+    walker: Standing,
     method: Any,
     start: State,
     steps: int,
@@ -104,7 +105,7 @@ def take_walk(
 ) -> RecordedWalk:
     """Walk `steps` steps from `start`, or until the walk ends.
 
-    method   an integrator for four equations
+    method   an integrator for the walker's equations
     sampled  whether states in time are wanted
     advance  told how many more steps were taken
     budget   right-hand sides of the whole walk; none: what any step needs, for each
@@ -126,19 +127,18 @@ def take_walk(
 class Recorder:
     """Walks on from where it is, and keeps what was seen."""
 
-    def __init__(
-        self, walker: RigidWalker, method: Any, start: State, sampled: bool, budget: int | None = None
-    ) -> None:
+    def __init__(self, walker: Standing, method: Any, start: State, sampled: bool, budget: int | None = None) -> None:
         """Stand at `start`, at time 0."""
         self.walker, self.method, self.sampled, self.budget = walker, method, sampled, budget
         self.start = self.state = start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
-        self.finder = finder_for(method, SIGNALS)
+        self.finder = finder_for(method, EVENTS)
         # a library's method is integrated with in Python
         self.walk: Callable[..., tuple[int, int]] = uncompiled(walk) if isinstance(method, ScipyMethod) else walk
-        first = new_observer(np.zeros(0))
-        observe_start(first, walker, start)
+        self.numbers, self.kneed = len(walker.blank), not isinstance(walker.knee, NoKnee)
+        first = new_observer(np.zeros(0), self.numbers)
+        observe_start(first, Mode(walker, walker.bent), start)
         self.energy_at_start = float(first.energy[LATEST])
         self.extremes = first.extremes
         self.energy_integral, self.duration = 0.0, 0.0
@@ -146,23 +146,29 @@ class Recorder:
         self.strikes: list[Array] = []
         self.before: list[Array] = []
         self.after: list[Array] = []
+        self.knees: list[Array] = []
         self.pieces: list[Samples] = []
 
     def walk_on(self, steps: int) -> Outcome:
         """Take up to `steps` more steps."""
-        strikes, before, after = np.zeros(steps), np.zeros((steps, 4)), np.zeros((steps, 4))
-        observer = new_observer(self._grid(steps))
+        strikes, knees = np.zeros(steps), np.zeros(steps)
+        before, after = np.zeros((steps, self.numbers)), np.zeros((steps, self.numbers))
+        observer = new_observer(self._grid(steps), self.numbers)
         clear_counts(self.method)
         self.method.counts[BUDGET] = self._left_for(steps)
-        status, taken = self.walk(self.walker, self.method, self.finder, observer, self.state, strikes, before, after)
+        status, taken = self.walk(
+            self.walker, self.method, self.finder, observer, self.state, strikes, before, after, knees
+        )
         self.counts += self.method.counts
         self._keep(observer)
-        strikes, before, after = strikes[:taken] + self.time, before[:taken], after[:taken]
+        begun = self.time
+        strikes, before, after = strikes[:taken] + begun, before[:taken], after[:taken]
         if self.sampled:
-            self.pieces.append(self._samples(observer, strikes, before, after))
+            self.pieces.append(self._samples(observer, strikes, before, after, knees + begun))
         self.strikes.append(strikes)
         self.before.append(before)
         self.after.append(after)
+        self.knees.append(knees[:taken] + begun)
         self.steps += taken
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
@@ -180,7 +186,7 @@ class Recorder:
         most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
         return self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
 
-    def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array) -> Samples:
+    def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
         found = int(observer.recorded[0])
         grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
@@ -191,8 +197,11 @@ class Recorder:
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
         state = np.concatenate((observer.states[:found][kept], before, after))
         step = np.concatenate((self.steps + observer.steps[:found][kept], swing, swing + 1))
+        # a knee that has not struck yet is free
+        until = np.append(np.where(knees > self.time, knees, np.inf), np.inf)
+        bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
         order = np.argsort(time)
-        return Samples(time[order], state[order], step[order])
+        return Samples(time[order], state[order], step[order], bent[order])
 
     def _keep(self, observer: Observer) -> None:
         seen, worst = observer.extremes, self.extremes
@@ -206,23 +215,33 @@ class Recorder:
         """All that was seen."""
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
             outcome = Outcome.LIFTED_OFF
-        strikes, before = np.concatenate((np.zeros(0), *self.strikes)), np.concatenate((NO_STATES, *self.before))
+        no_states = np.zeros((0, self.numbers))
+        strikes = np.concatenate((np.zeros(0), *self.strikes))
+        before, after = np.concatenate((no_states, *self.before)), np.concatenate((no_states, *self.after))
         return RecordedWalk(
             outcome=outcome,
             start=self.start,
             heel_strikes=strikes,
             before=before,
-            after=np.concatenate((NO_STATES, *self.after)),
+            after=after,
             periods=np.diff(strikes, prepend=0.0),
-            lengths=np.array([step_length(self.walker, y[1], y[0]) for y in before]),
+            lengths=step_lengths(self.walker, self.start, before, after),
+            knee_strikes=np.concatenate((np.zeros(0), *self.knees)) if self.kneed else None,
             min_normal_force=float(self.extremes[MIN_NORMAL_FORCE]),
             max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
             max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
-            samples=joined(self.pieces) if self.sampled else None,
+            samples=joined(self.pieces) if self.pieces else None,
             work=Work(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
         )
+
+
+def step_lengths(walker: Standing, start: State, before: Array, after: Array) -> Array:
+    """Distance (steps,) in m from touch to touch: between the points of contact, and what the stance foot rolled."""
+    starts, ends = [start, *map(as_state, after[:-1])], [*map(as_state, before)]
+    steps = zip(starts[: len(ends)], ends, strict=True)
+    return np.array([swing_foot(walker, end)[1] + rolled_distance(walker, begun, end) for begun, end in steps])
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
@@ -236,6 +255,7 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
 
 def joined(pieces: list[Samples]) -> Samples:
     """One record of several that follow each other."""
-    time = np.concatenate((np.zeros(0), *(piece.time for piece in pieces)))
-    state = np.concatenate((NO_STATES, *(piece.state for piece in pieces)))
-    return Samples(time, state, np.concatenate((np.zeros(0, np.int64), *(piece.step for piece in pieces))))
+    time = np.concatenate([piece.time for piece in pieces])
+    state = np.concatenate([piece.state for piece in pieces])
+    step, bent = np.concatenate([piece.step for piece in pieces]), np.concatenate([piece.bent for piece in pieces])
+    return Samples(time, state, step, bent)

@@ -1,40 +1,84 @@
 """Energies and forces along a recorded walk of the rigid model."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from walkerlab.hybrid.recorded_walk import Array
+from walkerlab.hybrid.recorded_walk import Array, RecordedWalk, Samples
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.rigid_compass import RigidWalker, ground_reaction, kinetic_energy, potential_energy
+from walkerlab.mechanics.standing import STANCE, SWING, Standing, ground_reaction, kinetic_energy, potential_energy
+from walkerlab.solvers.vectors import load
 
 
-def energies(walker: RigidWalker, states: Array) -> Array:
-    """Kinetic and potential energy (samples, 2) of states (samples, 4) in J, from the current stance foot."""
+def energies(walker: Standing, states: Array) -> Array:
+    """Kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out
 
 
-def reactions(walker: RigidWalker, states: Array) -> Array:
-    """Force of the ground on the stance foot (samples, 2) in N: along the slope, and normal to it."""
+def reactions(walker: Standing, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
+    """Force of the ground on the stance foot (samples, 2) in N: along the slope, and normal to it.
+
+    bent  (samples,) whether the swing leg's knee is free; None if it never is
+    """
     out = np.zeros((len(states), 2))
-    fill_reactions(walker, np.ascontiguousarray(states), out)
+    free = np.zeros(len(states), np.bool_) if bent is None else bent
+    fill_reactions(walker, np.ascontiguousarray(states), free, out)
     return out
 
 
 @kernel
-def fill_energies(walker: RigidWalker, states: Any, out: Any) -> None:
-    """Write the energies of `states` (samples, 4) into `out` (samples, 2)."""
+def fill_energies(walker: Standing, states: Any, out: Any) -> None:
+    """Write the energies of `states` (samples, 2 n) into `out` (samples, 2)."""
     for i in range(states.shape[0]):
-        y = states[i]
-        out[i, 0] = kinetic_energy(walker, y[0], y[1], y[2], y[3])
-        out[i, 1] = potential_energy(walker, y[0], y[1])
+        y = load(states, i, walker.blank)
+        out[i, 0] = kinetic_energy(walker, y)
+        out[i, 1] = potential_energy(walker, y)
 
 
 @kernel
-def fill_reactions(walker: RigidWalker, states: Any, out: Any) -> None:
-    """Write the ground's forces at `states` (samples, 4) into `out` (samples, 2)."""
+def fill_reactions(walker: Standing, states: Any, bent: Any, out: Any) -> None:
+    """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
     for i in range(states.shape[0]):
-        y = states[i]
-        out[i, 0], out[i, 1] = ground_reaction(walker, y[0], y[1], y[2], y[3])
+        y = load(states, i, walker.blank)
+        out[i, 0], out[i, 1] = ground_reaction(walker, walker.bent if bent[i] else walker.straight, y)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points of the walker at samples, in m along the slope from the first foothold and over it."""
+
+    contact: Array  # (samples,) where the stance foot touches
+    hip: Array  # (samples, 2)
+    swing_foot: Array  # (samples, 2) its lowest point
+    knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
+
+
+def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedWalk, samples: Samples) -> Places:
+    """Where the walker's points are.
+
+    knee_m  the knee in its thigh's frame; None without knees
+    """
+    n = len(walker.tree.arm_x)
+    psi = samples.state[:, :n] + walker.slope
+    touches = np.concatenate(([0.0], np.cumsum(walk.lengths)))[samples.step]
+    set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
+    contact = touches - walker.radius * (samples.state[:, STANCE] - set_down)
+    centre = np.column_stack((contact, np.full_like(contact, walker.radius)))
+    hip = centre + turned(psi, walker.hip_x, walker.hip_y)
+    foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
+    knees = None
+    if knee_m is not None:
+        knees = np.stack([hip + turned(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1)
+    return Places(contact, hip, foot, knees)
+
+
+def turned(psi: Array, lever_x: Sequence[float], lever_y: Sequence[float]) -> Array:
+    """Sum (samples, 2) of the bodies' levers at their angles psi (samples, n) from the slope's normal."""
+    s, c = np.sin(psi), np.cos(psi)
+    x, y = np.array(lever_x), np.array(lever_y)
+    return np.column_stack((c @ x - s @ y, s @ x + c @ y))

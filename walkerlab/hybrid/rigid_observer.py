@@ -5,13 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import by_type, inlined
-from walkerlab.mechanics.rigid_compass import (
-    RigidWalker,
-    ground_reaction,
-    kinetic_energy,
-    potential_energy,
-    swing_foot_height,
-)
+from walkerlab.mechanics.standing import Mode, ground_reaction, swing_foot, total_energy
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.solvers.system import State
 
@@ -20,6 +14,7 @@ NO_FORCE = 1e300  # above any normal force
 MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT = 0, 1, 2, 3
 # indices into Observer.energy
 LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
+CLOSER = 3  # parabolas to an extremum
 # composite Simpson rule on eighths
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
@@ -32,7 +27,7 @@ class Observer(NamedTuple):
     """What is recorded of a walk besides its heel strikes."""
 
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 4)
+    states: Any  # (samples, 2 n)
     steps: Any  # (samples,) which step a sample belongs to
     recorded: Any  # (1,) samples recorded so far
     extremes: Any  # (4,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J
@@ -40,12 +35,12 @@ class Observer(NamedTuple):
 
 
 @by_type
-def observe_start(observer: Any, walker: RigidWalker, y: State) -> None:
+def observe_start(observer: Any, mode: Mode, y: State) -> None:
     """Take note of the start of a swing phase."""
 
 
 @by_type
-def observe(observer: Any, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+def observe(observer: Any, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
     """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
 
 
@@ -55,12 +50,12 @@ def wants_dense(observer: Any) -> bool:
 
 
 @observe_start.case(Unobserved)
-def ignore_start(observer: Unobserved, walker: RigidWalker, y: State) -> None:
+def ignore_start(observer: Unobserved, mode: Mode, y: State) -> None:
     """Nothing."""
 
 
 @observe.case(Unobserved)
-def ignore(observer: Unobserved, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+def ignore(observer: Unobserved, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
     """Nothing."""
 
 
@@ -70,56 +65,101 @@ def without_dense(observer: Unobserved) -> bool:
     return False
 
 
-def new_observer(times: Any) -> Observer:
-    """An observer with memory for samples at `times` (s, rising)."""
+def new_observer(times: Any, numbers: int) -> Observer:
+    """An observer with memory for samples of a state of some `numbers` at `times` (s, rising)."""
     extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0])
     steps = np.zeros(times.size, np.int64)
-    return Observer(times, np.zeros((times.size, 4)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
-
-
-@inlined
-def total_energy(walker: RigidWalker, y: State) -> float:
-    """Kinetic and potential energy (J), from the stance foot."""
-    return kinetic_energy(walker, y[0], y[1], y[2], y[3]) + potential_energy(walker, y[0], y[1])
+    return Observer(times, np.zeros((times.size, numbers)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
 
 
 @observe_start.case(Observer)
-def record_start(observer: Observer, walker: RigidWalker, y: State) -> None:
+def record_start(observer: Observer, mode: Mode, y: State) -> None:
     """The energy that the swing phase must keep."""
-    energy = total_energy(walker, y)
+    energy = total_energy(mode.model, y)
     observer.energy[LEAST], observer.energy[MOST] = energy, energy
-    record_extremes(observer, walker, y)
+    record_extremes(observer, mode, y)
 
 
 @inlined
-def record_extremes(observer: Observer, walker: RigidWalker, y: State) -> None:
-    """Keep the worst of what the model assumes (section 3.1 of the paper), and the energy."""
+def assumptions(mode: Mode, y: State) -> tuple[float, float, float]:
+    """What the model assumes (section 3.1 of the paper), worst where largest.
+
+    Pull of the ground (N), friction ratio where it pushes, depth of the swing foot (m).
+    """
+    along, normal = ground_reaction(mode.model, mode.links, y)
+    ratio = abs(along) / normal if normal > 0.0 else 0.0
+    return -normal, ratio, -swing_foot(mode.model, y)[0]
+
+
+@inlined
+def keep_worst(observer: Observer, found: tuple[float, float, float]) -> None:
+    """Keep the worst of what the model assumes."""
+    extremes = observer.extremes
+    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], -found[0])
+    extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], found[1])
+    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], found[2])
+
+
+@inlined
+def record_extremes(observer: Observer, mode: Mode, y: State) -> tuple[float, float, float]:
+    """Keep the worst of what the model assumes, and the energy."""
     extremes, energy = observer.extremes, observer.energy
-    along, normal = ground_reaction(walker, y[0], y[1], y[2], y[3])
-    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], normal)
-    if normal > 0.0:
-        extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], abs(along) / normal)
-    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], -swing_foot_height(walker, y[0], y[1]))
-    now = total_energy(walker, y)
+    found = assumptions(mode, y)
+    keep_worst(observer, found)
+    now = total_energy(mode.model, y)
     energy[LEAST], energy[MOST], energy[LATEST] = min(energy[LEAST], now), max(energy[MOST], now), now
     extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], energy[MOST] - energy[LEAST])
+    return found
+
+
+@inlined
+def vertex(before: float, at: float, after: float) -> float:
+    """Where between three evenly spaced values (at -1, 0, 1) the parabola through them is largest; beyond: nowhere."""
+    bend = before - 2.0 * at + after
+    return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
+
+
+@inlined
+def climb_to_worst(
+    observer: Observer, method: Any, mode: Mode, system: Any, measure: int, middle: float, spacing: float, last: float
+) -> None:
+    """Follow a measure of `assumptions` to its maximum near `middle` of the step, by parabolas that close in.
+
+    The fractions of the step are kept below `last`.
+    """
+    for _ in range(CLOSER):
+        before = assumptions(mode, interpolate(method, system, middle - spacing))
+        at = assumptions(mode, interpolate(method, system, middle))
+        after = assumptions(mode, interpolate(method, system, middle + spacing))
+        shift = vertex(before[measure], at[measure], after[measure])
+        if abs(shift) > 1.0:
+            return
+        middle += shift * spacing
+        keep_worst(observer, assumptions(mode, interpolate(method, system, middle)))
+        spacing *= 0.125
+        middle = min(max(middle, spacing), last - spacing)
 
 
 @observe.case(Observer)
-def record(observer: Observer, method: Any, system: Any, walker: RigidWalker, fraction: float, step: int) -> None:
+def record(observer: Observer, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
     """Samples that fall into the integration step; extremes and the energy's integral from eighths of it."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    t_end = t + fraction * h
+    t_end, spacing = t + fraction * h, 0.125 * fraction
     mean_energy = SIMPSON[0] * observer.energy[LATEST]
+    before = at = assumptions(mode, interpolate(method, system, 0.0))
     for eighth in range(1, 9):
-        record_extremes(observer, walker, interpolate(method, system, 0.125 * eighth * fraction))
+        after = record_extremes(observer, mode, interpolate(method, system, spacing * eighth))
         mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
+        for measure in range(3):
+            if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
+                climb_to_worst(observer, method, mode, system, measure, spacing * (eighth - 1), spacing, fraction)
+        before, at = at, after
     observer.energy[INTEGRAL] += mean_energy * fraction * h
     observer.energy[DURATION] += fraction * h
     index = observer.recorded[0]
     while index < observer.times.size and observer.times[index] <= t_end:
         y = interpolate(method, system, (observer.times[index] - t) / h)
-        for i in range(4):
+        for i in range(len(y)):
             observer.states[index, i] = y[i]
         observer.steps[index] = step
         index += 1

@@ -10,6 +10,7 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 from walkerlab.kernels import PART_FLAGS
+from walkerlab.solvers.lanes import LANES, multiply_add
 
 
 def fused(a: float, b: float, c: float) -> float:
@@ -19,10 +20,11 @@ def fused(a: float, b: float, c: float) -> float:
 
 @intrinsic
 def _fma(context: Any, a: Any, b: Any, c: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
+    number = LANES if LANES in (a, b, c) else types.float64
 
-    number = types.float64
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return multiply_add(builder, *arguments)
+
     return number(number, number, number), generate
 
 

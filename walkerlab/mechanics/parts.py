@@ -50,8 +50,29 @@ class BallFoot:
 
 
 @dataclass(frozen=True)
+class Knee:
+    """A hinge that locks when the shank comes into line with its thigh from behind: both at one angle."""
+
+    name: str
+    thigh: str
+    shank: str
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A body whose angle is a weighted sum of other bodies' angles, such as a torso on the legs' bisector."""
+
+    body: str
+    of: tuple[str, ...]
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Assembly:
     """Bodies held together by hinges, without closed loops.
+
+    legs  the bodies of either leg from the hip down, in the same order; they change roles at heel strike. The first
+          foot is the first leg's. Bodies of neither leg belong to both.
 
     Raises KeyError for a part on a body that is not there, ValueError for two bodies of one name and for closed loops.
     """
@@ -60,13 +81,19 @@ class Assembly:
     joints: tuple[Revolute, ...]
     particles: tuple[Particle, ...] = ()
     feet: tuple[BallFoot, ...] = ()
+    knees: tuple[Knee, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    legs: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def __post_init__(self) -> None:
         """Refuse what is not a tree of known bodies."""
         names = [body.name for body in self.bodies]
         if len(set(names)) < len(names):
             raise ValueError(f"two bodies of one name among {', '.join(names)}")
-        for body in [*(particle.body for particle in self.particles), *(foot.body for foot in self.feet)]:
+        placed = [*(particle.body for particle in self.particles), *(foot.body for foot in self.feet)]
+        locked = [body for knee in self.knees for body in (knee.thigh, knee.shank)]
+        coupled = [body for coupling in self.couplings for body in (coupling.body, *coupling.of)]
+        for body in (*placed, *locked, *coupled, *self.legs[0], *self.legs[1]):
             self.index(body)
         group = list(range(len(names)))
         for joint in self.joints:

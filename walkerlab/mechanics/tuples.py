@@ -6,6 +6,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import overload
 
 from walkerlab.kernels import PART_FLAGS, inlined
+from walkerlab.solvers.lanes import holds_lanes, in_lanes
 
 Vector = tuple[float, ...]
 
@@ -20,7 +21,10 @@ def _put(vector: Any, index: Any, value: Any) -> Any:
     def replaced(vector: Any, index: Any, value: Any) -> Any:
         return tuple_setitem(vector, index, value)
 
-    return replaced
+    def replaced_in_lanes(vector: Any, index: Any, value: Any) -> Any:
+        return tuple_setitem(in_lanes(vector), index, value)
+
+    return replaced_in_lanes if holds_lanes(value) and not holds_lanes(vector) else replaced
 
 
 @inlined

@@ -58,8 +58,7 @@ def find_gait_from(walker: ContactWalker, ground: Ground, methods: MethodSetting
         gait = gait_near(walker, ground, methods, z, stride_measure(ground.terrain))
         if isinstance(gait, ContactGait):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
-        ended = "it did not converge" if gait is Outcome.WALKED else f"a step ended as {gait.label}"
-        said = f"Newton's method found none after {steps} steps from the start: {ended}"
+        said = f"Newton's method found none after {steps} steps from the start: {gait}"
     followed = follow_from_rigid(walker, ground, methods, start)
     if followed.gait is not None:
         return followed
@@ -96,22 +95,24 @@ def section_points(
         finder = finder_for(method, SIGNALS)
         outcome = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
         if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:
-            yield steps, coordinates_of(method.y, int(ledger.feet[STANCE]))
+            yield steps, coordinates_of(walker, method.y, int(ledger.feet[STANCE]))
         elif ledger.feet[STEPS] > steps:
             return
 
 
 def gait_near(
     walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float
-) -> ContactGait | Outcome:
-    """Newton's method from section coordinates z (6,): the gait, or how the last step that it tried ended."""
+) -> ContactGait | str:
+    """Newton's method from section coordinates z (6,): the gait, or what came in its way."""
     try:
         found = find_contact_gait(walker, ground, methods, z, pitch_m, most_steps=NEWTON_STEPS)
     except np.linalg.LinAlgError:
-        return Outcome.REJECTED
+        return "its matrix is singular, since a multiplier is 1"
     if not isinstance(found, ContactGait):
-        return found.outcome
-    return found if found.step.length_m > 0.0 and found.step.period_s > 0.0 else Outcome.REJECTED
+        return "it did not converge" if found.outcome is Outcome.WALKED else f"a step ended as {found.outcome.label}"
+    if found.step.length_m <= 0.0:
+        return f"it led to a walk that does not advance, with steps of {found.step.length_m:.3g} m"
+    return found
 
 
 def softened(walker: ContactWalker, rigidity: float) -> ContactWalker:

@@ -2,9 +2,10 @@
 
 Section: the swing foot passes the stance foot. One foot then stands, the transients of its touch have died away, and
 the other swings freely; just after a touch the state is still in motion on the contact's own time scale, which makes
-touch-down a poor section. Coordinates by role, six numbers: height of the centre of mass, the angle of the stance leg,
-velocity along and normal to the slope, angular velocities of swing and stance leg. The swing leg's angle follows from
-the section; where along the slope it happens does not matter.
+touch-down a poor section. Coordinates by role: height of the centre of mass, the angles of the legs' bodies but the
+uppermost of the swing leg, which follows from the section, velocity along and normal to the slope, and the angular
+velocities of all bodies that turn on their own; of two straight legs these are six numbers. A knee of the stance leg is
+locked, that of the swing leg is not. Where along the slope it happens does not matter.
 
 One step maps the section to itself with the legs' roles exchanged.
 """
@@ -18,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.held import Held, IdealLock, Knees, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion
+from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_rules import Ledger
 from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
@@ -32,9 +34,9 @@ from walkerlab.solvers.stepping import T
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
-COORDINATES = 6
-# places in the state of a walker with two legs: along, height, two angles, and the velocities of these
-ALONG, HEIGHT, ANGLES, ALONG_RATE, HEIGHT_RATE, RATES = 0, 1, 2, 4, 5, 6
+# places in the state: along, height, the bodies' angles, and the velocities of these
+ALONG, HEIGHT, ANGLES = 0, 1, 2
+NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -42,37 +44,108 @@ class SectionStep:
     """One step from the section to the section."""
 
     outcome: Outcome
-    z: Floats  # (6,) where it led
-    DP: Floats  # (6, 6) its derivative
+    z: Floats  # (coordinates,) where it led
+    DP: Floats  # (coordinates, coordinates) its derivative
     period_s: float
     length_m: float  # how far the walker went
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
-    books_J: Floats  # (3,) dissipated by damping, by friction, at edges
+    rolling_m: float  # likewise
+    books_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
     height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    touch_s: float  # from the section to the touch
+    spacing_m: float  # between the feet at the touch
 
 
-def state_on_section(z: Floats, stance: int) -> State:
-    """The walker's state (8) of section coordinates, with `stance` the standing leg, at along = 0."""
-    height, angle, along_rate, height_rate, swing_rate, stance_rate = (float(x) for x in z)
-    rates = (swing_rate, stance_rate) if stance == 1 else (stance_rate, swing_rate)
-    return (0.0, height, angle, angle, along_rate, height_rate, *rates)
+def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
+    locked = walker.knees.shanks[stance] if isinstance(walker.knees, Knees) else None
+    return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
-def coordinates_of(state: Floats, stance: int) -> Floats:
+def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
+    free = turning_bodies(walker, stance)[1:]
+    if isinstance(walker.knees, Knees) and not isinstance(walker.knees.stop, IdealLock):
+        return (*free, walker.knees.shanks[stance])
+    return free
+
+
+def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
+    """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
+    if not isinstance(walker.held, Held):
+        return angles
+    weights = np.array(walker.held.weights).reshape(angles.size, angles.size)
+    followers = [body for body, always in enumerate(walker.held.always) if always]
+    if isinstance(walker.knees, Knees):
+        followers = [walker.knees.shanks[stance], *followers]
+    for body in followers:
+        if body not in given:
+            angles[body] = weights[body] @ angles
+    return angles
+
+
+def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
+    """How far foot 0 is ahead of foot 1 (m), and its derivatives by the bodies' angles (n)."""
+    s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
+    x = np.array(walker.feet[0].lever_x) - np.array(walker.feet[1].lever_x)
+    y = np.array(walker.feet[0].lever_y) - np.array(walker.feet[1].lever_y)
+    return float(c @ x - s @ y), -(s * x + c * y)
+
+
+def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
+    """The walker's state of section coordinates, with `stance` the standing leg, at along = 0."""
+    n = len(walker.tree.arm_x)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    state = np.zeros(4 + 2 * n)
+    state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
+    rates = np.zeros(n)
+    rates[list(turning)] = z[3 + len(angled) :]
+    state[4 + n :] = with_followers(walker, stance, rates, turning)
+    angles = np.zeros(n)
+    angles[list(angled)] = z[1 : 1 + len(angled)]
+    angles[turning[0]] = angles[walker.legs[stance][0]]
+    state[ANGLES : ANGLES + n] = feet_abreast(walker, stance, angles)
+    return tuple(float(x) for x in state)
+
+
+def feet_abreast(walker: ContactWalker, stance: int, angles: Floats) -> Floats:
+    """The angles (n) with the swing leg's uppermost body turned until the feet pass each other."""
+    angled, upper = angled_bodies(walker, stance), turning_bodies(walker, stance)[0]
+    turned = with_followers(walker, stance, np.eye(angles.size)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):
+        angles = with_followers(walker, stance, angles, (upper, *angled))
+        apart, gradient = feet_apart(walker, angles)
+        move = -apart / float(gradient @ turned)
+        angles[upper] += move
+        if abs(move) < 1e-15:
+            break
+    return with_followers(walker, stance, angles, (upper, *angled))
+
+
+def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
     """Section coordinates of a state whose standing leg is `stance`."""
-    swing = 1 - stance
-    picked = [HEIGHT, ANGLES + stance, ALONG_RATE, HEIGHT_RATE, RATES + swing, RATES + stance]
-    return np.asarray(state)[picked]
+    n = len(walker.tree.arm_x)
+    angles = [ANGLES + body for body in angled_bodies(walker, stance)]
+    rates = [4 + n + body for body in turning_bodies(walker, stance)]
+    return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
 
 
-def directions(stance: int) -> Floats:
-    """Derivative (8, 6) of `state_on_section`."""
-    swing = 1 - stance
-    along = np.zeros((8, COORDINATES))
-    along[HEIGHT, 0] = along[ALONG_RATE, 2] = along[HEIGHT_RATE, 3] = 1.0
-    along[ANGLES, 1] = along[ANGLES + 1, 1] = 1.0
-    along[RATES + swing, 4] = along[RATES + stance, 5] = 1.0
+def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
+    """Derivative (4 + 2 n, coordinates) of `state_on_section`, at the state it gave."""
+    n = len(walker.tree.arm_x)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
+    _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
+    given = (turning[0], *angled)
+    upper = with_followers(walker, stance, np.eye(n)[turning[0]], given)
+    along[HEIGHT, 0] = 1.0
+    for column, body in enumerate(angled, 1):
+        turned = with_followers(walker, stance, np.eye(n)[body], given)
+        along[ANGLES : ANGLES + n, column] = turned - upper * (gradient @ turned) / (gradient @ upper)
+    along[2 + n, 1 + len(angled)] = along[3 + n, 2 + len(angled)] = 1.0
+    for column, body in enumerate(turning, 3 + len(angled)):
+        along[4 + n :, column] = with_followers(walker, stance, np.eye(n)[body], turning)
     return along
 
 
@@ -91,36 +164,46 @@ def step_from_section(
 ) -> SectionStep:
     """Walk from the section to the section.
 
-    z        (6,) section coordinates
+    z        section coordinates
     pitch_m  what the pads are laid for
     booked   whether to keep the energy's books
     """
     stance = STANCE_FOOT
-    start = state_on_section(z, stance)
+    start = state_on_section(walker, z, stance)
     laid = pads_for(ground, walker, start, stance, pitch_m)
     ledger = new_ledger(walker, laid.terrain, stance, 2, start)
     stand_on_section(ledger, walker, laid, start, stance)
-    observer = new_observer(walker, ledger, start, booked=booked, directions=COORDINATES)
-    observer.tangent.Phi[:, :] = directions(stance)
+    observer = new_observer(walker, ledger, start, booked=booked, directions=z.size)
+    observer.tangent.Phi[:, :] = directions(walker, start, stance)
     method = methods.new(len(walker.blank))
     finder = finder_for(method, SIGNALS)
     outcome = Outcome(walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1))
     end = method.y.copy()
-    landed = feet_motion(walker, tuple(end.tolist()))[1 - stance].along - ledger.foothold[1 - stance]
+    slipped, rolled = since_touch(walker, ledger, tuple(end.tolist()), 1 - stance)
     DP = section_derivative(walker, ledger, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
         outcome,
-        coordinates_of(end, 1 - stance),
+        coordinates_of(walker, end, 1 - stance),
         DP,
         float(method.clock[T]),
         float(end[ALONG] - start[ALONG]),
-        float(ledger.slip[0] + landed),
+        float(ledger.slip[0] + slipped),
+        float(ledger.rolling[0] + rolled),
         observer.books.copy(),
         float(lost),
         method.counts[:4].copy(),
+        float(ledger.touch_time[0]),
+        float(ledger.touch_along[0] - ledger.foothold[stance] - ledger.slip[0]),
     )
+
+
+def since_touch(walker: ContactWalker, ledger: Ledger, y: State, foot: int) -> tuple[float, float]:
+    """How far a foot has slipped and rolled since its touch (m)."""
+    along = feet_motion(walker, y)[foot].along
+    slipped = material_along(walker, foot, along, y) - float(ledger.touched[foot])
+    return slipped, along - float(ledger.foothold[foot]) - slipped
 
 
 def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, start: State, stance: int) -> None:
@@ -129,6 +212,7 @@ def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, star
     feet = feet_motion(walker, start)
     ledger.at_zero[:] = 0
     ledger.at_zero[PASSING] = 1
+    ledger.sides[PASSING] = 1 if swing == 1 else -1
     ledger.carried[swing] = 0
     ledger.left_cells[swing] = ledger.cells[swing] - 1
     ledger.foothold[swing] = feet[stance].along - ground.frame.leg_length
@@ -137,27 +221,26 @@ def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, star
 def section_derivative(
     walker: ContactWalker, ledger: Ledger, observer: ContactObserver, end: Floats, stance: int
 ) -> Floats:
-    """Derivative (6, 6) of the step: the flow's, less how it shifts the moment at which the feet pass."""
-    system = OnGround(walker, (bool(ledger.carried[0]), bool(ledger.carried[1])))
+    """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
+    carried = (bool(ledger.carried[0]), bool(ledger.carried[1]))
+    held = tuple(bool(x) for x in ledger.held)
+    system = OnGround(walker, carried, held, stop_flags(walker.knees, ledger.knee))
     rate = np.zeros(end.size)
     right_hand_side(system, 0.0, end, rate)
-    gradient = np.zeros(end.size)
-    for k in range(2):
-        tilted = end[ANGLES + k] + walker.slope
-        upward = [np.sin(tilted) * foot.lever_x[k] + np.cos(tilted) * foot.lever_y[k] for foot in walker.feet]
-        gradient[ANGLES + k] = upward[0] - upward[1]
+    gradient, n = np.zeros(end.size), len(walker.tree.arm_x)
+    gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
     Phi = observer.tangent.Phi
     on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
-    return np.column_stack([coordinates_of(column, stance) for column in on_section.T])
+    return np.column_stack([coordinates_of(walker, column, stance) for column in on_section.T])
 
 
 @dataclass(frozen=True)
 class ContactGait:
     """A periodic walk of the contact model."""
 
-    z: Floats  # (6,) section coordinates
+    z: Floats  # section coordinates
     step: SectionStep  # the step from there
-    multipliers: NDArray[np.complex128]  # (6,) of the step map, largest first
+    multipliers: NDArray[np.complex128]  # of the step map, largest first
     residual: float  # largest component of P(z) - z, in the section's units
     iterations: int
 
@@ -176,7 +259,7 @@ def find_contact_gait(
     tolerance: float = 1e-10,
     most_steps: int = 60,
 ) -> ContactGait | SectionStep:
-    """Newton on the step map with its exact derivative, from section coordinates z (6,).
+    """Newton on the step map with its exact derivative, from section coordinates z.
 
     pitch_m     the pads' pitch to begin with; each iteration lays them for the step it has just taken
     most_steps  how many steps may be walked in search of it
@@ -192,7 +275,7 @@ def find_contact_gait(
             multipliers = np.linalg.eigvals(step.DP).astype(np.complex128)
             order = np.argsort(-np.abs(multipliers), kind="stable")
             return ContactGait(z, step, multipliers[order], residual, iteration)
-        move = np.linalg.solve(np.eye(COORDINATES) - step.DP, step.z - z)
+        move = np.linalg.solve(np.eye(z.size) - step.DP, step.z - z)
         z, step, tried = damped(walker, ground, methods, z, move, residual, step)
         iteration, walked = iteration + 1, walked + tried
     return step

@@ -7,25 +7,25 @@ random starting values, the paper's way (section 3.3). All of it happens with th
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import root
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import SIGNALS
-from walkerlab.mechanics.rigid_compass import CORRECTED, RigidWalker
-from walkerlab.mechanics.rigid_swing import VARIATION_BLANK
+from walkerlab.hybrid.rigid_walk import EVENTS
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.gait import Gait, measured
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import Vector, seeds
-from walkerlab.orbits.step_map import evaluate, new_shooting, newton
+from walkerlab.orbits.step_map import new_shooting, newton, variation_size
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 
 RANDOM_START = "random start"
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
+LOOKED_RESIDUAL = 1e-6  # of a random search that has come near a gait
 SAME = 1e-5  # relative distance of states below which two searches found one gait
-# ranges of random starting values: angle between the legs (rad), both angular velocities (sqrt(g/L))
-LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0])
+# ranges of random starting values: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance
+# leg, and of a shank whose knee was free at heel strike
+LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -73,12 +73,12 @@ class GaitSearch:
         return None if self.chosen is None else self.gaits[self.chosen]
 
 
-def find_gaits(walker: RigidWalker, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
+def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
     """Every period-1 gait of `walker` that the searches find.
 
     seed  of the random starting values
     """
-    if walker.slope <= 0.0 and walker.c21_sign == CORRECTED:
+    if walker.slope <= 0.0 and walker.centrifugal == walker.tree:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker, settings)
     search.follow_seeds()
@@ -90,10 +90,6 @@ NO_DESCENT = (
     "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
     "standing still is no gait"
 )
-
-
-class NoStep(Exception):  # noqa: N818 (the end of one search, not an error)
-    """Starting values from which no step is taken."""
 
 
 @dataclass
@@ -108,15 +104,15 @@ class Found:
 class Search:
     """A search in progress."""
 
-    def __init__(self, walker: RigidWalker, settings: SearchSettings) -> None:
+    def __init__(self, walker: Standing, settings: SearchSettings) -> None:
         """Nothing is found yet."""
         self.walker, self.units = unit_walker(walker)
         self.settings = settings
         self.found: list[Found] = []
         self.lost: list[str] = []
-        n, budget = len(VARIATION_BLANK), settings.budget
-        self.method = new_dop853(4, settings.solved_rtol, settings.solved_atol, budget)
-        self.finder = finder_for(self.method, SIGNALS)
+        n, budget = variation_size(self.walker), settings.budget
+        self.method = new_dop853(len(self.walker.blank), settings.solved_rtol, settings.solved_atol, budget)
+        self.finder = finder_for(self.method, EVENTS)
         self.looking = new_shooting(self.walker, new_dop853(n, settings.rtol, settings.atol, budget), self.finder)
         solved = new_dop853(n, settings.solved_rtol, settings.solved_atol, budget)
         self.solving = new_shooting(self.walker, solved, self.finder)
@@ -134,22 +130,13 @@ class Search:
 
     def draw(self, generator: np.random.Generator) -> None:
         """Solve the step map from random starting values."""
+        d = len(self.walker.picked)
         for _ in range(self.settings.random_starts):
-            angle, omega_1, omega_2 = generator.uniform(LEAST_START, MOST_START)
-            start = np.array([0.5 * angle - self.walker.slope, omega_1, omega_2])
-            try:
-                solution = root(self.mismatch, start, jac=True, options={"maxfev": 60})
-            except NoStep:
-                continue
-            if solution.success:
-                self.keep(solution.x, RANDOM_START)
-
-    def mismatch(self, z: Vector) -> tuple[Vector, Vector]:
-        """P(z) - z and its derivative."""
-        status, _ = evaluate(self.looking, z)
-        if status != Outcome.WALKED:
-            raise NoStep
-        return self.looking.z_next - z, self.looking.DP - np.eye(3)
+            z = generator.uniform(LEAST_START[:d], MOST_START[:d])
+            z[0] = 0.5 * z[0] - self.walker.slope - self.walker.lean
+            status, _, residual, _ = newton(self.looking, z, LOOKED_RESIDUAL)
+            if status == Outcome.WALKED and residual < LOOKED_RESIDUAL:
+                self.keep(z, RANDOM_START)
 
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
@@ -184,7 +171,7 @@ def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
-        return None, "what repeats itself there cannot be walked: " + "; ".join(objections)
+        return None, "the gaits there cannot be walked: " + "; ".join(objections)
     best = min(walkable, key=lambda index: gaits[index].spectral_radius)
     if gaits[best].stable:
         return best, "it is stable"

@@ -45,6 +45,15 @@ class Trial(NamedTuple):
         return self.outcome == Outcome.WALKED and self.settled
 
 
+class Walk(NamedTuple):
+    """A walk's end and its touches."""
+
+    outcome: int
+    touch_time: np.ndarray  # (steps,) s
+    touch_along: np.ndarray  # (steps,) m
+    evaluations: int  # right-hand sides
+
+
 @dataclass(frozen=True)
 class ScaledStarts:
     """One scene, walked from its start with scaled velocities."""
@@ -67,15 +76,19 @@ class ScaledStarts:
 
     def walk(self, swing: float, stance: float) -> Trial:
         """Walk from a scaled start."""
-        start = self.start(swing, stance)
+        walk = self.walked_from(self.start(swing, stance))
+        settled = walk.outcome == Outcome.WALKED and self.is_settled(walk.touch_time, walk.touch_along)
+        return Trial(walk.outcome, walk.touch_time.size, bool(settled), walk.evaluations)
+
+    def walked_from(self, start: State) -> Walk:
+        """Walk from a state of the free walker."""
         ledger = new_ledger(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
         observer = new_observer(self.walker, ledger, start)
         method = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget).new(len(start))
         finder = finder_for(method, SIGNALS)
         outcome = walk_free(self.walker, self.ground, method, finder, observer, ledger, 0.0, start, NEVER)
         steps = int(ledger.feet[STEPS])
-        settled = outcome == Outcome.WALKED and self.is_settled(ledger.touch_time, ledger.touch_along)
-        return Trial(int(outcome), steps, bool(settled), int(method.counts[0]))
+        return Walk(int(outcome), ledger.touch_time[:steps], ledger.touch_along[:steps], int(method.counts[0]))
 
     def is_settled(self, touch_time: np.ndarray, touch_along: np.ndarray) -> bool:
         """Whether the last of a walk's steps is the gait's."""

@@ -1,4 +1,4 @@
-"""Similar walkers: every compass walker is one of unit leg length, total mass and gravity, measured in its own units.
+"""Similar walkers: every walker is one of unit leg length, total mass and gravity, measured in its own units.
 
 Gaits are sought for the unit walker, so that starting ranges, tolerances and thresholds mean the same for all.
 """
@@ -6,7 +6,9 @@ Gaits are sought for the unit walker, so that starting ranges, tolerances and th
 import math
 from typing import NamedTuple
 
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing, on_slope
+from walkerlab.mechanics.tree import Tree
+from walkerlab.mechanics.tuples import Vector
 
 
 class Units(NamedTuple):
@@ -27,18 +29,29 @@ class Units(NamedTuple):
         return self.mass * self.length / self.time**2
 
 
-def unit_walker(walker: RigidWalker) -> tuple[RigidWalker, Units]:
+def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""
-    length = walker.leg_length
-    mass = walker.hip_mass + 2.0 * walker.leg_mass
-    unit = RigidWalker(
+    length, mass = walker.leg_length, walker.tree.mass
+    inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
+
+    def unit_tree(tree: Tree) -> Tree:
+        A, B = scaled(tree.cosine, inertia), scaled(tree.sine, inertia)
+        return Tree(1.0, A, B, scaled(tree.arm_x, moment), scaled(tree.arm_y, moment))
+
+    unit = walker._replace(
+        tree=unit_tree(walker.tree),
+        centrifugal=unit_tree(walker.centrifugal),
+        radius=walker.radius / length,
+        foot_x=scaled(walker.foot_x, 1.0 / length),
+        foot_y=scaled(walker.foot_y, 1.0 / length),
+        hip_x=scaled(walker.hip_x, 1.0 / length),
+        hip_y=scaled(walker.hip_y, 1.0 / length),
         leg_length=1.0,
-        foot_to_mass=walker.foot_to_mass / length,
-        leg_mass=walker.leg_mass / mass,
-        hip_mass=walker.hip_mass / mass,
-        leg_inertia=walker.leg_inertia / (mass * length * length),
         gravity=1.0,
-        slope=walker.slope,
-        c21_sign=walker.c21_sign,
     )
-    return unit, Units(length, mass, math.sqrt(length / walker.gravity))
+    return on_slope(unit, walker.slope), Units(length, mass, math.sqrt(length / walker.gravity))
+
+
+def scaled(vector: Vector, by: float) -> Vector:
+    """A vector times a number."""
+    return tuple(by * value for value in vector)

@@ -5,13 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.mechanics.standing import on_slope
 from walkerlab.orbits.small_slope import Seed, Vector
 from walkerlab.orbits.step_map import Shooting, newton
 
 WIDEST_STRIDE, NARROWEST_STRIDE = 1.6, 1.001  # from one slope to the next, as ratio of cube roots
 REMEMBERED = 3  # points that the next one is extrapolated from
 JUMP = 0.02  # a gait further than this from where it was expected is another gait
-SLACK = 1e-6  # residual that is good enough on the way, relative
+SLACK = 1e-8  # residual that is good enough on the way, relative; a multiplier tends to 1 as the slope vanishes
+RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
 
 
 class Reached(NamedTuple):
@@ -35,25 +37,34 @@ class Branch:
 
     def follow(self, slope: float) -> Reached:
         """The gait at `slope` > 0 (rad), in steps that adapt to how well it is foretold."""
-        target, reached, ratio = float(np.cbrt(slope)), 0.0, WIDEST_STRIDE
-        s = min(target, float(np.cbrt(self.seed.slope)))
-        while True:
+        target, ratio = float(np.cbrt(slope)), WIDEST_STRIDE
+        reached = self._begin(min(target, float(np.cbrt(self.seed.slope))))
+        if reached is None:
+            return Reached(0.0, None)
+        while reached < target:
+            s = min(target, ratio * reached)
             if self._correct(s):
-                if s == target:
-                    return Reached(slope, self._state(s, self.points[-1][1]))
                 reached = s
                 ratio = min(WIDEST_STRIDE, ratio**1.5)
             else:
                 ratio = ratio**0.5
-                if reached == 0.0 or ratio < NARROWEST_STRIDE:
+                if ratio < NARROWEST_STRIDE:
                     return Reached(reached**3, None)
-            s = min(target, ratio * reached)
+        return Reached(slope, self._state(target, self.points[-1][1]))
+
+    def _begin(self, s: float) -> float | None:
+        """Take the first gait at s or, where the seed is too rough for that, nearer to its limit; None if nowhere."""
+        for _ in range(RETREATS + 1):
+            if self._correct(s):
+                return s
+            s *= 0.5
+        return None
 
     def _correct(self, s: float) -> bool:
         """Take the gait at s among the points, if Newton's method finds it near where it is expected."""
         expected = self._expected(s)
         z = self._state(s, expected)
-        shooting = self.shooting._replace(walker=self.shooting.walker._replace(slope=s**3))
+        shooting = self.shooting._replace(walker=on_slope(self.shooting.walker, s**3))
         status, period, residual, _ = newton(shooting, z, SLACK * s)
         if status != Outcome.WALKED or residual > 100.0 * SLACK * s:
             return False

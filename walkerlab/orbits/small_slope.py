@@ -7,7 +7,8 @@ Long period: the step is symmetric about mid-swing, and both legs turn alike at 
 at leading order. What it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, is what the step
 descends, M g L alpha phi; with omega proportional to alpha that makes phi = kappa alpha^3.
 
-Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi.
+Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi. The factor
+grows without bound as the feet's mass vanishes; then this gait, too, loses alpha^2 and grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
 Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
@@ -22,13 +23,23 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from walkerlab.mechanics.heel_strike import impact_matrices
-from walkerlab.mechanics.rigid_compass import RigidWalker, swing_constants
+from walkerlab.mechanics.impact import heel_strike
+from walkerlab.mechanics.links import spread
+from walkerlab.mechanics.standing import (
+    NoKnee,
+    Standing,
+    kinetic_energy,
+    on_slope,
+    standing_mass,
+    swing_foot,
+)
+from walkerlab.solvers.system import State
 
 Vector = NDArray[np.float64]
 
 LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
 SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
+LOSS_ANGLE = 1e-3  # rad, small against one and large against rounding
 LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
 SHORT_AMPLITUDE = 0.002
 MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
@@ -36,6 +47,7 @@ MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no dig
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 COORDINATES = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
+THETA_2 = np.array([1.0, 0.0, 0.0])
 
 
 class Seed(NamedTuple):
@@ -56,21 +68,36 @@ class Modes(NamedTuple):
     V: Vector  # (2, 2), a mode a column, oscillating first
 
 
-def linear_modes(walker: RigidWalker) -> Modes | None:
+def linear_modes(walker: Standing) -> Modes | None:
     """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
-    c = swing_constants(walker)
-    D = np.array([[c.d11, -c.mLb], [-c.mLb, c.d22]])
-    stiffness = walker.gravity * np.diag([-c.mb, c.K])
+    n = len(walker.tree.arm_y)
+    s, c = (0.0,) * n, (1.0,) * n
+    legs = leg_columns(walker)
+    D = legs.T @ np.reshape(standing_mass(walker, s, c, walker.tree.arm_y), (n, n)) @ legs
+    stiffness = walker.gravity * legs.T @ np.diag(walker.tree.arm_y) @ legs
     try:
         rates, V = eigh(stiffness, D)
     except np.linalg.LinAlgError:
         return None
+    if rates[0] >= 0.0 or rates[1] <= 0.0:
+        return None
     return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
 
 
-def seeds(walker: RigidWalker) -> tuple[Seed, ...]:
+def leg_columns(walker: Standing) -> Vector:
+    """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
+    n = len(walker.tree.arm_x)
+    return np.array([spread(walker.straight, tuple(float(k == leg) for k in range(n))) for leg in range(2)]).T
+
+
+def has_small_gaits(walker: Standing) -> bool:
+    """Whether upright legs balance, so that gaits shrink with the slope."""
+    return isinstance(walker.knee, NoKnee) and walker.lean == 0.0 and not any(walker.tree.arm_x)
+
+
+def seeds(walker: Standing) -> tuple[Seed, ...]:
     """The small-slope gaits that `walker` has; its own slope plays no part."""
-    modes = linear_modes(walker)
+    modes = linear_modes(walker) if has_small_gaits(walker) else None
     long = None if modes is None else long_period_seed(walker, modes)
     if modes is None or long is None:
         return ()
@@ -78,7 +105,7 @@ def seeds(walker: RigidWalker) -> tuple[Seed, ...]:
     return (long,) if short is None else (long, short)
 
 
-def long_period_seed(walker: RigidWalker, modes: Modes) -> Seed | None:
+def long_period_seed(walker: Standing, modes: Modes) -> Seed | None:
     """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MOST_GROWTH:
@@ -90,10 +117,40 @@ def long_period_seed(walker: RigidWalker, modes: Modes) -> Seed | None:
     weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
     weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
     omega = float((modes.V @ (weights * rates_at_end)).mean())
-    kappa = 0.5 * walker.leg_length * omega**2 / walker.gravity
+    return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
+
+
+def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float) -> Seed:
+    """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
+
+    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
+    period     duration of a step, s
+    """
+    kappa = loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
-    z = LONG_AMPLITUDE * np.array([0.5, omega, omega]) - np.array([slope, 0.0, 0.0])
-    return Seed(LONG_PERIOD, slope, z, 2.0 * half, np.array([0.5, omega, omega]) / np.cbrt(kappa))
+    z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
+    return Seed(name, slope, z, period, per_angle / np.cbrt(kappa))
+
+
+def loss(walker: Standing, per_angle: Vector) -> float:
+    """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs.
+
+    A gait of the limit comes down as it set out, with both legs at the same rates: what its heel strike takes is what
+    descending by a step gives, in the units of the cube of a small angle.
+    """
+    flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
+    omega = angle * float(per_angle[2])
+    before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
+    after = heel_strike(flat, before)
+    lost = kinetic_energy(flat, before) - kinetic_energy(flat, after)
+    length = swing_foot(flat, before)[1] + flat.radius * angle
+    return float(lost / (flat.tree.mass * flat.gravity * length * angle**3))
+
+
+def leg_state(walker: Standing, theta: tuple[float, float], omega: tuple[float, float]) -> State:
+    """The state of straight legs: angles and rates of swing and stance leg, and of what follows them."""
+    legs = leg_columns(walker)
+    return tuple(float(x) for x in (*(legs @ theta), *(legs @ omega)))
 
 
 def symmetric_half_period(modes: Modes) -> float | None:
@@ -109,8 +166,8 @@ def symmetric_half_period(modes: Modes) -> float | None:
     return first_root(mismatch, 2.0 * math.pi / modes.swing)
 
 
-def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed | None:
-    """The gait that is proportional to the slope, of less than `longest` (s); None if there is none."""
+def short_period_seed(walker: Standing, modes: Modes, longest: float) -> Seed | None:
+    """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
     try:
         step = LinearStep(walker, modes)
         period = first_root(step.mismatch, longest)
@@ -120,21 +177,30 @@ def short_period_seed(walker: RigidWalker, modes: Modes, longest: float) -> Seed
     if period is None or z is None or z[0] <= -1.0:
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
+    per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
+    if loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
+        return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
     return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
 class LinearStep:
     """One step of the linearised walker on a slope of one radian, for many durations at once."""
 
-    def __init__(self, walker: RigidWalker, modes: Modes) -> None:
+    def __init__(self, walker: Standing, modes: Modes) -> None:
         """Prepare the heel strike's map at vanishing angles, with the change of roles."""
         self.modes = modes
         self.inverse = np.linalg.inv(modes.V)
-        A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, 1.0)
-        after = np.linalg.solve([[A_11, A_12], [A_12, A_22]], [[B_11, B_12], [0.0, B_22]])
+        flat, n = on_slope(walker, 0.0), len(walker.tree.arm_x)
         self.strike = np.zeros((3, 4))
         self.strike[0, 0] = 1.0
-        self.strike[1:, 2:] = after[::-1]
+        for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
+            self.strike[1:, 2 + leg] = heel_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
+        # a foot that rolls on a slope of one radian is in balance with its leg off the vertical
+        legs = leg_columns(flat)
+        pull = np.array([0.0, flat.tree.mass * flat.gravity * flat.radius])
+        rest = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.tree.arm_y) @ legs, pull)
+        self.rest = np.zeros((4, 4))
+        self.rest[:2, 3] = rest
 
     def flows(self, t: Vector) -> Vector:
         """Matrices (..., 4, 4) that take a state to the one t (s) later."""
@@ -155,8 +221,9 @@ class LinearStep:
         """Matrices (..., 4, 4) on (z, 1): three rows say that t (s) later z is back, one that both feet are down."""
         flow = self.flows(t)
         bordered = np.empty_like(flow)
-        bordered[..., :3, :] = COORDINATES - self.strike @ flow @ STATE_OF
-        bordered[..., 3, :] = FEET_DOWN @ flow @ STATE_OF
+        end = flow @ (STATE_OF - self.rest) + self.rest
+        bordered[..., :3, :] = COORDINATES - self.strike @ end
+        bordered[..., 3, :] = FEET_DOWN @ end
         bordered[..., 3, 3] += 2.0
         return bordered
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
@@ -81,7 +81,7 @@ def contact_row(starts: ScaledStarts, swing: NDArray[np.float64], stance: float)
 
 
 def rigid_map(
-    walker: RigidWalker, state: State, swing: NDArray[np.float64], stance: NDArray[np.float64], steps: int
+    walker: Standing, state: State, swing: NDArray[np.float64], stance: NDArray[np.float64], steps: int
 ) -> StartMap:
     """The same starts in the rigid model, whose ground may also pull: then the outcome is `lifted-off`."""
     method = method_named(RIGID_METHOD).new(len(state), RIGID_RTOL, RIGID_ATOL, ENDLESS)

@@ -1,7 +1,8 @@
-"""The step map of the rigid walker and its exact derivative.
+"""The step map of the rigid model and its exact derivative.
 
-A gait's state lies on the section 'both feet on the slope, just after impact', which leaves three coordinates
-z = (theta_2, dtheta_1, dtheta_2); theta_1 = -2 phi - theta_2.
+A gait's state lies on the section 'both feet on the slope, just after heel strike'. Its coordinates z are the stance
+leg's angle, which the swing leg's follows from, and the velocities of all bodies that turn by themselves then: swing
+leg, stance leg, and a shank whose knee was free during the impact. A compass has (theta_2, dtheta_1, dtheta_2).
 """
 
 from typing import Any, NamedTuple
@@ -10,96 +11,136 @@ import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import slide_onto_slope, swing
+from walkerlab.hybrid.rigid_walk import HEEL_STRIKE, head, on_event, swing
 from walkerlab.kernels import inlined, kernel
-from walkerlab.mechanics.heel_strike import impact, impact_jacobian
-from walkerlab.mechanics.rigid_compass import RigidWalker
-from walkerlab.mechanics.rigid_swing import SwingVariation
+from walkerlab.mechanics.impact import heel_strike, heel_strike_along
+from walkerlab.mechanics.links import spread
+from walkerlab.mechanics.standing import STANCE, SWING, Mode, Standing, Variation
+from walkerlab.mechanics.tuples import Vector, put
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.stepping import H_NEXT, T, clear_counts, end_state
+from walkerlab.solvers.stepping import H_NEXT, T, clear_counts
 from walkerlab.solvers.system import State, derivative
 
 WALKED, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.NO_HEEL_STRIKE)
-SECTION = 3
 SMALLEST_MOVE = 2.0**-8
 MOST_EVALUATIONS = 60
 NO_RESIDUAL = 1e300
 ROUNDING = 1e-10  # a residual this small that no longer shrinks is rounding
-# derivative (4, 3) of the state with respect to z: theta_2 takes theta_1 along with the opposite sign
-ALONG_SECTION = (-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @inlined
-def on_section(walker: RigidWalker, z: Any) -> State:
-    """The state (4) of section coordinates z (3,)."""
-    return (-2.0 * walker.slope - z[0], z[0], z[1], z[2])
+def on_section(walker: Standing, z: Any) -> State:
+    """The state (2 n) of section coordinates z (d,)."""
+    return lifted(walker, z, -2.0 * (walker.slope + walker.lean))
+
+
+@inlined
+def lifted(walker: Standing, z: Any, both: float) -> State:
+    """The state (2 n) of section coordinates z (d,) with straight legs whose angles sum to `both` (rad).
+
+    Linear in z for `both` = 0: the derivative of `on_section` along z.
+    """
+    n = len(walker.tree.arm_x)
+    theta, omega = walker.tree.arm_x, walker.tree.arm_x
+    for k in range(n):
+        theta, omega = put(theta, k, 0.0), put(omega, k, 0.0)
+    theta = put(theta, STANCE, z[0])
+    theta = put(theta, SWING, both - z[0])
+    for i in range(1, len(walker.picked)):
+        omega = put(omega, walker.picked[i] - n, z[i])
+    theta, omega = spread(walker.straight, theta), spread(walker.at_strike, omega)
+    y = walker.blank
+    for k in range(n):
+        y = put(y, k, theta[k])
+        y = put(y, n + k, omega[k])
+    return y
+
+
+def section_of(walker: Standing, y: Any) -> Any:
+    """The section coordinates (d,) of a state (2 n) just after heel strike."""
+    return np.array([y[i] for i in walker.picked])
 
 
 class Shooting(NamedTuple):
     """A walker's step map with the memory to evaluate, differentiate and invert it."""
 
-    walker: RigidWalker
-    method: Any  # for the 16 equations of SwingVariation
+    walker: Standing
+    method: Any  # for the equations of Variation
     finder: CrossingFinder
-    z_next: Any  # (3,) where a step led
-    DP: Any  # (3, 3) its derivative
-    system: Any  # (3, 3) Newton's matrix
-    pivots: Any  # (3,)
-    impact: Any  # (4, 4) derivative of the impact
-    move: Any  # (3,) Newton's
-    best: Any  # (3,) the best state that Newton's method has met
-    best_DP: Any  # (3, 3) the derivative there
+    blank: State  # zeros of Variation
+    no_move: Vector  # (d) zeros
+    z_next: Any  # (d,) where a step led
+    DP: Any  # (d, d) its derivative
+    system: Any  # (d, d) Newton's matrix
+    pivots: Any  # (d,)
+    knee_time: Any  # (1,) s
+    move: Any  # (d,) Newton's
+    best: Any  # (d,) the best state that Newton's method has met
+    best_DP: Any  # (d, d) the derivative there
 
 
-def new_shooting(walker: RigidWalker, method: Any, finder: CrossingFinder) -> Shooting:
-    """The step map of `walker`, integrated with `method`."""
-    square = (SECTION, SECTION)
-    pivots = np.zeros(SECTION, np.int64)
+def variation_size(walker: Standing) -> int:
+    """How many equations the step map's derivative takes."""
+    return len(walker.blank) * (1 + len(walker.picked))
+
+
+def new_shooting(walker: Standing, method: Any, finder: CrossingFinder) -> Shooting:
+    """The step map of `walker`, integrated with `method`, which has room for `variation_size` equations."""
+    d = len(walker.picked)
     return Shooting(
-        walker, method, finder, np.zeros(SECTION), np.zeros(square), np.zeros(square), pivots, np.zeros((4, 4)),
-        np.zeros(SECTION), np.zeros(SECTION), np.zeros(square),
+        walker, method, finder, (0.0,) * variation_size(walker), (0.0,) * d, np.zeros(d), np.zeros((d, d)),
+        np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d), np.zeros((d, d)),
     )  # fmt: skip
 
 
 @inlined
-def step_with_jacobian(shooting: Shooting, z: Any) -> tuple[int, float]:
-    """One step from z (3,), its end and derivative left in `z_next` and `DP`.
+def start_of_variation(shooting: Shooting, z: Any) -> State:
+    """The state on the section with the directions of the section's coordinates."""
+    walker, y = shooting.walker, shooting.blank
+    size = len(walker.blank)
+    start = on_section(walker, z)
+    for i in range(size):
+        y = put(y, i, start[i])
+    for j in range(len(walker.picked)):
+        column = lifted(walker, put(shooting.no_move, j, 1.0), 0.0)
+        for i in range(size):
+            y = put(y, size * (j + 1) + i, column[i])
+    return y
 
-    The derivative is that of the flow, corrected for the heel strike's own shift in time, times that of the impact
+
+@inlined
+def step_with_jacobian(shooting: Shooting, z: Any) -> tuple[int, float]:
+    """One step from z (d,), its end and derivative left in `z_next` and `DP`.
+
+    The derivative is that of the flow, corrected for the events' own shifts in time, times that of the impacts
     (saltation): J_impact (Phi - f (grad g Phi) / (grad g f)).
 
     Returns the outcome's number and the step's duration (s).
     """
     walker, method = shooting.walker, shooting.method
-    variation = SwingVariation(walker)
-    y0 = (-2.0 * walker.slope - z[0], z[0], z[1], z[2])
+    n = len(walker.tree.arm_x)
+    system = Variation(Mode(walker, walker.bent), shooting.blank)
     method.clock[H_NEXT] = 0.0
-    status = swing(method, variation, walker, shooting.finder, Unobserved(), 0.0, y0 + ALONG_SECTION, 0)
+    y0 = start_of_variation(shooting, z)
+    status = swing(method, system, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time)
     if status != WALKED:
         return status, method.clock[T]
-    full = end_state(method, variation)
-    t, y = slide_onto_slope(walker, method.clock[T], full[0:4])
-    new = impact(walker, y[0], y[1], y[2], y[3])
-    for i in range(SECTION):
-        shooting.z_next[i] = new[i + 1]
-    chain_rule(walker, y, full, shooting.DP, shooting.impact)
+    t, full = on_event(method, Variation(Mode(walker, walker.straight), shooting.blank), HEEL_STRIKE)
+    before = head(walker.blank, full, 0)
+    after = heel_strike(walker, before)
+    f = derivative(Mode(walker, walker.straight), t, before)
+    for i in range(len(walker.picked)):
+        shooting.z_next[i] = after[walker.picked[i]]
+    for j in range(len(walker.picked)):
+        column = head(walker.blank, full, 2 * n * (j + 1))
+        wait = -(column[SWING] + column[STANCE]) / (before[n + SWING] + before[n + STANCE])
+        for i in range(2 * n):
+            column = put(column, i, column[i] + wait * f[i])
+        column = heel_strike_along(walker, before, after, column)
+        for i in range(len(walker.picked)):
+            shooting.DP[i, j] = column[walker.picked[i]]
     return WALKED, t
-
-
-@inlined
-def chain_rule(walker: RigidWalker, y: State, full: State, DP: Any, work: Any) -> None:
-    """Assemble DP from the flow's derivative (behind the first four numbers of `full`) at the heel strike's state y."""
-    impact_jacobian(walker, y[0], y[1], y[2], y[3], work)
-    f = derivative(walker, 0.0, y)
-    guard_rate = y[2] + y[3]
-    for column in range(SECTION):
-        wait = -(full[4 + column] + full[7 + column]) / guard_rate
-        for row in range(SECTION):
-            total = 0.0
-            for k in range(4):
-                total += work[row + 1, k] * (full[4 + 3 * k + column] + f[k] * wait)
-            DP[row, column] = total
 
 
 def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
@@ -112,7 +153,7 @@ def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
 def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
     """Solve P(z) = z by Newton's method with the exact derivative, halving moves that make the residual grow.
 
-    z  (3,) start; overwritten with the best state found, whose derivative is left in `DP`
+    z  (d,) start; overwritten with the best state found, whose derivative is left in `DP`
 
     Returns the outcome's number of the step from z, its duration (s), the residual (largest component of P(z) - z)
     and the steps of walking it took.
@@ -135,7 +176,7 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
             scale *= 0.5
             if scale < SMALLEST_MOVE or best_status != WALKED or best_residual < ROUNDING:
                 break
-        for i in range(SECTION):
+        for i in range(shooting.move.size):
             z[i] = best[i] + scale * move[i]
     keep(best, DP, z, shooting.DP)
     return best_status, best_period, best_residual, evaluations
@@ -144,22 +185,22 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
 @inlined
 def keep(z: Any, DP: Any, z_kept: Any, DP_kept: Any) -> None:
     """Copy a state and the derivative there."""
-    for i in range(SECTION):
+    for i in range(z.size):
         z_kept[i] = z[i]
-        for j in range(SECTION):
+        for j in range(z.size):
             DP_kept[i, j] = DP[i, j]
 
 
 @inlined
 def newton_move(shooting: Shooting, z: Any, move: Any) -> bool:
     """Newton's move (I - DP)^-1 (P(z) - z); False if the matrix is singular."""
-    for i in range(SECTION):
+    for i in range(shooting.move.size):
         move[i] = shooting.z_next[i] - z[i]
-        for j in range(SECTION):
+        for j in range(shooting.move.size):
             shooting.system[i, j] = (1.0 if i == j else 0.0) - shooting.DP[i, j]
-    if not factor(shooting.system, shooting.pivots, SECTION):
+    if not factor(shooting.system, shooting.pivots, shooting.move.size):
         return False
-    solve(shooting.system, shooting.pivots, move, 0, SECTION)
+    solve(shooting.system, shooting.pivots, move, 0, shooting.move.size)
     return True
 
 
@@ -168,5 +209,7 @@ def residual_of(shooting: Shooting, z: Any, status: int) -> float:
     """Largest component of P(z) - z; huge if the step did not end in a heel strike."""
     if status != WALKED:
         return NO_RESIDUAL
-    ahead = shooting.z_next
-    return max(abs(ahead[0] - z[0]), abs(ahead[1] - z[1]), abs(ahead[2] - z[2]))
+    largest = 0.0
+    for i in range(shooting.move.size):
+        largest = max(largest, abs(shooting.z_next[i] - z[i]))
+    return largest

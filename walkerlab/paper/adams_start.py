@@ -12,7 +12,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing
 from walkerlab.paper.printed import E_AVG, TABLE_2
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
@@ -66,7 +66,7 @@ class PaperStart:
         return "; ".join((*parts, fate))
 
 
-def paper_start(walker: RigidWalker, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> PaperStart:
+def paper_start(walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> PaperStart:
     """Run Table 2's ADAMS start.
 
     walk  walks the physical model from a rigid start state, with samples
@@ -95,7 +95,7 @@ def paper_start(walker: RigidWalker, walk: Callable[[State], ContactWalkResult],
     )
 
 
-def pulls_from(walker: RigidWalker, time: NDArray[np.float64], states: NDArray[np.float64]) -> float | None:
+def pulls_from(walker: Standing, time: NDArray[np.float64], states: NDArray[np.float64]) -> float | None:
     """When the normal force on the rigid model's stance foot first falls below zero (s)."""
     return first(time, reactions(walker, states)[:, 1] < 0.0)
 
@@ -115,5 +115,5 @@ def forces_of(
         raise ValueError("the walk was not sampled")
     feet, books = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
     sampled_feet(walker, samples.states, samples.carried, feet)
-    sampled_energies(walker, samples.states, samples.carried, books)
+    sampled_energies(walker, samples.states, samples.carried, samples.knees, books)
     return samples.time_s, feet[:, :, 2], books[:, 0] + books[:, 1]

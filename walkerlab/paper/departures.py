@@ -25,12 +25,18 @@ def departures(config: Config, start_moved: bool) -> Departures:
     """
     of_rigid = tuple(of_the_rigid_model(config))
     moved = ("the start is not the rigid model's fixed point",) if start_moved else ()
-    of_contact = () if config.contact is None else tuple(of_the_contact(config.walker, config.contact))
+    walker, contact = config.walker, config.contact
+    of_contact: tuple[str, ...] = ()
+    if contact is not None and isinstance(walker, CompassWalker):
+        of_contact = tuple(of_the_contact(walker, contact))
     return Departures(of_rigid, (*of_rigid, *of_contact, *moved))
 
 
 def of_the_rigid_model(config: Config) -> Iterator[str]:
     """Walker, gravity and slope; the slope is known to the digits of x_p."""
+    if not isinstance(config.walker, CompassWalker):
+        yield said("walker.type", config.walker.type, CompassWalker().type)
+        return
     yield from different(CompassWalker(), config.walker, leave_out=PHYSICAL_MODEL_ONLY)
     gravity = Config.model_fields["gravity_m_s2"].default
     if not same(config.gravity_m_s2, gravity):

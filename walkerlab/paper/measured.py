@@ -10,7 +10,7 @@ import numpy as np
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies
-from walkerlab.mechanics.rigid_compass import RigidWalker, step_length
+from walkerlab.paper.appendix_a import RigidWalker, assembled, step_length
 from walkerlab.solvers.dop853 import Dop853, new_dop853
 from walkerlab.solvers.system import State
 
@@ -100,14 +100,14 @@ def tight_method() -> Dop853:
 
 def five_cycles(walker: RigidWalker, start: State) -> RecordedWalk:
     """Ten steps of the rigid model with samples in time."""
-    return take_walk(walker, tight_method(), start, 2 * CYCLES, sampled=True)
+    return take_walk(assembled(walker), tight_method(), start, 2 * CYCLES, sampled=True)
 
 
 def energy_record(walker: RigidWalker, walk: RecordedWalk) -> Array:
     """Energy (samples,) in J along a sampled walk, from the current stance foot."""
     if walk.samples is None:
         raise ValueError("the walk was not sampled")
-    return np.asarray(energies(walker, walk.samples.state).sum(axis=1))
+    return np.asarray(energies(assembled(walker), walk.samples.state).sum(axis=1))
 
 
 def rigid_model(walker: RigidWalker, state: State) -> RigidModel:

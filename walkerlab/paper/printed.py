@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Final
 
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker
 
 COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")

@@ -10,7 +10,7 @@ import numpy as np
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.paper.measured import (
     Characteristics,
     RigidModel,
@@ -135,7 +135,7 @@ def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
     printed, right = walker_of_the_paper(AS_PRINTED), walker_of_the_paper(CORRECTED)
     gaits = {name: settled(walker_of_the_paper(sign)) for name, sign in SIGNS.items()}
-    one_step = take_walk(printed, tight_method(), gaits["as-printed"], 1, sampled=True)
+    one_step = take_walk(assembled(printed), tight_method(), gaits["as-printed"], 1, sampled=True)
     cycles = five_cycles(printed, fixed_point_as_printed())
     slope, rounding = slope_of(*X_P[:2])
     return PaperStudy(
@@ -154,7 +154,7 @@ def study_the_paper() -> PaperStudy:
 
 def settled(walker: RigidWalker) -> State:
     """The stable gait that walking from x_p leads to."""
-    walk = take_walk(walker, tight_method(), fixed_point_as_printed(), SETTLING_STEPS)
+    walk = take_walk(assembled(walker), tight_method(), fixed_point_as_printed(), SETTLING_STEPS)
     if walk.steps < SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
     return walk.final_state
@@ -203,16 +203,16 @@ def adams_start() -> AdamsStart:
     """Walk the corrected rigid model from the ADAMS start, on the slope on which that stands."""
     slope, rounding = slope_of(TABLE_2[0].adams, TABLE_2[1].adams)
     walker = walker_of_the_paper(CORRECTED)._replace(slope=slope)
-    walk = take_walk(walker, tight_method(), adams_start_as_printed(), 1, sampled=True)
+    walk = take_walk(assembled(walker), tight_method(), adams_start_as_printed(), 1, sampled=True)
     assert walk.samples is not None
-    normal = reactions(walker, walk.samples.state)[:, 1]
+    normal = reactions(assembled(walker), walk.samples.state)[:, 1]
     start = np.array([adams_start_as_printed()])
     return AdamsStart(
         slope=slope,
         slope_rounding=rounding,
-        energy=float(energies(walker, start).sum()),
+        energy=float(energies(assembled(walker), start).sum()),
         weight=(walker.hip_mass + 2.0 * walker.leg_mass) * walker.gravity,
-        normal_force=float(reactions(walker, start)[0, 1]),
+        normal_force=float(reactions(assembled(walker), start)[0, 1]),
         pull_from=first_below_zero(walk.samples.time, normal),
         heel_strikes=walk.steps,
         end=walk.outcome.label,

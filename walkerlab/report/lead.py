@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.report.numbers import count, length, listed, number, quantity
@@ -35,11 +36,29 @@ def scene(config: Config, run: str) -> str:
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: a compass walker with legs of {length(walker.leg_length_m)} and "
-        f"{quantity(walker.leg_mass_kg, 'kg')} and a hip of {quantity(walker.hip_mass_kg, 'kg')} on a slope of "
+        f"Config {config.name}{changed}: {walker_in_words(walker)} on a slope of "
         f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°), with the {equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
+
+
+WALKERS = {
+    "compass": "a compass walker",
+    "straight-legs": "a walker with straight legs",
+    "kneed": "a walker with knees",
+    "parts": "a walker described by its parts",
+}
+
+
+def walker_in_words(walker: Any) -> str:
+    """Kind, size and mass of a walker."""
+    torso = "" if walker.torso is None else f" and a torso of {quantity(walker.torso.mass_kg, 'kg')}"
+    if walker.type == "compass":
+        of_legs = f"{length(walker.leg_length_m)} and {quantity(walker.leg_mass_kg, 'kg')}"
+        return f"a compass walker with legs of {of_legs} and a hip of {quantity(walker.hip_mass_kg, 'kg')}{torso}"
+    feet = f"feet of radius {length(walker.foot_radius_m)}" if walker.foot_radius_m else "point feet"
+    whole = quantity(walker.total_mass_kg, "kg")
+    return f"{WALKERS[walker.type]} with legs of {length(walker.leg_length_m)}, {feet}, {whole} in all{torso}"
 
 
 def equations(config: Config) -> str:

@@ -3,32 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.ground.compliant import (
     STANCE_FOOT,
     CompassParts,
+    KneeRules,
     centre_to,
-    compass_assembly,
     contact_walker,
     pinned_walker,
 )
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned, floating_state
-from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
+from walkerlab.ground.terrain import AfterMidSwing, Checkerboard, Plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
 from walkerlab.hybrid.contact_run import Ground, MethodSettings
+from walkerlab.mechanics.parts import Assembly, Position
+from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
+from walkerlab.scene.parts import AnyWalker, assembly_of
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import CompassWalker, Config, Contact
+    from walkerlab.config.schema import Config, Contact
 
 GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
+FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
 GAIT_BUDGET = 10_000_000  # right-hand sides
 
 
@@ -37,10 +45,11 @@ class ContactScene:
     """A walker on the ground, ready to walk."""
 
     walker: ContactWalker
-    terrain: Checkerboard | AfterMidSwing
+    terrain: Checkerboard | AfterMidSwing | Plane
     frame: Frame
     pinned: Pinned | None  # the hinged first step, if the config wants one
     pitch_m: float
+    assembly: Assembly
 
     @property
     def ground(self) -> Ground:
@@ -56,20 +65,74 @@ def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float
     """
     contact = with_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
-    parts = compass_parts(config.walker)
-    assembly = compass_assembly(parts)
-    walker = contact_walker(assembly, normal_law(contact), friction_law(contact), config.gravity_m_s2, config.slope_rad)
-    hip = centre_to(assembly, "leg 2", (0.0, 0.0))
+    return assembled_scene(
+        assembly_of(config.walker),
+        config.walker.leg_length_m,
+        contact,
+        config.gravity_m_s2,
+        config.slope_rad,
+        pitch,
+        knee_rules(config.walker),
+    )
+
+
+def knee_rules(walker: AnyWalker) -> KneeRules:
+    """How the knees of a walker lock and are released; straight legs have none."""
+    if not isinstance(walker, Kneed | PartsWalker):
+        return KneeRules()
+    knee = walker.knee
+    at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
+    if knee.lock == "ideal":
+        return KneeRules(release_at_touch=at_touch)
+    # damped from the first hundredth of a milliradian on
+    return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
+
+
+def assembled_scene(
+    assembly: Assembly,
+    leg_length_m: float,
+    contact: Contact,
+    gravity: float,
+    slope: float,
+    pitch_m: float,
+    knee_rules: KneeRules | None = None,
+) -> ContactScene:
+    """Any walker of the catalogue on the ground of a contact block.
+
+    gravity     m/s^2
+    slope       rad
+    pitch_m     what pads are laid for and steps are measured by
+    knee_rules  how knees lock and are released
+    """
+    walker = contact_walker(assembly, normal_law(contact), friction_law(contact), gravity, slope, knee_rules)
+    upper = assembly.legs[STANCE_FOOT][0]
+    hip = centre_to(assembly, upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     frame = Frame(
-        leg_length=parts.leg_length_m,
-        pendulum_time=math.sqrt(parts.leg_length_m / config.gravity_m_s2),
+        leg_length=leg_length_m,
+        pendulum_time=math.sqrt(leg_length_m / gravity),
         hip_x=tuple(float(x) for x in hip[:, 0]),
         hip_y=tuple(float(x) for x in hip[:, 1]),
         locate_joins=True,
     )
-    terrain = Checkerboard(pitch, (-pitch, 0.0)) if contact.terrain == "checkerboard" else AfterMidSwing(pitch)
-    pinned = hinged_walker(config, walker) if contact.stance == "pinned" else None
-    return ContactScene(walker, terrain, frame, pinned, pitch)
+    pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
+    return ContactScene(walker, TERRAINS[contact.terrain](pitch_m), frame, pinned, pitch_m, assembly)
+
+
+def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
+    """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
+    for joint in assembly.joints:
+        if (joint.parent, joint.child) == (body, other):
+            return joint.parent_point_m
+        if (joint.parent, joint.child) == (other, body):
+            return joint.child_point_m
+    return (0.0, 0.0)
+
+
+TERRAINS: dict[str, Callable[[float], Checkerboard | AfterMidSwing | Plane]] = {
+    "checkerboard": lambda pitch: Checkerboard(pitch, (-pitch, 0.0)),
+    "after-mid-swing": AfterMidSwing,
+    "plane": Plane,
+}
 
 
 def with_contact(config: Config) -> Contact:
@@ -81,7 +144,7 @@ def with_contact(config: Config) -> Contact:
 
 def hinged_walker(config: Config, walker: ContactWalker) -> Pinned:
     """The walker with a revolute joint at its first stance foot."""
-    return pinned_walker(compass_assembly(compass_parts(config.walker)), walker, STANCE_FOOT, 0.0)
+    return pinned_walker(assembly_of(config.walker), walker, STANCE_FOOT, 0.0)
 
 
 def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
@@ -94,7 +157,7 @@ def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State)
     return find_gait_from(scene.walker, scene.ground, methods, start_state(scene, rigid_state))
 
 
-def compass_parts(walker: CompassWalker) -> CompassParts:
+def compass_parts(walker: Any) -> CompassParts:
     """The measures that the walker is assembled by."""
     return CompassParts(
         walker.leg_length_m,
@@ -106,9 +169,14 @@ def compass_parts(walker: CompassWalker) -> CompassParts:
     )
 
 
+def wants_own_pitch(contact: Contact) -> bool:
+    """Whether there are pads, to be laid for the contact gait's own step length."""
+    return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
+
+
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
     """Pitch of the pads (m); on a plane the rigid step length, by which steps are judged."""
-    if contact.terrain == "after-mid-swing" or contact.pad_pitch == "rigid":
+    if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
         if own_pitch_m is None:
@@ -134,17 +202,23 @@ def friction_law(contact: Contact) -> Coulomb | Frictionless:
 def start_state(scene: ContactScene, rigid_state: State) -> State:
     """The walker with the rigid start state, its stance foot just touching at along = 0, at rest and rolling.
 
-    rigid_state  (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2), both feet on the slope
+    rigid_state  of the rigid model, both feet on the slope; of a compass (theta_1 swing, theta_2 stance, dtheta_1,
+                 dtheta_2)
 
     The hinge at the ball's centre gives position and velocity; then the ball rolls without slip instead of turning
     about its centre.
     """
     walker = scene.walker
-    foot = walker.feet[STANCE_FOOT]
-    pinned = scene.pinned or Pinned(walker, walker.tree, STANCE_FOOT, 0.0, (0.0,) * 4)
+    n = len(walker.tree.arm_x)
+    members = places_of(scene.assembly).members
+    parts = np.array(rigid_state).reshape(2, members.shape[1])
+    rigid_state = tuple(float(x) for x in (parts @ members.T).ravel())
+    pinned = scene.pinned or Pinned(walker, walker.tree, STANCE_FOOT, 0.0, (0.0,) * (2 * n))
     hinged = floating_state(pinned, rigid_state)
-    rolled = hinged[4] - foot.radius * rigid_state[2 + STANCE_FOOT]
-    return (*hinged[:4], rolled if scene.pinned is None else hinged[4], *hinged[5:])
+    if scene.pinned is not None:
+        return hinged
+    rolled = sum(r * omega for r, omega in zip(walker.feet[STANCE_FOOT].rolling, rigid_state[n:], strict=True))
+    return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
 
 
 def static_penetration(scene: ContactScene) -> float:

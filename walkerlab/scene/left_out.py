@@ -49,7 +49,7 @@ def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
 
 def of_legs(config: Config) -> Iterator[LeftOut]:
     """What legs without inertia do without."""
-    if config.walker.leg_inertia_kg_m2 == 0.0:
+    if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
         saved = "nothing: it is summed into constants before anything runs"
         yield left_out("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 

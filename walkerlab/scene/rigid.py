@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.mechanics.rigid_compass import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.config.walkers import CompassWalker, is_plain_compass
+from walkerlab.errors import ConfigError
+from walkerlab.mechanics.rigid import knee_of, places_of, standing
+from walkerlab.mechanics.standing import Standing
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
+from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Equations
 
-COORDINATES = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-SWING_EQUATIONS = len(COORDINATES)
-C21_SIGNS: dict[Equations, float] = {"corrected": CORRECTED, "as-printed": AS_PRINTED}
 ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
 
 
@@ -21,8 +23,10 @@ ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
 class RigidScene:
     """A walker on its slope, ready to walk."""
 
-    walker: RigidWalker
+    walker: Standing
     method: Any  # integrator for the swing phase
+    names: tuple[str, ...]  # of the state's numbers
+    knee_m: tuple[float, float] | None  # the knee in its thigh's frame
     states: bool  # whether angles and velocities in time are wanted
     energies: bool
     forces: bool
@@ -36,20 +40,35 @@ class RigidScene:
 def rigid_scene(config: Config) -> RigidScene:
     """The scene of a config: its equations, its method, and of the outputs those that it asks for."""
     settings = config.solver.rigid
-    method = method_named(settings.method).new(SWING_EQUATIONS, settings.rtol, settings.atol, ENDLESS)
+    walker = rigid_walker(config, config.equations)
     wanted = config.outputs
     return RigidScene(
-        walker=rigid_walker(config, config.equations),
-        method=method,
+        walker=walker,
+        method=method_named(settings.method).new(len(walker.blank), settings.rtol, settings.atol, ENDLESS),
+        names=coordinates(config),
+        knee_m=knee_of(assembly_of(config.walker, rigid=True)),
         states="states" in wanted,
         energies="energies" in wanted,
         forces="forces" in wanted,
     )
 
 
-def rigid_walker(config: Config, equations: Equations) -> RigidWalker:
-    """The walker of a config with one of the two sets of equations; the rigid model has point feet."""
+def rigid_walker(config: Config, equations: Equations) -> Standing:
+    """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
+    parts = assembly_of(config.walker, rigid=True)
+    locked = knee_locked_at_strike(config.walker)
+    try:
+        model = standing(parts, config.gravity_m_s2, config.slope_rad, locked)
+    except ValueError as error:
+        raise ConfigError(f"walker: {error}", SHOWN_IN) from None
+    return as_printed(model) if equations == "as-printed" else model
+
+
+def compass(config: Config, equations: Equations) -> RigidWalker:
+    """The walker of Appendix A that a plain compass of a config is; ValueError for another walker."""
     walker = config.walker
+    if not isinstance(walker, CompassWalker) or walker.torso is not None:
+        raise ValueError(f"a walker of type {walker.type} is none of Appendix A")
     return RigidWalker(
         leg_length=walker.leg_length_m,
         foot_to_mass=walker.foot_to_mass_m,
@@ -58,5 +77,21 @@ def rigid_walker(config: Config, equations: Equations) -> RigidWalker:
         leg_inertia=walker.leg_inertia_kg_m2,
         gravity=config.gravity_m_s2,
         slope=config.slope_rad,
-        c21_sign=C21_SIGNS[equations],
+        c21_sign=AS_PRINTED if equations == "as-printed" else CORRECTED,
     )
+
+
+def compass_or_none(config: Config, equations: Equations) -> RigidWalker | None:
+    """`compass`, or None for another walker."""
+    return compass(config, equations) if is_plain_compass(config.walker) else None
+
+
+def coordinates(config: Config) -> tuple[str, ...]:
+    """Names of the numbers of the rigid model's state."""
+    angles = tuple(f"theta_{name}" for name in places_of(assembly_of(config.walker, rigid=True)).names)
+    return (*angles, *(f"d{name}" for name in angles))
+
+
+def equation_sets(config: Config) -> tuple[Equations, ...]:
+    """The sets of equations that a config's walker has: Appendix A is a compass's."""
+    return ("corrected", "as-printed") if is_plain_compass(config.walker) else ("corrected",)

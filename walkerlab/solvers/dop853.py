@@ -74,8 +74,8 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 
 @inlined
-def try_step(method: Dop853, system: Any, t: float, y: State, k1: State, h: float) -> float:
-    """The step from y over h into `method.y`; returns its error relative to the tolerance."""
+def stages_of(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
+    """The stages that the solution, its error and dense output use (k1, k6 .. k12), the solution and its derivative."""
     k2 = derivative(system, t + C[1] * h, shifted(y, h, A_2, (k1,)))
     k3 = derivative(system, t + C[2] * h, shifted(y, h, A_3, (k1, k2)))
     k4 = derivative(system, t + C[3] * h, shifted(y, h, A_4, (k1, k3)))
@@ -89,29 +89,37 @@ def try_step(method: Dop853, system: Any, t: float, y: State, k1: State, h: floa
     k12 = derivative(system, t + h, shifted(y, h, A_12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
     used = (k1, k6, k7, k8, k9, k10, k11, k12)
     y_new = shifted(y, h, A_13, used)
-    k13 = derivative(system, t + h, y_new)
+    return used, y_new, derivative(system, t + h, y_new)
+
+
+@inlined
+def try_step(method: Dop853, system: Any, t: float, y: State, k1: State, h: float) -> float:
+    """The step from y over h into `method.y`; returns its error relative to the tolerance."""
+    used, y_new, k13 = stages_of(system, t, y, k1, h)
     method.counts[RHS] += STAGES
     store(y_new, method.y, 0)
-    store(k1, method.stages, K1)
-    store(k6, method.stages, K6)
-    store(k7, method.stages, K7)
-    store(k8, method.stages, K8)
-    store(k9, method.stages, K9)
-    store(k10, method.stages, K10)
-    store(k11, method.stages, K11)
-    store(k12, method.stages, K12)
+    for row in range(K13):
+        store(used[row], method.stages, row)
     store(k13, method.stages, K13)
     return abs(h) * error_norm(method, y, y_new, combine(ERROR_5, used), combine(ERROR_3, used))
 
 
 @inlined
-def error_norm(method: Dop853, y: State, y_new: State, by_order_5: State, by_order_3: State) -> float:
-    """Error of a step of length one relative to the tolerance: section II.10, formula (10.17)."""
+def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
+    """Sums of squares of both errors over the tolerance; `method` is whatever holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))
-        error_5 += (by_order_5[i] * scale) ** 2
-        error_3 += (by_order_3[i] * scale) ** 2
+        relative_5, relative_3 = by_order_5[i] * scale, by_order_3[i] * scale
+        error_5 += relative_5 * relative_5
+        error_3 += relative_3 * relative_3
+    return error_5, error_3
+
+
+@inlined
+def error_norm(method: Dop853, y: State, y_new: State, by_order_5: State, by_order_3: State) -> float:
+    """Error of a step of length one relative to the tolerance: section II.10, formula (10.17)."""
+    error_5, error_3 = error_sums(method, y, y_new, by_order_5, by_order_3)
     denominator = error_5 + 0.01 * error_3
     if denominator == 0.0:
         return 0.0

@@ -63,11 +63,16 @@ def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: f
 
     Returns NO_CROSSING if there is none.
     """
-    stack, ends = finder.stack, finder.ends
-    size = finder.nodes.size
     if not spans_zero(finder, signal):
         return NO_CROSSING
-    size = set_root_piece(finder, signal, zero_at_start)
+    return crossing_of_piece(finder, set_root_piece(finder, signal, zero_at_start), direction, after)
+
+
+@inlined
+def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
+    """`first_crossing` of the polynomial whose `size` Bernstein coefficients are at the bottom of the stack."""
+    stack, ends = finder.stack, finder.ends
+    ends[0, 0], ends[0, 1] = 0.0, 1.0
     top = 0
     while top >= 0:
         low, high = ends[top, 0], ends[top, 1]
@@ -116,9 +121,12 @@ def set_root_piece(finder: CrossingFinder, signal: int, zero_at_start: bool) -> 
         for j in range(size):
             total += finder.to_bernstein[i, j] * finder.values[signal, j]
         stack[0, i] = total
-    finder.ends[0, 0], finder.ends[0, 1] = 0.0, 1.0
-    if not zero_at_start:
-        return size
+    return without_zero_at_start(stack, size) if zero_at_start else size
+
+
+@inlined
+def without_zero_at_start(stack: Any, size: int) -> int:
+    """Divide a zero at the start out of the coefficients at the bottom of the stack; returns how many are left."""
     degree = size - 1
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i

@@ -180,12 +180,21 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: State, h: float) 
 
 @advance.case(ScipyMethod)
 def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
-    """One step of the solver, or the rest of one that was rewound, read off its dense output."""
+    """What is left of the solver's last step, if that was cut short or rewound, else its next; never beyond t_end."""
     clock = method.clock
-    if method.dense is not None and clock[T] < t_end <= method.dense.t_max:
-        method.y[:] = method.dense(t_end)
-        clock[T] = t_end
-        return STEP_DONE
+    if method.dense is None or method.solver.t <= clock[T]:
+        status = step_solver(method)
+        if status != STEP_DONE:
+            return status
+    solver = method.solver
+    clock[T_OLD], clock[T] = clock[T], min(solver.t, t_end)
+    method.y_old[:] = method.y
+    method.y[:] = solver.y if clock[T] == solver.t else method.dense(clock[T])
+    return STEP_DONE
+
+
+def step_solver(method: ScipyMethod) -> int:
+    """One step of the solver's own choice, with its dense output; returns what became of it."""
     if method.solver is None:
         return OUT_OF_BUDGET
     try:
@@ -193,15 +202,11 @@ def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
         if method.solver.status == "failed":
             return STEP_TOO_SMALL
         # some dense outputs evaluate the right-hand side too
-        dense = method.solver.dense_output()
+        method.dense = method.solver.dense_output()
     except OutOfBudgetError:
         return OUT_OF_BUDGET
     method.counts[ACCEPTED] += 1
-    method.dense = dense
-    clock[T_OLD], clock[T] = method.solver.t_old, min(method.solver.t, t_end)
-    method.y_old[:] = method.dense(method.solver.t_old)
-    method.y[:] = method.solver.y if clock[T] == method.solver.t else method.dense(clock[T])
-    clock[H_NEXT] = method.solver.t - method.solver.t_old
+    method.clock[H_NEXT] = method.solver.t - method.solver.t_old
     return STEP_DONE
 
 

@@ -10,18 +10,25 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from walkerlab.solvers.lanes import VECTOR, multiply_add, spread_over
+
 
 def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
     """Components of the sum of weights[j] vectors[j], as chains of fused multiply-adds."""
-    factors = cgutils.unpack_tuple(builder, weights)
     columns = [cgutils.unpack_tuple(builder, vector) for vector in cgutils.unpack_tuple(builder, vectors)]
+    factors = [like(builder, factor, columns[0][0]) for factor in cgutils.unpack_tuple(builder, weights)]
     sums = []
     for i in range(length):
         total = builder.fmul(factors[0], columns[0][i])
         for factor, column in zip(factors[1:], columns[1:], strict=True):
-            total = builder.fma(factor, column[i], total)
+            total = multiply_add(builder, factor, column[i], total)
         sums.append(total)
     return sums
+
+
+def like(builder: Any, number: Any, other: Any) -> Any:
+    """A number as it is, or in each lane where `other` is lanes."""
+    return spread_over(builder, number) if other.type == VECTOR else number
 
 
 @intrinsic
@@ -43,10 +50,11 @@ def shifted(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
         state, step, factors, columns = arguments
         sums = _sums(builder, factors, columns, y.count)
         start = cgutils.unpack_tuple(builder, state)
-        moved = [builder.fma(step, total, value) for total, value in zip(sums, start, strict=True)]
+        step = like(builder, step, start[0])
+        moved = [multiply_add(builder, step, total, value) for total, value in zip(sums, start, strict=True)]
         return context.make_tuple(builder, signature.return_type, moved)
 
-    return y(y, types.float64, weights, vectors), generate
+    return y(y, y.dtype, weights, vectors), generate
 
 
 def _element(context: Any, builder: Any, array_type: Any, array: Any, row: Any, length: int, i: int) -> Any:

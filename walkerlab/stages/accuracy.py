@@ -15,7 +15,7 @@ from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Climb, Row, climb, fini
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.config.schema import Config
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import compass_or_none, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
@@ -77,7 +77,9 @@ def scenes(config: Config, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     """The walks to measure by: rigid, and with a contact block the contact as it is and near the rigid limit."""
     state = inputs["fixedpoint"].summary["state"] if config.start == "fixed-point" else config.start
     start = (state[0], state[1], OFF_THE_GAIT * state[2], OFF_THE_GAIT * state[3])
-    yield RigidTrial(rigid_walker(config, config.equations), start, RIGID_STEPS)
+    yield RigidTrial(
+        rigid_walker(config, config.equations), start, RIGID_STEPS, compass_or_none(config, config.equations)
+    )
     if config.contact is None:
         return
     # contact code is loaded only for scenes that have contact

@@ -27,7 +27,7 @@ from walkerlab.paper.start_rows import start_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.paper.verdict import Row, Verdict
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import compass
 from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
 from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
@@ -112,7 +112,7 @@ def measure(config: Config, inputs: Mapping[str, Content], motion: Comparison) -
     models: dict[str, RigidModel] = {name: walk_gait(config, name, gait) for name, gait in found.items()}
     contact = contact_model(config, inputs["contact-sim"])
     return Measured(
-        walker=rigid_walker(config, config.equations),
+        walker=compass(config, config.equations),
         equations=config.equations,
         models=dict(models),
         spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
@@ -124,7 +124,7 @@ def measure(config: Config, inputs: Mapping[str, Content], motion: Comparison) -
 
 def walk_gait(config: Config, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
     """The rigid model walked from a stored fixed point."""
-    return rigid_model(rigid_walker(config, equations), as_state(gait["state"]))
+    return rigid_model(compass(config, equations), as_state(gait["state"]))
 
 
 def start_moved(model: RigidModel | None, start: State | None) -> bool:

@@ -6,21 +6,34 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.held import Knees
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
     MethodSettings,
+    by_channel,
     sampled_energies,
     sampled_feet,
     walk_contact,
 )
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, scene_measures, start_state
+from walkerlab.mechanics.rigid import places_of
+from walkerlab.mechanics.walkers import TORSO
+from walkerlab.scene.contact import (
+    ContactScene,
+    contact_gait,
+    contact_scene,
+    hinge_of,
+    scene_measures,
+    start_state,
+    wants_own_pitch,
+)
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
@@ -31,6 +44,7 @@ SAMPLES_PER_PENDULUM_TIME = 200
 RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
 TIME, LEG = "time", "leg"
+Floats = NDArray[np.float64]
 
 
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -69,13 +83,20 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
 def compile_kernels(config: Config) -> None:
     """Have everything compiled that `run` calls, by walks that may evaluate next to nothing: hinged and free."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    y = start_state(scene, (-HALF_ANGLE, HALF_ANGLE, 0.0, 0.0))
+    y = start_state(scene, standing(scene))
     settings = config.solver.contact
     methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, 1)
     interval = scene.frame.pendulum_time if config.outputs else None
     for pinned in dict.fromkeys((scene.pinned, None)):
         result = walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, y, methods, 1, interval)
         groups(config, scene, result)
+
+
+def standing(scene: ContactScene) -> tuple[float, ...]:
+    """A rigid state with the legs straight and apart, at rest."""
+    places = places_of(scene.assembly).names
+    angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
+    return (*angles, *(0.0 for _ in places))
 
 
 def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
@@ -104,7 +125,7 @@ def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, t
 def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
     """Step length (m) of the contact gait, if the pads are laid for it; raises NoAnswer if there is no such gait."""
     contact = config.contact
-    if contact is None or contact.pad_pitch != "own" or contact.terrain != "checkerboard":
+    if contact is None or not wants_own_pitch(contact):
         return None
     answer = contact_gait(config, rigid_step, rigid_state)
     if answer.gait is None:
@@ -125,8 +146,11 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
         "slips_m": slips.tolist(),
+        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else 0.0,
+        "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
-        "dissipated_J": dict(zip(("damping", "friction", "edges"), result.dissipated_J.tolist(), strict=True)),
+        "dissipated_J": by_channel(scene.walker, result.dissipated_J),
+        **knee_times(result),
         "rhs_evaluations": int(result.work[0]),
         "accepted_steps": int(result.work[1]),
         "rejected_steps": int(result.work[2]),
@@ -135,6 +159,11 @@ def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> d
         **scene_measures(scene),
         "left_out": list(of_contact_walk(config)),
     }
+
+
+def knee_times(result: ContactWalkResult) -> dict[str, Any]:
+    """When the swing leg's knee locked in each step (s), for walkers with knees."""
+    return {"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}
 
 
 def groups(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
@@ -154,7 +183,8 @@ def steps_group(result: ContactWalkResult) -> Group:
         ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
         ("touch_time_s", result.touch_time_s, "s", "time of the touch that ends the step"),
         ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
-        ("slip_m", result.slip_m, "m", "net slip of the stance foot from its touch to its lift"),
+        ("slip_m", result.slip_m, "m", "net slip of the stance foot's material from its touch to its lift"),
+        ("rolling_m", result.rolling_m, "m", "how far the stance foot rolled from its touch to its lift"),
     )
     variables = {"step": Variable(np.arange(result.touch_time_s.size), ("step",), "1", "step number")}
     variables |= {name: Variable(values, ("step",), units, text) for name, values, units, text in rows}
@@ -207,24 +237,61 @@ def trajectory_group(config: Config, scene: ContactScene, samples: ContactSample
 def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Angles and velocities of the legs, and where hip and feet are."""
     y, frame = samples.states, scene.frame
-    tilted = y[:, 2:4] + scene.walker.slope
+    n = len(frame.hip_x)
+    upper = [leg[0] for leg in scene.walker.legs]
+    tilted = y[:, 2 : 2 + n] + scene.walker.slope
     hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
     along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
     height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
-    return {
-        "angle": Variable(y[:, 2:4], (TIME, LEG), "rad", "angle of the leg from the vertical"),
-        "velocity": Variable(y[:, 6:8], (TIME, LEG), "rad/s", "angular velocity of the leg"),
+    legs = {
+        "angle": Variable(y[:, 2 : 2 + n][:, upper], (TIME, LEG), "rad", "angle of the leg from the vertical"),
+        "velocity": Variable(y[:, 4 + n :][:, upper], (TIME, LEG), "rad/s", "angular velocity of the leg"),
         "hip_along_m": Variable(along, (TIME,), "m", "position of the hip along the slope"),
         "hip_height_m": Variable(height, (TIME,), "m", "height of the hip over the slope"),
         "foot_along_m": Variable(feet[:, :, 0], (TIME, LEG), "m", "position of the foot along the slope"),
         "foot_height_m": Variable(feet[:, :, 1], (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
+    }
+    return legs | knee_variables(scene, y, along, height) | torso_variables(scene, y)
+
+
+def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height: Floats) -> dict[str, Variable]:
+    """Angles and velocities of the shanks, and where the knees are; nothing for straight legs."""
+    knees = scene.walker.knees
+    if not isinstance(knees, Knees):
+        return {}
+    n, names = len(scene.frame.hip_x), [body.name for body in scene.assembly.bodies]
+    shanks, per_leg = list(knees.shanks), (TIME, LEG)
+    along, height = np.zeros((y.shape[0], 2)), np.zeros((y.shape[0], 2))
+    for leg, (thigh, shank) in enumerate(zip(knees.thighs, knees.shanks, strict=True)):
+        hip = hinge_of(scene.assembly, names[thigh], names[knees.thighs[1 - leg]])
+        knee = hinge_of(scene.assembly, names[thigh], names[shank])
+        ahead, up = knee[0] - hip[0], knee[1] - hip[1]
+        s, c = np.sin(y[:, 2 + thigh] + scene.walker.slope), np.cos(y[:, 2 + thigh] + scene.walker.slope)
+        along[:, leg], height[:, leg] = hip_along + c * ahead - s * up, hip_height + s * ahead + c * up
+    return {
+        "shank_angle": Variable(y[:, 2 : 2 + n][:, shanks], per_leg, "rad", "angle of the shank from the vertical"),
+        "shank_velocity": Variable(y[:, 4 + n :][:, shanks], per_leg, "rad/s", "angular velocity of the shank"),
+        "knee_along_m": Variable(along, per_leg, "m", "position of the knee along the slope"),
+        "knee_height_m": Variable(height, per_leg, "m", "height of the knee over the slope"),
+    }
+
+
+def torso_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
+    """Angle and velocity of the torso, if there is one."""
+    names = [body.name for body in scene.assembly.bodies]
+    if TORSO not in names:
+        return {}
+    n, torso = len(names), names.index(TORSO)
+    return {
+        "torso_angle": Variable(y[:, 2 + torso], (TIME,), "rad", "angle of the torso from the vertical"),
+        "torso_velocity": Variable(y[:, 4 + n + torso], (TIME,), "rad/s", "angular velocity of the torso"),
     }
 
 
 def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Energies as the paper plots them, from the current stance foot, and the books from a fixed origin."""
     energies = np.zeros((samples.time_s.size, 3))
-    sampled_energies(scene.walker, samples.states, samples.carried, energies)
+    sampled_energies(scene.walker, samples.states, samples.carried, samples.knees, energies)
     walker = scene.walker
     row = np.arange(samples.time_s.size)
     foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]

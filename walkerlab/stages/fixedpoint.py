@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config, Equations
+from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.orbits.gait import Gait
-from walkerlab.scene.rigid import COORDINATES, rigid_walker
+from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 
@@ -33,7 +33,7 @@ COLUMNS = (
 
 def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Find the gaits of both sets of equations; raises NoAnswer if those of the config have none to walk."""
-    sets: tuple[Equations, ...] = get_args(Equations)
+    sets = equation_sets(config)
     progress.start("fixedpoint", len(sets))
     searches: dict[str, GaitSearch] = {}
     for equations in sets:
@@ -41,7 +41,7 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
         progress.advance()
     chosen = searches[config.equations]
     content = Content(
-        {f"{name}/gaits": gaits_group(search, config.slope_rad) for name, search in searches.items() if search.gaits},
+        {f"{name}/gaits": gaits_group(search, config) for name, search in searches.items() if search.gaits},
         summary(config, searches),
     )
     if chosen.gait is None:
@@ -52,7 +52,7 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
 def advice(config: Config) -> str:
     """What to do about a slope without a gait."""
     walk_anyway = (
-        "to walk there all the same, give a start state (start: [theta_1, theta_2, dtheta_1, dtheta_2]), and the "
+        f"to walk there all the same, give a start state (start: [{', '.join(coordinates(config))}]), and the "
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
     )
     if config.slope_rad <= 0.0:
@@ -63,7 +63,7 @@ def advice(config: Config) -> str:
 def summary(config: Config, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
     """What the command prints: the chosen gait of the config's equations, and both sets side by side."""
     sets = {name: set_summary(name, config.slope_rad, search) for name, search in searches.items()}
-    return {**sets[config.equations], "equation_sets": sets}
+    return {**sets[config.equations], "state_names": list(coordinates(config)), "equation_sets": sets}
 
 
 def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, Any]:
@@ -74,6 +74,7 @@ def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, A
         "equations": equations,
         "slope_rad": slope,
         "gaits_found": len(search.gaits),
+        "gaits": [listed(search, index) for index in range(len(search.gaits))],
         "reason": search.reason,
         "random_starts": search.random_starts,
         "random_hits": list(search.random_hits),
@@ -81,9 +82,18 @@ def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, A
     }
 
 
+def listed(search: GaitSearch, index: int) -> dict[str, Any]:
+    """One of the gaits found, and why it was or was not chosen."""
+    gait = search.gaits[index]
+    of_gait = gait_summary(gait)
+    return {**of_gait, "chosen": index == search.chosen, "objection": "; ".join(gait.objections)}
+
+
 def gait_summary(gait: Gait) -> dict[str, Any]:
     """One gait in SI units."""
+    knee = {} if gait.knee_strike is None else {"knee_strike_s": gait.knee_strike}
     return {
+        **knee,
         "state": list(gait.state),
         "multipliers": [[value.real, value.imag] for value in gait.multipliers],
         **{key: getattr(gait, attribute) for key, attribute, _, _ in COLUMNS},
@@ -91,7 +101,7 @@ def gait_summary(gait: Gait) -> dict[str, Any]:
     }
 
 
-def gaits_group(search: GaitSearch, slope: float) -> Group:
+def gaits_group(search: GaitSearch, config: Config) -> Group:
     """Every gait found, one row each."""
     gaits = search.gaits
     states = np.array([gait.state for gait in gaits])
@@ -100,7 +110,7 @@ def gaits_group(search: GaitSearch, slope: float) -> Group:
     objections = np.array(["; ".join(gait.objections) for gait in gaits])
     variables = {
         "gait": Variable(np.arange(len(gaits)), GAIT, "1", "gait, shortest period first"),
-        "coordinate": Variable(np.array(COORDINATES), ("coordinate",), "", "coordinate of the state"),
+        "coordinate": Variable(np.array(coordinates(config)), ("coordinate",), "", "coordinate of the state"),
         "state": Variable(states, ("gait", "coordinate"), "rad, rad/s", "state just after heel strike"),
         "multiplier_real": Variable(multipliers.real, ("gait", "multiplier"), "1", "multiplier, real part"),
         "multiplier_imag": Variable(multipliers.imag, ("gait", "multiplier"), "1", "multiplier, imaginary part"),
@@ -110,5 +120,12 @@ def gaits_group(search: GaitSearch, slope: float) -> Group:
     }
     for key, attribute, units, text in COLUMNS:
         variables[key] = Variable(np.array([getattr(gait, attribute) for gait in gaits]), GAIT, units, text)
-    attrs: dict[str, Any] = {"slope_rad": slope, "reason": search.reason, "random_starts": search.random_starts}
+    attrs: dict[str, Any] = {
+        "slope_rad": config.slope_rad,
+        "reason": search.reason,
+        "random_starts": search.random_starts,
+    }
+    if gaits[0].knee_strike is not None:
+        times = np.array([gait.knee_strike for gait in gaits])
+        variables["knee_strike_s"] = Variable(times, GAIT, "s", "time of the knee strike after the heel strike")
     return Group(variables, attrs if search.chosen is None else {**attrs, "chosen": search.chosen})

@@ -45,6 +45,7 @@ class Stage:
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
     reads          keys of the config that its result depends on; it is shown no others
+    reads_of_paper keys of the built-in paper config on which its own cases stand
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
@@ -53,7 +54,9 @@ class Stage:
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
+    on_demand      whether only its own command runs it; nothing is stale without it
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -61,6 +64,7 @@ class Stage:
     module: str
     purpose: str
     reads: tuple[str, ...]
+    reads_of_paper: tuple[str, ...] = ()
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
@@ -69,8 +73,15 @@ class Stage:
     has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
+    on_demand: bool = False
     keeps_parts: bool = False
+    follows: bool = False
     does_without: Lacks = nothing
+
+    @property
+    def optional(self) -> bool:
+        """Whether it runs only if the user asks for it."""
+        return self.on_demand or bool(self.campaign_of)
 
 
 class Graph:
@@ -101,7 +112,8 @@ class Graph:
 
 
 MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
-EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "seed")
+PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
+EVERYTHING = ("name", *MODEL, "contact", "solver", "tune", "stability", "continuation", "basin", "seed")
 
 PIPELINE = Graph(
     Stage(
@@ -162,12 +174,14 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         needs_contact=True,
+        on_demand=True,
     ),
     Stage(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
+        reads_of_paper=PAPERS_WALK,
         has_cells=True,
     ),
     Stage(
@@ -175,8 +189,26 @@ PIPELINE = Graph(
         "walkerlab.stages.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; goes on where it was interrupted.",
         reads=("stability.map_cells",),
+        reads_of_paper=PAPERS_WALK,
         has_cells=True,
         campaign_of="stability",
+        keeps_parts=True,
+    ),
+    Stage(
+        "continuation",
+        "walkerlab.stages.continuation",
+        "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
+        reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        follows=True,
+    ),
+    Stage(
+        "basin",
+        "walkerlab.stages.basin",
+        "Map which starts come to which attractor, and which fall; goes on where it was interrupted.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact", "solver.contact", "basin", "seed"),
+        inputs=results_of("fixedpoint"),
+        has_cells=True,
+        on_demand=True,
         keeps_parts=True,
     ),
     Stage(
@@ -185,7 +217,7 @@ PIPELINE = Graph(
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "engines", "tune", "stability-maps"),
+        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
         draws=True,
     ),
     Stage(
@@ -194,7 +226,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("engines", "stability-maps"),
+        if_current=("engines", "stability-maps", "continuation", "basin"),
         draws=True,
     ),
 )

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from walkerlab.config.canonical import slice_of
+from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
 from walkerlab.store.code import Sources
+from walkerlab.store.elsewhere import Elsewhere, find_elsewhere
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
 from walkerlab.store.runfolder import RunFolder
@@ -44,6 +46,7 @@ class Step:
     identity  what its result is determined by; None if it is left out
     found     what is stored now, if it is intact: the result to reuse, or an outdated one
     damaged   a file is stored that is not to be trusted
+    origin    where the result to reuse lies, if that is another run's folder
     """
 
     stage: Stage
@@ -52,17 +55,30 @@ class Step:
     identity: Identity | None = None
     found: Stored | None = None
     damaged: bool = False
+    origin: Elsewhere | None = None
 
 
 class Planner:
     """Decides on stages one after another, knowing what became of those before."""
 
-    def __init__(self, config: Config, folder: RunFolder, graph: Graph = PIPELINE, force: bool = False) -> None:
-        """Begin with nothing decided; `force` has every stage run that is not left out."""
+    def __init__(
+        self,
+        config: Config,
+        folder: RunFolder,
+        graph: Graph = PIPELINE,
+        force: bool = False,
+        elsewhere: bool = True,
+    ) -> None:
+        """Begin with nothing decided.
+
+        force      every stage runs that is not left out
+        elsewhere  results in other run folders are reused too
+        """
         self.config = config
         self.folder = folder
         self.graph = graph
         self.force = force
+        self.elsewhere = elsewhere
         self.left_out: dict[str, str] = {}
         self.results: dict[str, Stored] = {}
         self._keys: dict[str, str] = {}
@@ -74,7 +90,7 @@ class Planner:
         for stage in stages:
             self.look_at_current(stage, stages)
             step = self.decide(stage)
-            if not (stage.campaign_of and step.action == "run"):  # a campaign is counted on once it is there
+            if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
                 self.expect(step)
             steps.append(step)
         return tuple(steps)
@@ -84,7 +100,7 @@ class Planner:
         for name in stage.if_current:
             if self.graph[name] not in planned:
                 step = self._judge(self.graph[name], force=False)
-                if step.action == "reuse":
+                if step.action == "reuse" and step.origin is None:
                     self.expect(step)
 
     def decide(self, stage: Stage) -> Step:
@@ -124,7 +140,7 @@ class Planner:
             return Step(stage, "leave out", why)
         identity = Identity(
             stage=stage.name,
-            config_slice=slice_of(self.config, stage.reads),
+            config_slice=config_slice(self.config, stage),
             input_keys=self._input_keys(stage),
             code_digest=self._sources.code_digest(stage.module),
         )
@@ -133,12 +149,24 @@ class Planner:
         if reason is None and verdict.artifact is not None:
             kept = "up to date" if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
             return Step(stage, "reuse", kept, identity, verdict.artifact)
+        origin = None if force else self._elsewhere(stage, identity)
+        if origin is not None:
+            reason = f"the same as in {origin.path.parent}"
+            return Step(stage, "reuse", reason, identity, origin.result, verdict.damaged, origin)
         return Step(stage, "run", reason or "--force", identity, verdict.artifact, verdict.damaged)
+
+    def _elsewhere(self, stage: Stage, identity: Identity) -> Elsewhere | None:
+        """The result of a stage in another run folder; drawings stand beside their artifact and are made anew."""
+        if not self.elsewhere or stage.draws:
+            return None
+        found = find_elsewhere(self.folder, stage.name, identity.key)
+        return found if found is not None and self._made_anew(stage, found.result) is None else None
 
     def _why_absent(self, name: str) -> str:
         main = self.graph[name].campaign_of
-        if main:
-            return self.left_out.get(name, f"it was not asked for; `walkerlab {main} --full` makes it")
+        if self.graph[name].optional:
+            command = f"{main} --full" if main else name
+            return self.left_out.get(name, f"it was not asked for; `walkerlab {command}` makes it")
         return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
 
     def _why_left_out(self, stage: Stage) -> str | None:
@@ -165,10 +193,20 @@ class Planner:
         broken = broken_file(self.folder.path, found)
         if broken is not None:
             return broken
+        return self._made_anew(stage, found)
+
+    def _made_anew(self, stage: Stage, found: Stored) -> str | None:
+        """What of a result's inputs has another content than it was made with, in words."""
         for name, result in self.inputs(stage).items():
             if found.provenance.input_digests.get(name) != input_digest(stage, result):
                 return f"input {name} was made anew"
         return None
+
+
+def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
+    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on."""
+    own = slice_of(config, stage.reads)
+    return own | {"paper": slice_of(paper_config(), stage.reads_of_paper)} if stage.reads_of_paper else own
 
 
 def input_digest(stage: Stage, result: Stored) -> str:
@@ -190,5 +228,5 @@ def plan(
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
-    """What running each stage there is would do; touches nothing."""
-    return Planner(config, folder, graph).plan(graph.stages)
+    """What is stored in a run's own folder, and what running each stage there is would do; touches nothing."""
+    return Planner(config, folder, graph, elsewhere=False).plan(graph.stages)

@@ -20,6 +20,7 @@ from walkerlab.stages.progress import Reporter, Silent
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
+from walkerlab.store.elsewhere import take_over
 from walkerlab.store.files import drawing_into
 from walkerlab.store.parts import Parts
 from walkerlab.store.runfolder import RunFolder
@@ -90,7 +91,7 @@ def execute(
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
     run = Run(planner, reporter or Silent(), jobs)
-    if any(step.action == "run" for step in steps):
+    if any(step.action == "run" or step.origin is not None for step in steps):
         with folder.locked(wait, run.reporter.note):
             # Decided anew, stage by stage: another process may have worked here until now.
             run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
@@ -158,11 +159,13 @@ class Run:
             self.later = stages[index + 1 :]
             self.planner.look_at_current(stage, stages)
             step = self.planner.decide(stage)
-            if step.damaged:
+            if step.damaged and step.origin is None:
                 self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
             if step.action == "run":
                 self._run(step)
             else:
+                if step.origin is not None:
+                    take_over(step.origin, self.folder.artifact(stage.name))
                 self.planner.expect(step)
                 self.skip(step)
 
@@ -260,11 +263,11 @@ class Run:
     def _left_out(self, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
         """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
 
-        A campaign that nobody asked for was not left out; a drawing says all the same that there is one.
+        What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
         """
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
-        found = [entry for entry in found if not graph[entry.what].campaign_of]
+        found = [entry for entry in found if not graph[entry.what].optional]
         found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         entries = [*by_stage]
         for done in self.done:

@@ -10,9 +10,9 @@ import numpy as np
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state, take_walk
-from walkerlab.hybrid.rigid_measures import energies, reactions
+from walkerlab.hybrid.rigid_measures import energies, places, reactions
 from walkerlab.scene.left_out import of_rigid_walk
-from walkerlab.scene.rigid import COORDINATES, RigidScene, rigid_scene
+from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -53,6 +53,7 @@ def summary(config: Config, walk: RecordedWalk) -> dict[str, Any]:
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio,
         "max_scuff_depth_m": walk.max_scuff_depth,
+        **({} if walk.knee_strikes is None else {"knee_strike_times_s": walk.knee_strikes.tolist()}),
         "rhs_evaluations": walk.work.rhs_evaluations,
         "accepted_steps": walk.work.accepted,
         "rejected_steps": walk.work.rejected,
@@ -66,19 +67,19 @@ def groups(scene: RigidScene, walk: RecordedWalk) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored = {}
     if walk.steps:
-        stored["steps"] = steps_group(walk)
+        stored["steps"] = steps_group(scene, walk)
     if walk.samples is not None and walk.samples.time.size:
-        stored["trajectory"] = trajectory_group(scene, walk.samples)
+        stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
     return stored
 
 
-def steps_group(walk: RecordedWalk) -> Group:
+def steps_group(scene: RigidScene, walk: RecordedWalk) -> Group:
     """One row a step."""
     states = (STEP, "coordinate")
     return Group(
         {
             STEP: Variable(np.arange(walk.steps), (STEP,), "1", "step number"),
-            "coordinate": Variable(np.array(COORDINATES), ("coordinate",), "", "coordinate of the state"),
+            "coordinate": Variable(np.array(scene.names), ("coordinate",), "", "coordinate of the state"),
             "period_s": Variable(walk.periods, (STEP,), "s", "time from heel strike to heel strike"),
             "length_m": Variable(walk.lengths, (STEP,), "m", "distance between the feet at heel strike"),
             "heel_strike_time_s": Variable(walk.heel_strikes, (STEP,), "s", "time of the heel strike at the end"),
@@ -88,7 +89,7 @@ def steps_group(walk: RecordedWalk) -> Group:
     )
 
 
-def trajectory_group(scene: RigidScene, samples: Samples) -> Group:
+def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) -> Group:
     """Samples of the walk, both sides of each heel strike among them: what `outputs` asks for."""
     # leg 0 swings in even steps, leg 1 in odd ones
     stance = 1 - samples.step % 2
@@ -99,10 +100,12 @@ def trajectory_group(scene: RigidScene, samples: Samples) -> Group:
     }
     if scene.states:
         variables |= leg_variables(samples, stance)
+        variables |= body_variables(scene, samples, stance)
+        variables |= place_variables(scene, walk, samples, stance)
     if scene.energies:
         variables |= energy_variables(energies(scene.walker, samples.state))
     if scene.forces:
-        force = reactions(scene.walker, samples.state)
+        force = reactions(scene.walker, samples.state, samples.bent)
         variables |= {
             "tangential_force_N": Variable(force[:, 0], (TIME,), "N", "force of the ground along the slope, downhill"),
             "normal_force_N": Variable(force[:, 1], (TIME,), "N", "force of the ground normal to the slope"),
@@ -112,14 +115,55 @@ def trajectory_group(scene: RigidScene, samples: Samples) -> Group:
 
 def leg_variables(samples: Samples, stance: Any) -> dict[str, Variable]:
     """Angles and velocities of the legs themselves, which change roles at every heel strike."""
-    as_leg = np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]])
-    angle = np.take_along_axis(samples.state[:, :2], as_leg, axis=1)
-    velocity = np.take_along_axis(samples.state[:, 2:], as_leg, axis=1)
+    n = samples.state.shape[1] // 2
+    angle = of_legs(samples.state[:, :2], stance)
+    velocity = of_legs(samples.state[:, n : n + 2], stance)
     return {
         LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
         "angle": Variable(angle, (TIME, LEG), "rad", "angle of the leg from the vertical"),
         "velocity": Variable(velocity, (TIME, LEG), "rad/s", "angular velocity of the leg"),
     }
+
+
+def of_legs(by_role: Any, stance: Any) -> Any:
+    """Numbers (samples, 2) of swing and stance leg as those of leg 0 and leg 1."""
+    return np.take_along_axis(by_role, np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]]), axis=1)
+
+
+def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str, Variable]:
+    """Angles and velocities of the bodies below and above the legs: shanks, a torso."""
+    n, found = samples.state.shape[1] // 2, {}
+    for k, name in enumerate(scene.names[2:n], 2):
+        angle, rate = samples.state[:, k], samples.state[:, n + k]
+        body = name.split("_")[-1]
+        if name.startswith("theta_1_"):  # the stance leg's is in line with it
+            legs = of_legs(np.column_stack((angle, samples.state[:, 1])), stance)
+            rates = of_legs(np.column_stack((rate, samples.state[:, n + 1])), stance)
+            found[f"{body}_angle"] = Variable(legs, (TIME, LEG), "rad", f"angle of the leg's {body} from the vertical")
+            found[f"{body}_velocity"] = Variable(rates, (TIME, LEG), "rad/s", f"angular velocity of the leg's {body}")
+        else:
+            found[f"{body}_angle"] = Variable(angle, (TIME,), "rad", f"angle of the {body} from the vertical")
+            found[f"{body}_velocity"] = Variable(rate, (TIME,), "rad/s", f"angular velocity of the {body}")
+    return found
+
+
+def place_variables(scene: RigidScene, walk: RecordedWalk, samples: Samples, stance: Any) -> dict[str, Variable]:
+    """Where hip, knees and feet are, along the slope from the first foothold and over it."""
+    at = places(scene.walker, scene.knee_m, walk, samples)
+    ground = np.zeros_like(at.contact)
+    foot_along = of_legs(np.column_stack((at.swing_foot[:, 0], at.contact)), stance)
+    foot_height = of_legs(np.column_stack((at.swing_foot[:, 1], ground)), stance)
+    found = {
+        "hip_along_m": Variable(at.hip[:, 0], (TIME,), "m", "position of the hip along the slope"),
+        "hip_height_m": Variable(at.hip[:, 1], (TIME,), "m", "height of the hip over the slope"),
+        "foot_along_m": Variable(foot_along, (TIME, LEG), "m", "position of the foot along the slope"),
+        "foot_height_m": Variable(foot_height, (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
+    }
+    if at.knees is not None:
+        along, height = (of_legs(at.knees[:, :, axis], stance) for axis in range(2))
+        found["knee_along_m"] = Variable(along, (TIME, LEG), "m", "position of the knee along the slope")
+        found["knee_height_m"] = Variable(height, (TIME, LEG), "m", "height of the knee over the slope")
+    return found
 
 
 def energy_variables(parts: Any) -> dict[str, Variable]:

@@ -78,6 +78,7 @@ def case_row(case: CaseResult) -> dict[str, Any]:
         "wall_s": case.wall_s,
         "note": "; ".join(case.failures),
         "measures": measures,
+        "not_measured": [{"measure": one.measure, "why": one.why} for one in case.not_measured],
         "second_method": case.second_method,
         "second_tried": case.second_tried,
     }

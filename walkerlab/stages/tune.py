@@ -14,7 +14,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.orbits.scaled_starts import (
     Adjustment,
@@ -119,7 +119,7 @@ class Stage:
         """Nothing is walked yet."""
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.steps = 2 * config.strides
-        self.rigid: RigidWalker = rigid_walker(config, config.equations)
+        self.rigid: Standing = rigid_walker(config, config.equations)
         self.starts = self.scaled()
 
     def findings(self, progress: Progress, jobs: int) -> Findings:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.contact_run import CHANNELS, OF_STRAIGHT_LEGS, ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.orbits.contact_section import ContactGait
@@ -111,7 +111,7 @@ def gait_summary(found: Findings) -> dict[str, Any]:
         "stable": gait.stable,
         "slip_m": step.slip_m,
         "residual": gait.residual,
-        "lost_J": dict(zip(("damping", "friction", "edges"), step.books_J.tolist(), strict=True)),
+        "lost_J": dict(zip(CHANNELS[:OF_STRAIGHT_LEGS], step.books_J[:OF_STRAIGHT_LEGS].tolist(), strict=True)),
         "height_lost_J": step.height_lost_J,
         "balance_J": float(step.books_J.sum() - step.height_lost_J),
     }

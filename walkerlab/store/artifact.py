@@ -26,6 +26,16 @@ SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
 SEAL_BYTES = 83
 
 
+ROOT_ATTRIBUTES = frozenset(
+    {
+        "stage", "stage_key", "schema_version", "config_slice", "input_keys", "code_digest", "config", "command_line",
+        "seed", "started_utc", "ended_utc", "platform", "package_version", "library_versions", "git_commit",
+        "input_digests", "summary_json", "summary_timed", "content_digest", "complete",
+    }
+)  # fmt: skip
+"""What every artifact says of itself; a content with arrays at the root may say more there."""
+
+
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
     """A file is not an artifact that can be trusted; the text says why."""
 
@@ -68,7 +78,11 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
     Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
     """
-    image = hdf5.image(content.groups, root_attributes(content, identity, provenance, complete))
+    root = root_attributes(content, identity, provenance, complete)
+    own = content.groups[""].attrs if "" in content.groups else {}
+    if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
+        raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
+    image = hdf5.image(content.groups, {**root, **own})
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image + f"\nwalkerlab sha256 {seal}\n".encode())
     return Stored(
@@ -160,6 +174,9 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
     """The artifact made of a file's parts; Damaged if they do not agree with its content digest and key."""
     if root.get("schema_version") != SCHEMA_VERSION:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
+    own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
+    if "" in groups:
+        groups = {**groups, "": Group(groups[""].variables, own)}
     identity = Identity(
         stage=root["stage"],
         config_slice=json.loads(root["config_slice"]),

@@ -13,11 +13,13 @@ from walkerlab.store.runfolder import RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html")
 """What the drawing stages write, for the case that the index of it is gone."""
+SWEPT = ("sweep-*.h5", "sweep-*.csv", "sweep-chunks/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
+COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
     """The artifacts of these stages, the files that they list, and what killed writers left; those that exist."""
-    found = {path for pattern in (*DRAWN, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
+    found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     for stage in stages:
         found |= {folder.artifact(stage), folder.parts(stage)}
         found.update(listed_files(folder, stage))
@@ -35,12 +37,13 @@ def listed_files(folder: RunFolder, stage: str) -> Iterator[Path]:
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
-    """Remove files of a run folder, and its folder of figures once it is empty; to be called under its lock.
+    """Remove files of a run folder, and its inner folders once they are empty; to be called under its lock.
 
     Raises StorageError if the system refuses.
     """
     for path in files:
         with storing(path):
             path.unlink(missing_ok=True)
-    with contextlib.suppress(OSError):
-        folder.figures.rmdir()
+    for emptied in (folder.figures, folder.path / "sweep-chunks"):
+        with contextlib.suppress(OSError):
+            emptied.rmdir()

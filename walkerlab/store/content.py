@@ -50,8 +50,6 @@ class Variable:
             raise ValueError(f"{self.long_name!r}: shape {values.shape} does not go with dimensions {self.dims}")
         if values.dtype.kind == "f" and not self.missing and not np.isfinite(values).all():
             raise ValueError(f"{self.long_name!r} holds values that are not finite; leave out what was not computed")
-        if values.dtype.kind == "O" and values.ndim > 1:
-            raise ValueError(f"{self.long_name!r}: text has at most one dimension")
         check_text(self.units, self.long_name)
 
 
@@ -93,7 +91,7 @@ class Group:
 class Content:
     """Everything that a stage stores.
 
-    groups   by path, such as 'corrected/gaits'; the groups above one are there too, if only empty
+    groups   by path, such as 'corrected/gaits', '' for the file's root; groups above one are there too, if only empty
     summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     timed    further top-level keys of the summary that follow from timings, such as 'best'
 
@@ -110,7 +108,7 @@ class Content:
         object.__setattr__(self, "timed", tuple(sorted(self.timed)))
         check_text(*self.summary, *self.timed)
         object.__setattr__(self, "groups", with_parents(self.groups))
-        for path in self.groups:
+        for path in filter(None, self.groups):
             above, _, name = path.rpartition("/")
             check_name(name)
             parent = self.groups.get(above, Group({}))

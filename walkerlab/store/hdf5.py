@@ -30,7 +30,7 @@ def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
         for name, value in root.items():
             file.attrs[name] = value
         for path, group in sorted(content.items()):
-            write_group(file.require_group(path), group)
+            write_group(file.require_group(path) if path else file, group)
         file.flush()
         return bytes(file.id.get_file_image())
 
@@ -119,7 +119,7 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
     if path:
         yield path, Group(variables, dict(read_attributes(parent)))
     elif variables:
-        raise ValueError("it holds arrays outside any group")
+        yield path, Group(variables)
 
 
 def is_bare_dimension(dataset: Any) -> bool:
@@ -162,13 +162,14 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     """The strings of a dataset, a few at a time: many may point to one long text."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
-    if dataset.ndim > 1:
-        raise ValueError("it holds text in more than one dimension, which is not written here")
-    values = np.empty(dataset.size, dtype=object)
-    for start in range(0, dataset.size, STRINGS_AT_ONCE):
-        texts = dataset[start : start + STRINGS_AT_ONCE]
-        budget.spend(sum(len(text) for text in texts))
-        values[start : start + STRINGS_AT_ONCE] = [text.decode() for text in texts]
+    values = np.empty(dataset.shape, dtype=object)
+    # along the last dimension, of which a sweep of one parameter has all its points
+    for row in np.ndindex(dataset.shape[:-1]):
+        for start in range(0, dataset.shape[-1], STRINGS_AT_ONCE):
+            part = (*row, slice(start, start + STRINGS_AT_ONCE))
+            texts = dataset[part]
+            budget.spend(sum(len(text) for text in texts))
+            values[part] = [text.decode() for text in texts]
     return values
 
 

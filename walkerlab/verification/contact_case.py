@@ -15,10 +15,10 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import Method, method_named
 from walkerlab.solvers.stepping import ACCEPTED, RHS
 from walkerlab.verification.contact_start import Prepared, prepared
-from walkerlab.verification.momentum import momentum_findings
+from walkerlab.verification.momentum import MEASURE, momentum_finding
 from walkerlab.verification.scaling import pendulum_time, scaled, to_twin
 from walkerlab.verification.second_method import Second, promised, second_walk
-from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, finite
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, NotMeasured, finite
 
 TENFOLD = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
@@ -66,9 +66,9 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
     wall_s = time.perf_counter() - started
     findings = [*of_one_run(result, ready, case)]
     remarks: list[str] = []
+    momentum = momentum_of(result, ready, config, case)
     second: Second[ContactWalkResult] = Second("", None, f"the walk itself ended {result.outcome.label}")
     if result.outcome.answered:
-        findings += momentum_findings(ready, config, case) if result.end_time_s > 0.0 else []
         second = walked_otherwise(ready, config, case)
         for what, again, unit in compared_walks(ready, config, case, second):
             findings.append(time_difference(what, result, pendulum_time(config), again, unit, case, config))
@@ -84,11 +84,19 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
         residual_J=finite(result.energy_balance_residual_J),
         rhs_evaluations=int(result.work[RHS]),
         wall_s=wall_s,
-        findings=tuple(findings),
+        findings=(*findings, momentum) if isinstance(momentum, Finding) else tuple(findings),
         remarks=tuple(remarks),
         second_method=second.method,
         second_tried=second.tried,
+        not_measured=(momentum,) if isinstance(momentum, NotMeasured) else (),
     )
+
+
+def momentum_of(result: ContactWalkResult, ready: Prepared, config: Config, case: Case) -> Finding | NotMeasured:
+    """The momentum's balance of a walk that has an outcome and a length."""
+    if not result.outcome.answered or result.end_time_s <= 0.0:
+        return NotMeasured(MEASURE, f"the walk ended as {result.outcome.label}")
+    return momentum_finding(ready, config, case)
 
 
 def compared_walks(

@@ -8,9 +8,9 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.mechanics.rigid_compass import step_length
+from walkerlab.mechanics.standing import swing_foot
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State
 
@@ -37,7 +37,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
         rigid_state, length = tuple(float(x) for x in gait.state), float(gait.step_length)
     else:
         rigid_state = config.start
-        length = abs(float(step_length(walker, rigid_state[1], rigid_state[0])))
+        length = abs(float(swing_foot(walker, rigid_state)[1]))
     own = own_pitch(config, length, rigid_state)
     if own is None:
         return None
@@ -55,7 +55,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
 def own_pitch(config: Config, rigid_step_m: float, rigid_state: State) -> float | None:
     """What pads of the contact gait's own pitch are laid for (m), if the case wants them; None if there is no gait."""
     contact = config.contact
-    if contact is None or contact.pad_pitch != "own":
+    if contact is None or not wants_own_pitch(contact):
         return rigid_step_m
     found = contact_gait(config, rigid_step_m, rigid_state).gait
     return None if found is None else found.step.length_m

@@ -27,14 +27,18 @@ from walkerlab.hybrid.contact_run import (
     run_parts,
     sampled_feet,
 )
+from walkerlab.mechanics.assembly import Anchor, levers, masses, total_mass
+from walkerlab.mechanics.parts import Assembly
+from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.stepping import ACCEPTED
 from walkerlab.verification.contact_start import Prepared
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.second_method import MAGNIFIED, promised
-from walkerlab.verification.verdict import Finding, finite
+from walkerlab.verification.verdict import Finding, NotMeasured, finite
 
 Array = NDArray[np.float64]
+MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
@@ -60,19 +64,28 @@ class Balance:
     steps: int
 
 
-def momentum_findings(ready: Prepared, config: Config, case: Case) -> list[Finding]:
-    """Momentum against impulse; nothing for a hinged start, whose hinge pushes too, or where impulses are not known.
+def momentum_finding(ready: Prepared, config: Config, case: Case) -> Finding | NotMeasured:
+    """Momentum against impulse, or why it cannot be judged.
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
     """
     if ready.scene.pinned is not None:
-        return []
+        return NotMeasured(MEASURE, "the hinge pushes too")
     found = momentum_balance(ready, config, case)
     unknown = found.unsure + found.unresolved
     if unknown > MOST_UNKNOWN:
-        return []
+        return NotMeasured(MEASURE, why_unknown(found))
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
-    return [Finding("momentum not given by ground and gravity, over the walker's", finite(found.residual), limit)]
+    return Finding(MEASURE, finite(found.residual), limit)
+
+
+def why_unknown(found: Balance) -> str:
+    """What keeps the impulses of a balance from being known."""
+    shares = {
+        "the impulses' sums do not settle": found.unsure,
+        "friction hangs on slip velocities below the tolerance": found.unresolved,
+    }
+    return " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
 
 
 def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
@@ -173,17 +186,26 @@ def impulse_rate(samples: ContactSamples, ready: Prepared, config: Config) -> Ar
 
 def momentum(samples: ContactSamples, config: Config) -> Array:
     """Momentum along and up from the slope (kg m/s) and about a point of the slope (kg m^2/s), at intervals' ends."""
-    walker = config.walker
+    parts = assembly_of(config.walker)
+    n = len(parts.bodies)
     y = samples.states[::2]
-    angle, rate = y[:, 2:4] + config.slope_rad, y[:, 6:8]
-    up = np.stack([-np.sin(angle), np.cos(angle)], axis=2)  # samples, legs, axes: from foot to hip
-    turned = np.stack([-up[:, :, 1], up[:, :, 0]], axis=2) * rate[:, :, None]
-    b = walker.mass_to_hip_m
-    share = walker.leg_mass_kg * b / walker.total_mass_kg
-    hip, hip_velocity = y[:, 0:2] + share * up.sum(axis=1), y[:, 4:6] + share * turned.sum(axis=1)
-    masses = [(walker.hip_mass_kg, hip, hip_velocity)]
-    masses += [(walker.leg_mass_kg, hip - b * up[:, leg], hip_velocity - b * turned[:, leg]) for leg in range(2)]
-    spin = walker.leg_inertia_kg_m2 * rate.sum(axis=1)
-    linear = sum((mass * velocity for mass, _, velocity in masses), np.zeros_like(hip))
-    turning = sum((mass * (r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0]) for mass, r, v in masses), spin)
+    angle, rate = y[:, 2 : 2 + n] + config.slope_rad, y[:, 4 + n :]
+    s, c = np.sin(angle), np.cos(angle)
+    spin = rate @ np.array([body.inertia_kg_m2 for body in parts.bodies])
+    linear, turning = np.zeros((len(y), 2)), spin
+    for mass, d in levers_from_centre(parts):
+        arm = np.stack([c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]], axis=2)  # samples, bodies, axes
+        turned = np.stack([-arm[:, :, 1], arm[:, :, 0]], axis=2) * rate[:, :, None]
+        r, v = y[:, 0:2] + arm.sum(axis=1), y[:, 2 + n : 4 + n] + turned.sum(axis=1)
+        linear = linear + mass * v
+        turning = turning + mass * (r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0])
     return np.column_stack([linear, turning])
+
+
+def levers_from_centre(parts: Assembly) -> list[tuple[float, Array]]:
+    """Every mass (kg) and its levers (bodies, 2) in m from the walker's centre of mass."""
+    first = parts.bodies[0]
+    root = Anchor(first.name, first.centre_m)
+    found = [(mass, levers(parts, root, at)) for mass, at in masses(parts)]
+    centre = sum((mass * d for mass, d in found), np.zeros((len(parts.bodies), 2))) / total_mass(parts)
+    return [(mass, d - centre) for mass, d in found]

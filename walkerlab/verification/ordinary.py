@@ -22,7 +22,6 @@ from walkerlab.ground.on_pads import OnPads
 from walkerlab.ground.terrain import AfterMidSwing
 from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
-from walkerlab.scene.rigid import SWING_EQUATIONS
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
@@ -94,7 +93,7 @@ def rigid_choices(case: Case, config: Config) -> tuple[Choice, ...]:
         return ()
     name, rtol, atol = RIGID_REFERENCE
     walk = take_walk(
-        ready.walker, method_named(name).new(SWING_EQUATIONS, rtol, atol, case.budget), ready.start, case.steps
+        ready.walker, method_named(name).new(len(ready.walker.blank), rtol, atol, case.budget), ready.start, case.steps
     )
     if not walk.steps:
         return ()
@@ -108,7 +107,7 @@ def script(case: str, method: str, ready: RigidPrepared, walk: RecordedWalk, uni
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
-            y, count = walk_as_a_script(ready.walker, ready.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
+            y, count = walk_as_a_script(ready.compass, ready.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
         except (ValueError, np.linalg.LinAlgError):
             y, count = None, CAP
     wall_s = time.perf_counter() - began

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
-from walkerlab.mechanics.rigid_compass import RigidWalker
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.scene.rigid import SWING_EQUATIONS, rigid_walker
+from walkerlab.paper.appendix_a import RigidWalker
+from walkerlab.scene.rigid import compass, rigid_walker
 from walkerlab.solvers.registry import Method, method_named
 from walkerlab.solvers.system import State
 from walkerlab.verification.contact_case import TENFOLD, outcome_differs, without_start
@@ -30,7 +31,8 @@ ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to chan
 class Prepared:
     """A walker and the state that it starts from."""
 
-    walker: RigidWalker
+    walker: Standing
+    compass: RigidWalker  # what its momenta and energies are summed up from
     start: State
     energy: float  # J, m g L and the kinetic energy of the start
 
@@ -45,9 +47,10 @@ def prepared(config: Config) -> Prepared | None:
         start: State = as_state(gait.state)
     else:
         start = config.start
-    mass = walker.hip_mass + 2.0 * walker.leg_mass
+    mass = walker.tree.mass
     speed = walker.leg_length * max(abs(start[2]), abs(start[3]))
-    return Prepared(walker, start, mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
+    energy = mass * (walker.gravity * walker.leg_length + 0.5 * speed**2)
+    return Prepared(walker, compass(config, config.equations), start, energy)
 
 
 def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> RecordedWalk:
@@ -58,7 +61,7 @@ def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> Recor
 
 def walked_with(method: Method, rtol: float, atol: float, ready: Prepared, case: Case) -> RecordedWalk:
     """Walk a case by a method, within the case's budget."""
-    solver = method.new(SWING_EQUATIONS, rtol, atol, case.budget)
+    solver = method.new(len(ready.walker.blank), rtol, atol, case.budget)
     return take_walk(ready.walker, solver, ready.start, case.steps, budget=case.budget)
 
 
@@ -139,8 +142,8 @@ def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding
             Finding(
                 "distance of the feet from the slope at heel strike", float(np.max(np.abs(ahead))), ROUNDING, "rad"
             ),
-            Finding("momentum changed by a heel strike", momentum_change(walker, before, after), ROUNDING),
-            Finding("energy won at a heel strike", energy_won(walker, before, after, ready), ROUNDING),
+            Finding("momentum changed by a heel strike", momentum_change(ready.compass, before, after), ROUNDING),
+            Finding("energy won at a heel strike", energy_won(ready, before, after), ROUNDING),
         ]
     return found
 
@@ -189,11 +192,11 @@ def momenta(walker: RigidWalker, legs: tuple[float, float, float, float], stands
     return float(about_foot), float(about_hip)
 
 
-def energy_won(walker: RigidWalker, before: Array, after: Array, ready: Prepared) -> float:
+def energy_won(ready: Prepared, before: Array, after: Array) -> float:
     """Largest gain of kinetic energy at a heel strike, as a share of the energy."""
     gain = 0.0
     for old, new in zip(before, after, strict=True):
-        gain = max(gain, kinetic(walker, new) - kinetic(walker, old))
+        gain = max(gain, kinetic(ready.compass, new) - kinetic(ready.compass, old))
     return finite(gain / ready.energy)
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from walkerlab.config.contact import Contact
+from walkerlab.config.fields import Block
 from walkerlab.config.schema import Config
 
+B = TypeVar("B", bound=Block)
 # the twin's leg (m), mass (kg) and gravity (m/s^2): odd numbers, so that rounding falls differently
 TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
 
@@ -47,19 +50,23 @@ def to_twin(config: Config) -> Scale:
     return Scale(TWIN_LEG / walker.leg_length_m, TWIN_MASS / walker.total_mass_kg, TWIN_GRAVITY / config.gravity_m_s2)
 
 
+def scaled_block(block: B, by: Scale) -> B:
+    """A block of measures scaled, each by the unit that its key ends in."""
+    units = {"_kg_m2": by.mass * by.length**2, "_kg": by.mass, "_m": by.length}
+    changed: dict[str, Any] = {}
+    for name in type(block).model_fields:
+        value = getattr(block, name)
+        unit = next((unit for ending, unit in units.items() if name.endswith(ending)), None)
+        if isinstance(value, Block):
+            changed[name] = scaled_block(value, by)
+        elif isinstance(value, float) and unit is not None:
+            changed[name] = value * unit
+    return block.model_copy(update=changed)
+
+
 def scaled(config: Config, by: Scale) -> Config:
     """The config of the similar walker: every quantity with a unit scaled, angles and pure numbers as they are."""
-    old = config.walker
-    walker = old.model_copy(
-        update={
-            "leg_length_m": old.leg_length_m * by.length,
-            "foot_to_mass_m": old.foot_to_mass_m * by.length,
-            "leg_mass_kg": old.leg_mass_kg * by.mass,
-            "hip_mass_kg": old.hip_mass_kg * by.mass,
-            "leg_inertia_kg_m2": old.leg_inertia_kg_m2 * by.mass * by.length**2,
-            "foot_radius_m": old.foot_radius_m * by.length,
-        }
-    )
+    walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {"walker": walker, "gravity_m_s2": config.gravity_m_s2 * by.gravity}
     if not isinstance(config.start, str):
         theta_1, theta_2, omega_1, omega_2 = config.start

@@ -31,12 +31,21 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class NotMeasured:
+    """A measure that could not be taken, and why."""
+
+    measure: str
+    why: str
+
+
+@dataclass(frozen=True)
 class CaseResult:
     """How a case ended and how it is judged.
 
     residual_J     of the energy balance
     findings       every measure that was taken
     remarks        what is wrong besides, in words
+    not_measured   what could not be measured
     second_method  the other method that it was compared with; empty if none could walk it
     second_tried   what became of those asked before, or why none was asked
     """
@@ -55,6 +64,7 @@ class CaseResult:
     remarks: tuple[str, ...] = ()
     second_method: str = ""
     second_tried: str = ""
+    not_measured: tuple[NotMeasured, ...] = ()
 
     @property
     def failures(self) -> tuple[str, ...]:

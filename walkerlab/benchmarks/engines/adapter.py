@@ -47,11 +47,13 @@ class Integrator:
     order       that it promises
     most_steps  of a run: what takes longer is not run
     adapts      its steps to a tolerance
+    for_contact_only  without contact it is one of the others
     """
 
     order: int
     most_steps: int
     adapts: bool = False
+    for_contact_only: bool = False
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ INTEGRATORS = {
     "semi_explicit_euler": Integrator(1, 45_000),
     "runge_kutta3": Integrator(3, 45_000),
     "runge_kutta3 adaptive": Integrator(3, 60_000, adapts=True),
-    "discrete": Integrator(1, 45_000),
+    "discrete": Integrator(1, 45_000, for_contact_only=True),
 }
 EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
 CONTACTS = {

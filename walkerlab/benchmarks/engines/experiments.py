@@ -43,7 +43,7 @@ SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
 LARGEST_STEP_S = 0.01  # where they are
 STARTS = (0.95, 0.99)  # of the gait's velocities
-TUNING_STEP_S = 2.5e-5
+TUNING_STEP_S = 1e-5
 TOUCHES, OWN_TOUCHES = 2, 10
 INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
 SWING_S = 0.48
@@ -200,6 +200,8 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
 def same_law_rows(engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess) -> Iterator[Row]:
     """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
     for name, integrator in engine.adapter().INTEGRATORS.items():
+        if integrator.for_contact_only:
+            continue
         for stepping in ladder_of(name, integrator, truth.until_s):
             most = integrator.most_steps
             task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, most)

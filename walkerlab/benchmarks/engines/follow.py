@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces, in_arrays
-from walkerlab.ground.terrain import carried_in_cell, cell_at, order_matters
+from walkerlab.ground.terrain import carried_in_cell, cell_at, has_pads
 from walkerlab.ground.walker import FootMotion
-from walkerlab.hybrid.contact_events import FALLEN_HIP, farthest_slide
+from walkerlab.hybrid.contact_events import FALLEN_HIP, HEIGHT, PASSING, PER_FOOT, farthest_slide, material_along
 from walkerlab.hybrid.contact_rules import GOES_ON, LAST_TOUCH, STANCE, STEPS, Ledger, lift, pass_by, touch
 from walkerlab.hybrid.contact_run import new_ledger
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
@@ -55,9 +55,9 @@ class Follower:
         before, now = self.feet, self.look.feet(q, v)
         happened = self._happened(before, now)
         if happened:
-            self._let_happen(time_s, before, now)
+            self._let_happen(time_s, before, now, q, v)
         self.feet, self.time_s = now, time_s
-        self._judge(float(q[1]), now)
+        self._judge(now, q, v)
         return happened
 
     def _happened(self, before: Feet, now: Feet) -> bool:
@@ -66,26 +66,34 @@ class Follower:
         (y0, k0, _, _), (y1, k1, _, _) = now
         if (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0):
             return True
+        if (x0 < x1) != (y0 < y1):
+            return True
         if not self.on_pads:
-            return (x0 < x1) != (y0 < y1)
+            return False
         terrain, cells = self.scene.ground.terrain, self.ledger.cells
         return bool(cell_at(terrain, 0, y0) != cells[0] or cell_at(terrain, 1, y1) != cells[1])
 
-    def _let_happen(self, time_s: float, before: Feet, now: Feet) -> None:
+    def _let_happen(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
         """Let everything happen that lies between two states."""
-        ledger, terrain = self.ledger, self.scene.ground.terrain
+        ledger, terrain, walker = self.ledger, self.scene.ground.terrain, self.scene.ours
         if self.on_pads:
             self._cross_edges(now)
-        elif (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
+        if (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
+            ledger.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
             for foot in range(2):
-                pass_by(terrain, ledger, motions(now), foot)
+                pass_by(terrain, ledger, foot)
+        h = time_s - self.time_s
         for foot in range(2):
-            if before[foot][1] >= 0.0 > now[foot][1]:
-                h = time_s - self.time_s
-                share = crossing(before[foot], now[foot], h)
-                self._end(touch(terrain, ledger, between(before, now, share, h), foot, self.time_s + share * h))
-            elif before[foot][1] < 0.0 <= now[foot][1]:
-                lift(terrain, ledger, motions(now), foot)
+            if (before[foot][1] < 0.0) == (now[foot][1] < 0.0):
+                continue
+            ledger.sides[foot * PER_FOOT + HEIGHT] = 1 if now[foot][1] >= 0.0 else -1
+            share = crossing(before[foot], now[foot], h)
+            there = between(before, now, share, h)
+            y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
+            if now[foot][1] >= 0.0:
+                lift(walker, terrain, ledger, there, foot, y)
+            else:
+                self._end(touch(walker, terrain, ledger, there, foot, self.time_s + share * h, y))
         if ledger.feet[STEPS] == ledger.touch_time.size:
             self._end(int(Outcome.WALKED))
 
@@ -106,7 +114,7 @@ class Follower:
         if outcome != GOES_ON and self.outcome is None:
             self.outcome = Outcome(outcome)
 
-    def _judge(self, hip_height: float, now: Feet) -> None:
+    def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
         """End the walk that has fallen, slid, flown or taken too long."""
         ground, carried = self.scene.ground, self.ledger.carried
         tau, t = ground.frame.pendulum_time, self.time_s
@@ -114,12 +122,15 @@ class Follower:
         if inside[0] or inside[1]:
             self.grounded_s = t
             stance = self.ledger.feet[STANCE]
-            away = abs(now[stance][0] - self.ledger.foothold[stance])
-            if inside[stance] and away > farthest_slide(ground.terrain):
-                self._end(int(Outcome.SLID))
+            far = farthest_slide(ground.terrain)
+            if inside[stance] and abs(now[stance][0] - self.ledger.foothold[stance]) > far:
+                y = tuple(self.scene.about_centre(q, v).tolist())
+                material = material_along(self.scene.ours, stance, now[stance][0], y)
+                if abs(material - self.ledger.touched[stance]) > far:
+                    self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
-        if hip_height < FALLEN_HIP * ground.frame.leg_length:
+        if q[1] < FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
         elif t - self.ledger.times[LAST_TOUCH] > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))
@@ -153,7 +164,7 @@ def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> Follower:
     feet = look.feet(q, v)
     for row in feet:
         row[1] = min(row[1], -sys.float_info.min)  # both stand on the ground, inside or outside by rounding
-    return Follower(scene, look, ledger, feet, not order_matters(scene.ground.terrain))
+    return Follower(scene, look, ledger, feet, has_pads(scene.ground.terrain))
 
 
 def motions(rows: Feet) -> tuple[FootMotion, FootMotion]:
@@ -162,11 +173,12 @@ def motions(rows: Feet) -> tuple[FootMotion, FootMotion]:
 
 
 def crossing(before: list[float], now: list[float], h: float) -> float:
-    """Share of a step of h (s) at which a foot's height, a cubic, falls through zero."""
+    """Share of a step of h (s) at which a foot's height, a cubic, goes through zero."""
     low, high = 0.0, 1.0
+    above = before[1] >= 0.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if cubic(before[1], before[3], now[1], now[3], h, middle) >= 0.0:
+        if (cubic(before[1], before[3], now[1], now[3], h, middle) >= 0.0) == above:
             low = middle
         else:
             high = middle

@@ -16,18 +16,19 @@ from walkerlab.benchmarks.engines.planar import (
     planar_model,
 )
 from walkerlab.config.schema import Config
-from walkerlab.ground.compliant import STANCE_FOOT, compass_assembly
+from walkerlab.errors import ConfigError
+from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import Ground
 from walkerlab.mechanics.assembly import masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Position
-from walkerlab.mechanics.rigid_compass import step_length
-from walkerlab.scene.contact import compass_parts, contact_scene, start_state
+from walkerlab.mechanics.standing import swing_foot
+from walkerlab.scene.contact import contact_scene, hinge_of, start_state
+from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
-HIP: Position = (0.0, 0.0)  # the origin of every leg's frame
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class EngineScene:
     """A walker on its ground, as an engine and as the rules of a walk see it.
 
     assembly  the parts
-    base      the body that the engine's tree hangs from, with the hip as its point
+    base      the body that the engine's tree hangs from
+    hip       its point that does
     ours      the walker as this project walks it
     walker    the same with its feet's levers from the base's point
     chain     (n, n) which relative angles add up to each absolute one
@@ -47,6 +49,7 @@ class EngineScene:
     name: str
     assembly: Assembly
     base: str
+    hip: Position
     gravity: float
     ours: ContactWalker
     walker: ContactWalker
@@ -58,13 +61,14 @@ class EngineScene:
     @cached_property
     def model(self) -> PlanarModel:
         """What an engine builds."""
-        return planar_model(self.assembly, self.base, HIP, FLOATING, self.gravity, self.ours.slope)
+        return planar_model(self.assembly, self.base, self.hip, FLOATING, self.gravity, self.ours.slope)
 
     @cached_property
     def centre_levers(self) -> Floats:
         """Levers (n, 2) in m from the base's point to the centre of mass."""
         every = [
-            mass * levers_from(self.assembly, self.base, HIP, at.body, at.at_m) for mass, at in masses(self.assembly)
+            mass * levers_from(self.assembly, self.base, self.hip, at.body, at.at_m)
+            for mass, at in masses(self.assembly)
         ]
         return np.asarray(sum(every) / total_mass(self.assembly))
 
@@ -99,32 +103,45 @@ class EngineScene:
 def compass_scene(config: Config, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
     """The config's compass on its own ground, free from its start."""
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
-    assembly = compass_assembly(compass_parts(config.walker))
+    assembly = scene.assembly
     start = start_state(scene, rigid_state)
-    return engine_scene("compass", assembly, "leg 2", config.gravity_m_s2, scene.walker, scene.ground, start)
+    base = assembly.legs[STANCE_FOOT][0]
+    hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
+    return engine_scene("compass", assembly, base, hip, config.gravity_m_s2, scene.walker, scene.ground, start)
 
 
 def engine_scene(
-    name: str, assembly: Assembly, base: str, gravity: float, ours: ContactWalker, ground: Ground, start: State
+    name: str,
+    assembly: Assembly,
+    base: str,
+    hip: Position,
+    gravity: float,
+    ours: ContactWalker,
+    ground: Ground,
+    start: State,
 ) -> EngineScene:
-    """The scene of an assembly whose base's frame has its origin at the hip."""
+    """The scene of an assembly that hangs from the hip."""
     feet = tuple(
         foot._replace(
             lever_x=tuple(float(x) for x in d[:, 0]),
             lever_y=tuple(float(x) for x in d[:, 1]),
         )
         for foot, part in zip(ours.feet, assembly.feet, strict=True)
-        for d in (levers_from(assembly, base, HIP, part.body, part.centre_m),)
+        for d in (levers_from(assembly, base, hip, part.body, part.centre_m),)
     )
     walker = ours._replace(feet=(feet[0], feet[1]))
     return EngineScene(
-        name, assembly, base, gravity, ours, walker, chain_of(assembly, base), ground, STANCE_FOOT, start
+        name, assembly, base, hip, gravity, ours, walker, chain_of(assembly, base), ground, STANCE_FOOT, start
     )
 
 
 def scenes(config: Config, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
     """The walks of a config."""
-    length = rigid_step_length_m or abs(
-        step_length(rigid_walker(config, config.equations), rigid_state[0], rigid_state[1])
-    )
+    assembly = assembly_of(config.walker)
+    if assembly.knees or assembly.couplings:
+        raise ConfigError(
+            "engines: only walkers whose bodies turn independently are taken to other engines so far.",
+            "Choose a compass or straight legs without a torso.",
+        )
+    length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
     return (compass_scene(config, length, rigid_state),)

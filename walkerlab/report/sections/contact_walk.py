@@ -85,7 +85,11 @@ def slipping(summary: Mapping[str, Any]) -> list[Row]:
     rows: list[Row] = [["slip a step", mean, "net, downhill positive, mean over the steps"]]
     if summary.get("slips_m"):
         slips = [1e3 * slip for slip in summary["slips_m"]]
-        rows.append(["slip, step by step", span(slips, "mm", 3), "of the stance foot, from its touch to its lift"])
+        rows.append(
+            ["slip, step by step", span(slips, "mm", 3), "of the stance foot's material, from its touch to its lift"]
+        )
+    if summary.get("rolling_per_step_m"):
+        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the ball foot, which is no slip"])
     return rows
 
 

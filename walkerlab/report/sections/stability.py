@@ -96,21 +96,31 @@ def case_table(cases: Rows) -> Table:
     note = (
         "Other method: that gives the same times, as far as tolerances promise. Worst measure: the largest of all "
         "measures of a case but its use of the budget, each divided by the most that is allowed."
-        f"{without_answer(cases)}"
+        f"{without_answer(cases)}{not_measured(cases)}"
     )
     return Table("Extreme cases", columns, bodies, wordy=True, note=note)
 
 
 def without_answer(cases: Rows) -> str:
     """Which other methods gave no answer, or why none was asked: each reason once, with its cases."""
-    by_reason: dict[str, list[str]] = {}
-    for row in cases:
-        if row["second_tried"]:
-            by_reason.setdefault(str(row["second_tried"]), []).append(str(row["name"]))
-    if not by_reason:
-        return ""
-    said = "; ".join(f"{reason} ({', '.join(names)})" for reason, names in by_reason.items())
-    return f" Other methods that gave no answer, or why none was asked: {said}."
+    reasons = [(str(row["second_tried"]), row) for row in cases if row["second_tried"]]
+    said = by_reason(reasons)
+    return f" Other methods that gave no answer, or why none was asked: {said}." if said else ""
+
+
+def not_measured(cases: Rows) -> str:
+    """Which measures could not be taken: each with its reason once, and its cases."""
+    missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
+    said = by_reason(missed)
+    return f" Not measured: {said}." if said else ""
+
+
+def by_reason(reasons: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
+    """Each reason once, with the cases that it holds for."""
+    names: dict[str, list[str]] = {}
+    for reason, row in reasons:
+        names.setdefault(reason, []).append(str(row["name"]))
+    return "; ".join(f"{reason} ({', '.join(cases)})" for reason, cases in names.items())
 
 
 def case_row(row: Mapping[str, Any]) -> list[str | Cell]:

@@ -1,15 +1,20 @@
-"""The rigid compass walker's parameters, matrices, energies and ground reaction (Appendix A of the paper).
+"""Appendix A of the paper: the compass walker's equations as they are printed there, and with C_21 corrected.
+
+The rigid model is assembled from parts (mechanics/); these equations are what it is checked against, and `as-printed`
+walks by them.
 
 State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
 positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from walkerlab.kernels import inlined
 from walkerlab.mechanics.fused import fused
+from walkerlab.mechanics.rigid import standing
+from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 
 CORRECTED = -1.0
 AS_PRINTED = 1.0
@@ -39,7 +44,6 @@ class Swing(NamedTuple):
     mass: float  # kg, (A.19)
 
 
-@inlined
 def swing_constants(walker: RigidWalker) -> Swing:
     """The constant factors of the swing equations of `walker`."""
     L, a, m, M_H, J = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass, walker.leg_inertia
@@ -54,7 +58,6 @@ def swing_constants(walker: RigidWalker) -> Swing:
     )
 
 
-@inlined
 def accelerations(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float]:
@@ -71,7 +74,6 @@ def accelerations(
     return fused(c.d22, r1, -d12 * r2) * scale, fused(c.d11, r2, -d12 * r1) * scale
 
 
-@inlined
 def kinetic_energy(walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float) -> float:
     """Kinetic energy (J): half of dq' D dq."""
     c = swing_constants(walker)
@@ -79,14 +81,12 @@ def kinetic_energy(walker: RigidWalker, theta_1: float, theta_2: float, omega_1:
     return 0.5 * (c.d11 * omega_1 * omega_1 + c.d22 * omega_2 * omega_2) + d12 * omega_1 * omega_2
 
 
-@inlined
 def potential_energy(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
     """Potential energy (J) from the current stance foot."""
     c = swing_constants(walker)
     return walker.gravity * (c.K * math.cos(theta_2) - c.mb * math.cos(theta_1))
 
 
-@inlined
 def ground_reaction(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float]:
@@ -105,7 +105,6 @@ def ground_reaction(
     return c_phi * x - s_phi * y, s_phi * x + c_phi * y
 
 
-@inlined
 def swing_foot_height(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
     """Height of the swing foot above the slope (m), negative while it scuffs.
 
@@ -115,7 +114,87 @@ def swing_foot_height(walker: RigidWalker, theta_1: float, theta_2: float) -> fl
     return 2.0 * walker.leg_length * math.sin(half_sum) * math.sin(0.5 * (theta_1 - theta_2))
 
 
-@inlined
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
     """Distance between the feet along the slope (m) with both on it: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
+
+
+def feet_on_slope(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
+    """theta_1 + theta_2 + 2 phi (rad): zero with both feet on the slope, falling through zero at heel strike.
+
+    (9-2) prints theta_1 = -theta_2, which holds only for angles measured from the slope's normal.
+    """
+    return theta_1 + theta_2 + 2.0 * walker.slope
+
+
+def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
+    """(A_11, A_12, A_22, B_11, B_12, B_22) of A w+ = B w-, angular velocities (w_1, w_2) before the change of roles.
+
+    (A.57) with the constraint E dq+ = 0 solved first: dq+ = Z w+, so that Z' D_e Z w+ = Z' D_e dq- and the impulse
+    drops out. With the right sign in (A.55) everything depends on cos(theta_2 - theta_1) alone, and B_21 = 0: the
+    trailing leg keeps its angular momentum about the hip.
+    """
+    c = swing_constants(walker)
+    L = walker.leg_length
+    return (
+        c.d11 - 2.0 * c.mLb + c.mass * L * L,
+        (L * c.K - c.mass * L * L) * cos_d,
+        c.d22 - 2.0 * L * c.K + c.mass * L * L,
+        c.d11 - c.mLb,
+        (L * c.K - c.mLb) * cos_d,
+        c.d22 - L * c.K,
+    )
+
+
+def impact(
+    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
+) -> tuple[float, float, float, float]:
+    """State after the heel strike, roles changed: the leg that was swinging is theta_2 now."""
+    s1, c1 = sine_cosine(theta_1)
+    s2, c2 = sine_cosine(theta_2)
+    A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)
+    r1 = B_11 * omega_1 + B_12 * omega_2
+    r2 = B_22 * omega_2
+    scale = 1.0 / (A_11 * A_22 - A_12 * A_12)
+    return theta_2, theta_1, (A_11 * r2 - A_12 * r1) * scale, (A_22 * r1 - A_12 * r2) * scale
+
+
+def impact_jacobian(
+    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float, J: Any
+) -> None:
+    """Write the derivative of `impact` with respect to the state before it into J (4, 4).
+
+    From A dw+ = dB w- + B dw- - dA w+, with dA and dB along the angle between the legs.
+    """
+    s1, c1 = sine_cosine(theta_1)
+    s2, c2 = sine_cosine(theta_2)
+    A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)
+    _, dA_12, _, _, dB_12, _ = impact_matrices(walker, -(s2 * c1 - c2 * s1))
+    _, _, swing_after, stance_after = impact(walker, theta_1, theta_2, omega_1, omega_2)
+    scale = 1.0 / (A_11 * A_22 - A_12 * A_12)
+    r1 = dB_12 * omega_2 - dA_12 * swing_after
+    r2 = -dA_12 * stance_after
+    along_swing = (A_11 * r2 - A_12 * r1) * scale
+    along_stance = (A_22 * r1 - A_12 * r2) * scale
+    for j in range(4):
+        J[0, j], J[1, j] = 0.0, 0.0
+    J[0, 1], J[1, 0] = 1.0, 1.0
+    J[2, 0], J[2, 1] = -along_swing, along_swing
+    J[3, 0], J[3, 1] = -along_stance, along_stance
+    J[2, 2], J[2, 3] = -A_12 * B_11 * scale, (A_11 * B_22 - A_12 * B_12) * scale
+    J[3, 2], J[3, 3] = A_22 * B_11 * scale, (A_22 * B_12 - A_12 * B_22) * scale
+
+
+def as_printed(model: Standing) -> Standing:
+    """A compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign that (A.5) prints."""
+    A = list(model.tree.cosine)
+    A[2 * STANCE + SWING] *= -1.0
+    return model._replace(centrifugal=model.tree._replace(cosine=tuple(A)))
+
+
+def assembled(walker: RigidWalker) -> Standing:
+    """The walker's rigid model, assembled from its parts."""
+    below_hip = walker.leg_length - walker.foot_to_mass
+    leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)
+    model = standing(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)
+    return as_printed(model) if walker.c21_sign == AS_PRINTED else model

@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from walkerlab.mechanics.heel_strike import feet_on_slope, impact, impact_jacobian
-from walkerlab.mechanics.rigid_compass import (
+from walkerlab.paper.appendix_a import (
     CORRECTED,
     RigidWalker,
+    feet_on_slope,
+    impact,
+    impact_jacobian,
     kinetic_energy,
     step_length,
     swing_foot_height,

@@ -8,7 +8,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from walkerlab.mechanics.rigid_compass import (
+from walkerlab.paper.appendix_a import (
     AS_PRINTED,
     CORRECTED,
     RigidWalker,

@@ -1,0 +1,97 @@
+"""`walkerlab sweep`, `walkerlab diff` and the list of all runs, as a user types them."""
+
+import csv
+import io
+import json
+
+import pytest
+
+SWEEP = ("sweep", "--stage", "drop", "--jobs", "1")
+
+
+def test_a_sweep_prints_one_object_and_leaves_file_table_figure_and_page(swept):
+    toy, value = swept
+    assert (value["done"], value["failed"], value["reused"], value["points"]) == (6, 0, 0, 6)
+    assert value["parameters"] == {"gravity_m_s2": [1.0, 5.0, 9.0], "slope_rad": [0.1, 1.2]}
+    assert value["outcomes"] == {"answered": 3, "no-answer": 3}
+    assert value["stage"] == "sweep"
+    for path in (value["file"], value["csv"], value["html"], *value["figures"]):
+        assert (toy.folder / path).stat().st_size > 100
+    page = (toy.folder / value["html"]).read_text()
+    assert "<svg" in page
+    assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
+        "http://creativecommons.org", ""
+    )
+
+
+def test_the_same_sweep_again_prints_the_table_and_computes_nothing(swept):
+    toy, _ = swept
+    done = toy(*SWEEP, "--over", "gravity_m_s2=1:9:3", "--over", "slope_rad=[0.1, 1.2]", "--csv")
+    assert "6 of 6 points are there already" in done.stderr
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert [row["outcome"] for row in rows] == ["answered", "no-answer"] * 3
+    assert float(rows[4]["period_s"]) == (2 / 9) ** 0.5
+
+
+def test_a_block_of_the_config_asks_the_same(swept):
+    toy, value = swept
+    over = "    gravity_m_s2: 1:9:3\n    slope_rad: [0.1, 1.2]\n"
+    (toy.folder / "block.yaml").write_text(f"name: paper\nextends: paper\nsweep:\n  stage: drop\n  over:\n{over}")
+    again = json.loads(toy("sweep", "-c", "block.yaml", "--json").stdout)
+    assert again["reused"] == 6
+    assert again["file"] == value["file"]
+
+
+def test_a_dry_run_lists_points_and_touches_nothing(swept):
+    toy, _ = swept
+    before = sorted(toy.folder.rglob("*"))
+    text = toy(*SWEEP, "--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1", "--dry-run").stdout
+    assert "  gravity_m_s2=3.0" in text
+    assert "5 points, 3 there already, 2 to compute" in text
+    assert sorted(toy.folder.rglob("*")) == before
+
+
+def test_bad_points_and_bad_questions_exit_3_with_what_is_allowed(swept):
+    toy, _ = swept
+    done = toy(*SWEEP, "--over", "gravity_m_s2=[1, -2]")
+    assert done.returncode == 3
+    assert "at gravity_m_s2=-2" in done.stderr
+    assert toy(*SWEEP, "--over", "gravity=[1]").returncode == 3
+    assert toy("sweep", "--stage", "page", "--over", "gravity_m_s2=[1]").returncode == 3
+    assert toy(*SWEEP, "--over", "gravity_m_s2=[1]", "--engine", "abacus").returncode == 3
+
+
+def test_clean_takes_sweeps_away(swept, tmp_path):
+    toy, _ = swept
+    done = toy("clean", "--dry-run", "--json")
+    removed = json.loads(done.stdout)["removed"]
+    assert any("sweep-chunks/drop-" in name for name in removed)
+    assert any(name.endswith("sweep.html") for name in removed)
+
+
+def test_diff_says_what_of_config_and_numbers_differs(toy):
+    toy("roll")
+    toy("roll", "--set", "gravity_m_s2=4.905")
+    found = json.loads(toy("diff", "paper", "paper@gravity_m_s2=4.905", "--json").stdout)
+    assert found["config"] == [{"key": "gravity_m_s2", "first": 9.81, "second": 4.905}]
+    numbers = {pair["name"]: pair for pair in found["numbers"]["drop"]}
+    assert numbers["period_s"]["change"] == pytest.approx(2**0.5 - 1, rel=1e-12)
+    text = toy("diff", "paper", "paper@gravity_m_s2=4.905").stdout
+    assert "+41.4 %" in text
+    assert toy("diff", "paper", "nothing").returncode == 5
+
+
+def test_status_lists_all_runs_and_tells_of_one(toy):
+    toy("roll")
+    toy("drop", "--set", "strides=7")
+    status = json.loads(toy("status", "--json").stdout)
+    assert {run["name"]: run["stages"] for run in status["runs"]} == {
+        "paper": ["drop", "roll"],
+        "paper@strides=7": ["drop"],
+    }
+    assert all(run["current"] == run["stages"] for run in status["runs"])
+    assert "all runs in runs:" in toy("status").stdout
+    one = json.loads(toy("status", "paper@strides=7", "--json").stdout)
+    assert one["run_dir"] == "runs/paper@strides=7"
+    assert {row["stage"]: row["state"] for row in one["stages"]}["drop"] == "current"
+    assert toy("status", "paper@strides=8").returncode == 5

@@ -1,0 +1,217 @@
+"""The kneed walker on plane compliant ground: what another program measured, momentum, energy, a plain integration."""
+
+import numpy as np
+import plain_walk
+import pytest
+from kneed_walks import (
+    ANGLES,
+    AT_TOUCH,
+    GRAVITY,
+    HIP_MASS,
+    MASS,
+    PAPER_MASS,
+    PERIOD,
+    RATES,
+    SHANK,
+    SLOPE,
+    STEP,
+    THIGH,
+    scene_of,
+    walked,
+)  # fmt: skip
+
+from walkerlab.ground.compliant import KneeRules
+from walkerlab.ground.motion import OnGround
+from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.hybrid.contact_knee import locked
+from walkerlab.hybrid.contact_run import by_channel
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.mechanics.walkers import Limb
+from walkerlab.scene.contact import start_state
+from walkerlab.solvers.system import derivative, jacobian
+
+KNEE_STRIKE = 0.348612  # s after heel strike, of the rigid gait
+BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
+
+
+def exchanged(walk):
+    """Energy that the ground and the knees took (J)."""
+    return float(walk.dissipated_J.sum())
+
+
+def plain(release_at_touch=False):
+    legs = plain_walk.kneed_legs(
+        THIGH.length_m, THIGH.mass_below_m, THIGH.mass_kg, SHANK.length_m, SHANK.mass_below_m, SHANK.mass_kg, HIP_MASS,
+        0.0,
+    )  # fmt: skip
+    stiffness, damping = 1e5 * 1000.0**2.2 * MASS / PAPER_MASS, 9e4 * MASS / PAPER_MASS
+    return plain_walk.Plain(
+        *legs, 1.0, GRAVITY, SLOPE, stiffness, 2.2, damping, 1e-4, 0.9, 0.7, 0.1, 1.0, plain_walk.PLANE, STEP,
+        release_at_touch,
+    )  # fmt: skip
+
+
+def test_released_by_compression_it_walks_twenty_steps_near_the_rigid_gait():
+    walk = walked(steps=20)
+    assert walk.outcome is Outcome.WALKED
+    assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=0.01)
+    assert walk.knee_strike_s[0] == pytest.approx(KNEE_STRIKE, abs=5e-3)
+    assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
+
+
+def test_with_friction_that_creeps_less_it_tracks_the_rigid_gait():
+    walk = walked(steps=12, stiction_velocity=0.01, friction_velocity=0.1)
+    assert walk.outcome is Outcome.WALKED
+    assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=3e-3)
+
+
+def test_released_at_touch_it_is_another_walker():
+    walk = walked(steps=20, rules=AT_TOUCH)
+    steps = walk.periods_s
+    assert walk.outcome in (Outcome.FELL, Outcome.BENT_KNEE) or steps[-1] < PERIOD - 0.01
+
+
+def test_a_plain_integration_takes_the_same_steps_at_the_same_times():
+    scene = plain()
+    outcome, done, times, places, _, _, _, y, locks = plain_walk.walk(
+        scene, plain_walk.start(scene, ANGLES, RATES), 2, 1e-5, -1
+    )
+    walk = walked(steps=2, tolerance=1e-10)
+    assert outcome == walk.outcome == Outcome.WALKED
+    assert done == 2
+    np.testing.assert_allclose(walk.touch_time_s, times, atol=1e-6)
+    np.testing.assert_allclose(walk.touch_along_m, places, atol=1e-6)
+    np.testing.assert_allclose(walk.knee_strike_s, locks, atol=1e-6)
+    np.testing.assert_allclose(walk.end_state[2:6], y[2:6], atol=1e-6)
+
+
+def masses_of(state, slope=SLOPE):
+    """(mass, position, velocity) of all points, from hip, thighs and shanks."""
+    x, h, *rest = state
+    angles, (v_x, v_h), rates = rest[:4], rest[4:6], rest[6:]
+    up = [np.array([-np.sin(a + slope), np.cos(a + slope)]) for a in angles]
+    turn = [w * np.array([-np.cos(a + slope), -np.sin(a + slope)]) for a, w in zip(angles, rates, strict=True)]
+    points = [(HIP_MASS, np.zeros(2), np.zeros(2))]
+    for leg in range(2):
+        knee, knee_v = -THIGH.length_m * up[leg], -THIGH.length_m * turn[leg]
+        points.append((THIGH.mass_kg, -THIGH.mass_below_m * up[leg], -THIGH.mass_below_m * turn[leg]))
+        points.append(
+            (SHANK.mass_kg, knee - SHANK.mass_below_m * up[2 + leg], knee_v - SHANK.mass_below_m * turn[2 + leg])
+        )
+    centre, drift = (sum(m * p[k] for m, *p in points) / MASS for k in range(2))
+    return [(m, r - centre + (x, h), v - drift + (v_x, v_h)) for m, r, v in points]
+
+
+def spin(points, about, drift):
+    return sum(m * np.cross(r - about, v - drift) for m, r, v in points)
+
+
+def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
+    """Momentum sums over the masses: of the whole, and of the leg whose knee locks about the hip that carries it."""
+    scene = scene_of()
+    state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # straight just now
+    after, lost = locked(OnGround(scene.walker, (True, True), (False, False, True, True), (False, False)), state)
+    before_points, after_points = masses_of(state), masses_of(after)
+    assert after[10] == pytest.approx(after[8], abs=1e-14)
+    np.testing.assert_allclose(after[:8], state[:8], atol=0.0)
+    assert spin(after_points, np.zeros(2), np.zeros(2)) == pytest.approx(
+        spin(before_points, np.zeros(2), 0.0 * np.zeros(2))
+    )
+    energy = [sum(0.5 * m * v @ v for m, _, v in points) for points in (before_points, after_points)]
+    assert lost == pytest.approx(energy[0] - energy[1], rel=1e-12)
+    assert lost > 0.0
+    # the hip passes forces only: seen from there the leg's turning changes by the hip's own jump in velocity alone
+    hip, jump = before_points[0][1], after_points[0][2] - before_points[0][2]
+    leg = slice(1, 3)
+    change = sum(
+        m * np.cross(r - hip, w - v) for (m, r, v), (_, _, w) in zip(before_points[leg], after_points[leg], strict=True)
+    )
+    assert change == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(jump) > 1e-6
+
+
+def test_the_equations_of_a_locked_knee_are_those_of_one_leg():
+    """Compared with the compass whose legs carry thigh and shank masses as one."""
+    from walkerlab.ground.compliant import contact_walker
+    from walkerlab.mechanics.parts import Assembly, Particle
+    from walkerlab.mechanics.walkers import Arc, straight_legs
+
+    scene = scene_of()
+    legs = straight_legs(Limb(1.0, THIGH.mass_kg, THIGH.mass_below_m), HIP_MASS, Arc())
+    shanks = tuple(
+        Particle(f"s{k}", SHANK.mass_kg, f"leg {k}", (0.0, -THIGH.length_m - SHANK.mass_below_m)) for k in (1, 2)
+    )
+    one = contact_walker(
+        Assembly(legs.bodies, legs.joints, (*legs.particles, *shanks), legs.feet, legs=legs.legs),
+        scene.walker.normal, scene.walker.friction, GRAVITY, SLOPE,
+    )  # fmt: skip
+    two = OnGround(scene.walker, (True, True), (False, False, True, True), (False, False))
+    y = (0.1, 0.7, -0.3, 0.2, 0.3, -0.1, -0.5, -0.9)
+    straight = (*y[:4], *y[2:4], *y[4:], *y[6:])
+    expected = derivative(OnGround(one, (True, True)), 0.0, y)
+    found = derivative(two, 0.0, straight)
+    np.testing.assert_allclose(found[:4] + found[6:10], expected, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(found[10:], found[8:10], rtol=0.0, atol=0.0)
+
+
+@pytest.mark.parametrize("held", [(False,) * 4, (False, False, False, True), (False, False, True, True)])
+@pytest.mark.parametrize("stop", [False, True])
+def test_exact_derivatives_are_those_of_differences(held, stop):
+    rules = KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))
+    scene = scene_of(rules)
+    y = np.array(BENT_STATE)
+    y[4] = y[2] + 5e-3
+    system = OnGround(scene.walker, (False, False), held, (stop and not held[2], False))
+    J = np.zeros((12, 12))
+    jacobian(system, 0.0, tuple(y), J)
+    differences = np.zeros((12, 12))
+    for j in range(12):
+        step = np.zeros(12)
+        step[j] = 1e-6
+        ahead, behind = (np.array(derivative(system, 0.0, tuple(y + sign * step))) for sign in (1, -1))
+        differences[:, j] = (ahead - behind) / 2e-6
+    np.testing.assert_allclose(J, differences, atol=1e-5 * np.abs(differences).max())
+
+
+def test_a_twin_of_another_size_walks_the_same_steps():
+    one, other = walked(steps=3, tolerance=1e-9), walked(steps=3, tolerance=1e-9, scale=4.0)
+    np.testing.assert_allclose(other.touch_time_s / 2.0, one.touch_time_s, atol=1e-6)
+    np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
+
+
+def test_a_stiff_stop_walks_as_the_ideal_lock_does():
+    ideal = walked(steps=3)
+    stopped = [walked(steps=3, rules=KneeRules(NormalLaw(k, 1.0, 1e-3 * k, 1e-5))) for k in (1e3, 1e5)]
+    for walk in stopped:
+        assert walk.outcome is Outcome.WALKED
+        assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
+        assert by_channel(scene_of().walker, walk.dissipated_J)["knee_strikes"] < 1e-9
+        assert by_channel(scene_of().walker, walk.dissipated_J)["knee_stop"] > 1e-3
+    apart = [np.abs(walk.touch_time_s - ideal.touch_time_s).max() for walk in stopped]
+    assert apart[1] < 0.3 * apart[0]
+
+
+def test_a_foot_that_comes_down_on_a_bent_knee_ends_the_walk():
+    scene = scene_of(slope=0.02)
+    walk = walked(steps=20, rules=AT_TOUCH, slope=0.02)
+    assert walk.outcome in (Outcome.BENT_KNEE, Outcome.FELL, Outcome.NO_HEEL_STRIKE)
+    assert walk.outcome.advice
+    assert scene.walker.knees.release_at_touch is False
+
+
+def test_round_feet_of_a_fifth_of_a_leg_walk_on_the_plane():
+    walk = walked(steps=6, radius=0.2)
+    assert walk.outcome is Outcome.WALKED
+    assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
+    # they roll forward by the radius times what the leg turns, and slip far less
+    assert np.all(walk.rolling_m > 0.2 * 0.3)
+    assert np.all(np.abs(walk.slip_m) < 0.1 * walk.rolling_m)
+
+
+def test_the_start_rolls_and_stands():
+    scene = scene_of(radius=0.2)
+    y = start_state(scene, (*ANGLES, *RATES))
+    from walkerlab.hybrid.contact_events import feet_motion
+
+    stance = feet_motion(scene.walker, y)[1]
+    np.testing.assert_allclose((stance.slip, stance.climb, stance.height), 0.0, atol=1e-14)

@@ -1,0 +1,54 @@
+"""Events that lie close together are all found, on every terrain; the right answers are a plain integration's."""
+
+import numpy as np
+import pytest
+from contact_walks import settings, walked
+
+from walkerlab.config.loader import load
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.scene.rigid import rigid_walker
+
+AFTER_MID_SWING = "contact.terrain=after-mid-swing"
+HINGED = ("contact.stance=pinned", "walker.foot_radius_m=0", "slope_deg=0.7")
+BOUNCING = ("contact.damping=10", "contact.exponent=1.3")
+SWITCHING = ("slope_deg=2.8", "contact.exponent=1.3", "contact.full_damping_penetration=0.26")
+
+
+def from_the_gait(*sets, steps=4):
+    config = load(None, sets).config
+    gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
+    scene = contact_scene(config, gait.step_length)
+    start = start_state(scene, gait.state)
+    return walk_contact(scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start, settings(), steps, None)
+
+
+@pytest.mark.parametrize(
+    ("sets", "periods"),
+    [
+        (HINGED, (0.698474, 0.705916)),
+        (BOUNCING, (0.711005, 0.723931, 0.718791, 0.711621)),
+        (SWITCHING, (0.739270, 0.744060, 0.733988, 0.737583)),
+    ],
+    ids=["feet pass as the foot lifts", "stance foot bounces", "law switches as the foot lifts"],
+)
+def test_after_mid_swing_the_walk_is_the_right_one(sets, periods):
+    walk = from_the_gait(*sets, AFTER_MID_SWING, steps=len(periods))
+    assert walk.outcome is Outcome.WALKED
+    np.testing.assert_allclose(walk.periods_s, periods, atol=6e-7)
+
+
+@pytest.mark.parametrize("sets", [(), ("contact.stiction_velocity=1", "contact.friction_velocity=10")])
+def test_on_both_grounds_a_walk_that_scuffs_no_pad_is_the_same(sets):
+    pads, plane = walked(*sets, steps=6), walked(*sets, AFTER_MID_SWING, steps=6)
+    np.testing.assert_allclose(plane.touch_time_s, pads.touch_time_s, atol=1e-8)
+    np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-8)
+    np.testing.assert_allclose(plane.rolling_m, pads.rolling_m, atol=1e-8)
+
+
+def test_slips_are_the_same_on_both_grounds_where_the_law_switches_as_the_foot_lifts():
+    pads, plane = from_the_gait(*SWITCHING), from_the_gait(*SWITCHING, AFTER_MID_SWING)
+    np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-7)

@@ -1,0 +1,324 @@
+"""Families of gaits: flips by another route, cascades, folds, and what is said where a branch ends."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.attractors import close_returns, feigenbaum_ratios, largest_exponent, period_of, settled
+from walkerlab.orbits.bifurcation_curves import curve_through
+from walkerlab.orbits.bifurcations import on_pairs
+from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
+from walkerlab.orbits.families import Follower, Limits, Seed, Span
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_maps import RigidMap, multipliers_of, walk_steps
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
+
+A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81
+
+
+def map_of(walker_at, scale):
+    def model_at(value):
+        walker = walker_at(value)
+        return None if walker is None else assembled(walker)
+
+    return RigidMap(model_at, scale, assembled(paper_walker(0.05)))
+
+
+def paper_walker(slope):
+    return RigidWalker(L, A, M, M_H, 0.0, G, slope, CORRECTED) if 0.0 <= slope < 1.0 else None
+
+
+def simplest_walker(slope):
+    return RigidWalker(1.0, 1e-9, 1e-9, 1.0, 0.0, 1.0, slope, CORRECTED)
+
+
+def seeds_at(walker_at, slope):
+    walker = walker_at(slope)
+    _, units = unit_walker(assembled(walker))
+    return [
+        Seed(np.array([gait.state[1], gait.state[2] * units.time, gait.state[3] * units.time]), slope)
+        for gait in find_gaits(assembled(walker)).gaits
+    ]
+
+
+def period_three_start(follower):
+    """A nearly returning point of the chaotic attractor."""
+    one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
+    for slope in np.radians(np.linspace(5.06, 5.19, 8)):
+        chaotic = settled(follower.step_map, one.points[-1].z, slope, 400, 200)
+        if not isinstance(chaotic, Outcome):
+            for seed in close_returns(follower.step_map, chaotic, (3,), 3000):
+                gait = follower.solved_at(seed.z, slope, 3)
+                if gait is not None and np.max(np.abs(gait.evaluated.data.steps[0].z - gait.x[:-1])) > 1e-3:
+                    return Seed(gait.x[:-1], slope, 3)
+    raise AssertionError("no gait of three steps was found")
+
+
+@cache
+def family(walker_at, least, most, at, periods):
+    follower = Follower(map_of(walker_at, most - least), Span(least, most))
+    return follower.family(seeds_at(walker_at, at), periods)
+
+
+def compass_family():
+    return family(paper_walker, 1e-4, 0.1, 0.05, 8)
+
+
+def flips_of(branches):
+    return {
+        (branch.period, kind.kind): kind.value for branch in branches for kind in branch.bifurcations
+    }  # fmt: skip
+
+
+def compass_step(z, slope):
+    """A step by Lagrange's equations, from and to (theta_2, dtheta_1, dtheta_2), with SciPy alone."""
+
+    def mass(cos_d):
+        b = L - A
+        return np.array([[M * b * b, -M * L * b * cos_d], [-M * L * b * cos_d, M_H * L * L + M * (L * L + A * A)]])
+
+    def rates(_t, y):
+        b, d = L - A, y[1] - y[0]
+        forces = np.array(
+            [
+                -M * L * b * np.sin(d) * y[3] ** 2 - G * M * b * np.sin(y[0]),
+                M * L * b * np.sin(d) * y[2] ** 2 + G * (M * (L + A) + M_H * L) * np.sin(y[1]),
+            ]
+        )
+        return np.concatenate((y[2:], np.linalg.solve(mass(np.cos(d)), forces)))
+
+    def strike(_t, y):
+        return y[0] + y[1] + 2.0 * slope if y[0] > y[1] else 1.0
+
+    strike.terminal, strike.direction = True, -1.0
+    start = np.array([-2.0 * slope - z[0], z[0], z[1], z[2]])
+    walk = solve_ivp(rates, (0.0, 3.0), start, method="DOP853", rtol=1e-13, atol=1e-15, events=strike, max_step=0.1)
+    y = walk.y_events[0][0]
+    return impact_by_momenta(y)
+
+
+def impact_by_momenta(y):
+    """Angular momenta about the new foothold and of the trailing leg about the hip, with planar vectors."""
+    theta = y[:2]
+    hip_to_foot = [
+        np.array([np.sin(t), -np.cos(t)]) for t in theta
+    ]  # of the leg that swings and of the one that stands
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+    def velocities(omega, standing):
+        """Of the hip and of both leg masses, with one foot at rest."""
+        hip = -L * omega[standing] * (turn @ hip_to_foot[standing])
+        return hip, [hip + (L - A) * omega[k] * (turn @ hip_to_foot[k]) for k in range(2)]
+
+    def momenta(omega, standing):
+        hip, legs = velocities(omega, standing)
+        foothold = L * hip_to_foot[0]  # from the hip
+        whole = M_H * cross(-foothold, hip) + sum(
+            M * cross((L - A) * hip_to_foot[k] - foothold, legs[k]) for k in range(2)
+        )
+        return np.array([whole, M * cross((L - A) * hip_to_foot[1], legs[1])])
+
+    before = momenta(y[2:], 1)
+    after = np.linalg.solve(np.column_stack([momenta(unit, 0) for unit in np.eye(2)]), before)
+    return np.array([theta[0], after[1], after[0]])
+
+
+def cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def simplest_step(z, slope):
+    """A step of the simplest walker, from and to (theta, dtheta) from the slope's normal (Garcia et al. 1998)."""
+
+    def rates(_t, y):
+        theta, phi, omega, rate = y
+        fall = np.sin(theta - slope)
+        return [omega, rate, fall, fall + np.sin(phi) * (omega**2 - np.cos(theta - slope))]
+
+    def strike(_t, y):
+        return y[1] - 2.0 * y[0] if y[0] < -0.05 else -1.0
+
+    strike.terminal, strike.direction = True, 1.0
+    c = np.cos(2.0 * z[0])
+    start = np.array([z[0], 2.0 * z[0], z[1], (1.0 - c) * z[1]])
+    walk = solve_ivp(rates, (0.0, 8.0), start, method="DOP853", rtol=1e-13, atol=1e-15, events=strike, max_step=0.1)
+    theta, _, omega, _ = walk.y_events[0][0]
+    return np.array([-theta, np.cos(2.0 * theta) * omega])
+
+
+def multiplier_by_differences(step, z, slope):
+    """The smallest real multiplier of the gait near z, by Newton's method on central differences."""
+
+    def derivative(at):
+        h = 1e-5
+        return np.column_stack(
+            [(step(at + h * e, slope) - step(at - h * e, slope)) / (2.0 * h) for e in np.eye(z.size)]
+        )
+
+    for _ in range(3):
+        DP = derivative(z)
+        z = z + np.linalg.solve(np.eye(z.size) - DP, step(z, slope) - z)
+    return float(np.min(np.linalg.eigvals(derivative(z)).real)), z
+
+
+@pytest.mark.parametrize(
+    ("walker_at", "step", "span", "coordinates"),
+    [
+        (paper_walker, compass_step, (1e-4, 0.1, 0.05), lambda z, _: z * [1.0, np.sqrt(G / L), np.sqrt(G / L)]),
+        (simplest_walker, simplest_step, (5e-3, 0.0185, 0.012), lambda z, slope: np.array([z[0] + slope, z[2]])),
+    ],
+    ids=["compass", "simplest"],
+)
+def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(walker_at, step, span, coordinates):
+    branch = next(b for b in family(walker_at, *span, 8) if b.period == 1 and any(p.stable for p in b.points))
+    (flip,) = branch.bifurcations
+    z = coordinates(flip.point.x[:-1], flip.value)
+    slopes, values = [flip.value - 2e-6, flip.value + 2e-6], []
+    for slope in slopes:
+        value, z = multiplier_by_differences(step, z, slope)
+        values.append(value + 1.0)
+    elsewhere = slopes[0] - values[0] * (slopes[1] - slopes[0]) / (values[1] - values[0])
+    assert flip.kind == "flip"
+    assert abs(flip.value - elsewhere) < 1e-7
+
+
+def test_the_cascade_of_the_compass_is_followed_by_itself():
+    flips = flips_of(compass_family())
+    assert np.degrees(flips[(1, "flip")]) == pytest.approx(4.39, abs=5e-3)  # 0.02 deg above what is printed
+    assert np.degrees(flips[(2, "flip")]) == pytest.approx(4.9, abs=0.03)  # Goswami et al. 1996
+    assert np.degrees(flips[(4, "flip")]) == pytest.approx(5.01, abs=5e-3)  # Goswami et al. 1998
+    ratios = feigenbaum_ratios([flips[(period, "flip")] for period in (1, 2, 4, 8)])
+    assert abs(ratios[-1] - 4.669) < 0.02
+
+
+def test_located_flips_have_their_multiplier_at_minus_one_and_their_branch_begins_there():
+    branches = compass_family()
+    for branch in branches:
+        for one in branch.bifurcations:
+            assert abs(one.multiplier + 1.0) < 1e-9
+            children = [b for b in branches if b.ends[0].value == one.value and b.period == 2 * branch.period]
+            assert len(children) == (2 * branch.period <= 8)
+
+
+def test_every_point_of_a_branch_is_a_gait_of_so_many_steps_and_of_no_fewer():
+    step_map = map_of(paper_walker, 0.1)
+    for branch in compass_family():
+        for point in branch.points[:: max(1, len(branch.points) // 4)]:
+            cycle = walk_steps(step_map, point.z, point.value, branch.period)
+            assert np.max(np.abs(cycle.z - point.z)) < 1e-9
+            assert all(np.max(np.abs(step.z - point.z)) > 1e-6 for step in cycle.steps[:-1])
+
+
+def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_does():
+    branches = compass_family()
+    flips = flips_of(branches)
+    stable = next(b for b in branches if b.period == 1 and b.stable_ranges)
+    assert stable.stable_ranges == ((1e-4, flips[(1, "flip")]),)
+    assert [end.reason for end in stable.ends] == ["end of the span"] * 2
+    doubled = next(b for b in branches if b.period == 2)
+    assert doubled.stable_ranges == ((flips[(1, "flip")], flips[(2, "flip")]),)
+
+
+def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():
+    step_map = map_of(paper_walker, 0.1)
+    one, two = (next(b for b in compass_family() if b.period == n and b.stable_ranges) for n in (1, 2))
+    slope = float(np.mean(two.stable_ranges[0]))
+    nearest = min(one.points, key=lambda point: abs(point.value - slope))
+    there = settled(step_map, nearest.z, slope, 300, 40)
+    assert there.period == 2
+    follower = Follower(step_map, Span(1e-4, 0.1))
+    assert follower.lies_on(two, follower.solved_at(there.last, slope, 2))
+
+
+def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
+    step_map = map_of(paper_walker, 0.1)
+    one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
+    gait = next(point for point in one.points if point.value > 0.03)
+    calm = largest_exponent(step_map, gait.z, gait.value, 50, 300)
+    assert calm.exponent == pytest.approx(np.log(abs(gait.multipliers[0])), abs=5e-3)
+    chaotic = settled(step_map, one.points[-1].z, np.radians(5.15), 400, 200)
+    assert chaotic.period == 0
+    wild = largest_exponent(step_map, chaotic.last, chaotic.value, 50, 600)
+    assert wild.exponent > 5.0 * wild.uncertainty > 0.0
+
+
+def test_a_gait_of_three_steps_is_born_in_a_fold():
+    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1))
+    start = period_three_start(follower)
+    (branch,) = [b for b in follower.family([start], 3) if b.period == 3]
+    (fold,) = [one for one in branch.bifurcations if one.kind == "fold"]
+    values = branch.values
+    assert abs(fold.multiplier - 1.0) < 1e-6
+    assert fold.value <= values.min() + 1e-12
+    assert fold.value == pytest.approx(0.0676036, abs=1e-6)
+
+
+def test_curves_of_flips_pass_through_flips_located_for_other_masses():
+    def map_at(hip_mass):
+        return map_of(lambda slope: paper_walker(slope)._replace(hip_mass=hip_mass), 0.1)
+
+    branch = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
+    (flip,) = branch.bifurcations
+    curve = curve_through(flip, 1, map_at, (Span(1e-4, 0.1), Span(9.0, 12.0)), 10.0, 40)
+    index = int(np.argmax(curve.second))
+    heavy = curve.second[index]
+    assert heavy == 12.0
+    heavier = family(lambda slope: paper_walker(slope)._replace(hip_mass=12.0), 0.06, 0.09, 0.07, 1)
+    (elsewhere,) = [one for b in heavier for one in b.bifurcations]
+    assert curve.first[index] == pytest.approx(elsewhere.value, abs=1e-5)  # the curve's end is interpolated
+
+
+def test_a_branch_ends_where_no_walker_has_the_parameters_value():
+    def walker_at(mass):
+        return paper_walker(0.05)._replace(hip_mass=mass) if mass < 13.0 else None
+
+    follower = Follower(map_of(walker_at, 10.0), Span(8.0, 18.0))
+    branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
+    assert branch.ends[1].reason == "no walker has the parameter's next value"
+    assert 12.5 < branch.ends[1].value < 13.0
+
+
+def test_a_branch_that_uses_up_its_points_says_so():
+    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1), limits=Limits(points=5))
+    branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
+    assert all(end.reason == "5 points are used up" for end in branch.ends)
+
+
+class Circle:
+    """x^2 + y^2 = 1, which folds twice over either unknown."""
+
+    def at(self, x):
+        return Evaluated(Outcome.WALKED, np.array([x @ x - 1.0]), 2.0 * x[None, :], None)
+
+
+def test_continuation_goes_round_a_circle_and_finds_where_it_folds():
+    control = StepControl(first=0.1, longest=0.3, turn=0.9)
+    point = corrected(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
+    folds, gone, length = [], 0.0, control.first
+    while gone < 2.0 * np.pi:
+        following, _, length = stepped(Circle(), point, length, control)
+        gone += np.arccos(np.clip(point.x @ following.x, -1.0, 1.0))
+        if point.x[1] * following.x[1] < 0.0:
+            folds.append(root_along(Segment(Circle(), point, following, 1e-14), lambda solved: solved.x[1]).x)
+        point = following
+    assert isinstance(point, Solved)
+    assert np.sort([fold[0] for fold in folds])[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-14)
+
+
+def test_the_action_on_pairs_has_products_of_multipliers_as_its_own():
+    DP = np.random.default_rng(0).standard_normal((5, 5))
+    values = np.linalg.eigvals(DP)
+    products = [values[i] * values[j] for i in range(5) for j in range(i)]
+    found = np.linalg.eigvals(on_pairs(DP))
+    assert np.max([np.min(np.abs(found - product)) for product in products]) < 1e-10
+    assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
+
+
+def test_what_repeats_itself_has_a_period_and_what_does_not_has_none():
+    cycle = np.tile([[0.1, 0.2], [0.3, 0.1], [0.2, 0.5]], (8, 1))
+    assert period_of(cycle) == 3
+    assert period_of(np.random.default_rng(0).standard_normal((30, 2))) == 0

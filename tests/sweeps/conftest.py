@@ -1,0 +1,61 @@
+"""Sweeps of the toy pipeline, in this process and in others."""
+
+import contextlib
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.config.loader import template
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.engines import Engine, Order, Pool
+from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.sweep import Sweep, Work
+
+HERE = Path(__file__).parent
+AT = "toy_sweep.pipeline:GRAPH"
+
+
+@contextlib.contextmanager
+def in_this_process(_order):
+    with ThreadPoolExecutor(1) as executor:
+        yield Pool(executor, 1)
+
+
+HERE_AND_NOW = Engine(in_this_process, chunk_s=5.0)
+
+
+class Toy:
+    def __init__(self, runs):
+        from toy_sweep.pipeline import GRAPH
+
+        self.runs = runs
+        self.graph = GRAPH
+
+    def sweep(self, stage, *over, config=None, sets=(), **options):
+        read = template(config, sets)
+        question = asked(stage, [axis_of_text(text) for text in over], **options)
+        return Sweep(question, read, RunFolder(self.runs, read.base.run_name), self.graph)
+
+    def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):
+        work = Work(engine, order or Order(), chunk_s, force=force, graph=AT)
+        return self.sweep(stage, *over, **options).run(work, reporter)
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(HERE)
+    paths = [str(HERE), str(Path(walkerlab.__file__).parent.parent), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))
+    return Toy(tmp_path / "runs")
+
+
+@pytest.fixture
+def marks(tmp_path, monkeypatch):
+    """Where points that are computed leave a mark: their number."""
+    folder = tmp_path / "marks"
+    folder.mkdir()
+    monkeypatch.setenv("TOY_SWEEP_MARKS", str(folder))
+    return lambda: len(list(folder.iterdir()))

@@ -1,0 +1,206 @@
+"""Workers that die, on this machine, on Dask and as jobs; what is left is there and the guilty point is told."""
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.sweeps.engines import ENGINES, Engine, Order, engine_named
+from walkerlab.sweeps.fan_out import FanOut
+
+LOCAL = ENGINES["local"]
+
+
+def order(workers=2, **more):
+    return Order(workers, modules=("toy_sweep.deadly",), **more)
+
+
+def seeds(swept):
+    return dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["status"].tolist(), strict=True))
+
+
+def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
+    swept = toy.run("deadly", "seed=5:16:12", engine=LOCAL, order=order())
+    assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
+    said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["said"].tolist(), strict=True))
+    assert said[7] == "ZeroDivisionError: a bug"
+    assert said[13].startswith("its worker died: BrokenProcessPool")
+    twice = swept.content[""]["twice"]
+    assert np.nansum(twice) == sum(2 * seed for seed in range(5, 17) if seed not in (7, 13))
+
+
+def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
+    monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
+    swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())
+    assert (tmp_path / "died").exists()
+    assert set(seeds(swept).values()) == {"answered"}
+
+
+def test_workers_that_cannot_start_are_told_and_not_tried_for_ever(toy):
+    with pytest.raises(NoAnswer, match="no worker lives"):
+        toy.run("deadly", "seed=1:4:4", engine=LOCAL, order=Order(1, modules=("no_such_module",)))
+
+
+SWEEPER = """
+import sys
+from pathlib import Path
+from walkerlab.config.loader import template
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.engines import Order
+from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.sweep import Sweep, Work
+from toy_sweep.pipeline import GRAPH
+if __name__ == "__main__":
+    read = template()
+    question = asked("deadly", [axis_of_text("seed=100:179:80")])
+    sweep = Sweep(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
+    order = Order(2, modules=("toy_sweep.deadly",))
+    swept = sweep.run(Work(order=order, chunk_s=0.05, graph="toy_sweep.pipeline:GRAPH"))
+    print(swept.content.digest(), swept.failed)
+"""
+
+
+def workers_of(parent):
+    """Processes below a process, by the kernel's own table."""
+    children = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            pid, rest = entry.read_text().split(" ", 1)
+        except OSError:
+            continue
+        children.setdefault(int(rest.rpartition(")")[2].split()[1]), []).append(int(pid))
+    found, waiting = [], [parent]
+    while waiting:
+        below = children.get(waiting.pop(), [])
+        found += below
+        waiting += below
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs the kernel's table of processes")
+def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
+    monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
+    script = tmp_path / "sweeper.py"
+    script.write_text(SWEEPER)
+    command = [sys.executable, str(script), str(toy.runs)]
+    chunks = toy.runs / "paper" / "sweep-chunks"
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 90.0
+    while not (chunks.is_dir() and len(list(chunks.glob("*.h5"))) >= 3) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    below = workers_of(process.pid)
+    process.kill()
+    process.wait()
+    assert below
+    while any(is_alive(pid) for pid in below) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [pid for pid in below if is_alive(pid)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    undisturbed = toy.run("deadly", "seed=100:179:80", force=True).content.digest()
+    assert done.stdout.split() == [undisturbed, "0"]
+
+
+def is_alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        killer = threading.Timer(1.0, lambda: [os.kill(pid, signal.SIGKILL) for pid in pids])
+        killer.start()
+        engine, _ = engine_named("dask")
+        swept = toy.run(
+            "deadly", "seed=100:219:120", engine=engine, order=order(address=client.scheduler.address), chunk_s=0.2
+        )
+        killer.join()
+        assert set(client.run(os.getpid).values()).isdisjoint(pids)
+    assert set(seeds(swept).values()) == {"answered"}
+    assert swept.content.digest() == toy.run("deadly", "seed=100:219:120", force=True).content.digest()
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_dask_makes_a_cluster_of_its_own(toy):
+    pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    engine, address = engine_named("dask")
+    assert address == ""
+    swept = toy.run("deadly", "seed=100:103:4", engine=engine, order=order(1))
+    assert set(seeds(swept).values()) == {"answered"}
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_jobs_on_this_machine_give_the_same(toy, tmp_path):
+    pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    options = {"cluster": "local", "timeout_min": "5"}
+    swept = toy.run("deadly", "seed=11:16:6", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
+    assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
+    assert "its worker died" in swept.content[""]["said"][2]
+
+
+FAKE_SBATCH = """#!/bin/sh
+cp "$1" {folder}/submitted.sh
+echo "Submitted batch job 42"
+"""
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatch):
+    pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    for name, text in (
+        ("sbatch", FAKE_SBATCH.format(folder=tmp_path)),
+        ("srun", "#!/bin/sh\n"),
+        ("sacct", "#!/bin/sh\n"),
+    ):
+        program = tmp_path / name
+        program.write_text(text)
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    options = {"slurm_partition": "short", "timeout_min": "30", "python": "/opt/python"}
+    with ENGINES["slurm"].opened(Order(options=options, folder=tmp_path)) as pool:
+        assert pool.workers == 16
+        pool.executor.submit(os.getpid)
+    job = (tmp_path / "submitted.sh").read_text()
+    for line in ("--partition=short", "--time=30", "--cpus-per-task=1", "--job-name=walkerlab"):
+        assert f"#SBATCH {line}" in job
+    assert "/opt/python -u -m submitit" in job
+
+
+def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
+    with pytest.raises(ConfigError, match="no such engine; there are local, dask, slurm"):
+        engine_named("cloud")
+    assert engine_named("dask=tcp://10.0.0.1:8786")[1] == "tcp://10.0.0.1:8786"
+    with pytest.raises(ConfigError, match="takes no address"), LOCAL.opened(Order(address="x")):
+        pass
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError) as caught, ENGINES["dask"].opened(Order()):
+        pass
+    assert caught.value.advice == "pip install 'walkerlab[dask]'"
+
+
+def test_chunks_grow_with_what_was_measured_and_shrink_towards_the_end():
+    work = FanOut(Engine(None, 5.0), Order(), 5.0, iter(()), 10_000)
+    assert work._chunk_size(2) == 2
+    work.point_s = 0.01
+    assert work._chunk_size(2) == 500
+    work.left = 60
+    assert work._chunk_size(2) == 50  # half a second of work, however little is left
+    work.point_s = 20.0
+    assert work._chunk_size(2) == 1

@@ -1,0 +1,193 @@
+"""A sweep of quick points: what is computed, what is taken over, what is stored."""
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from walkerlab.errors import ConfigError, StorageError
+from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.stages.runner import execute
+from walkerlab.store import artifact
+from walkerlab.store.files import refused
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps import sweep as sweeps
+from walkerlab.sweeps.chunk import FOLDER
+from walkerlab.sweeps.result import as_csv
+
+GRAVITIES = "gravity_m_s2=1:9:5"
+
+
+def opened(swept):
+    return xr.open_dataset(swept.path, engine="h5netcdf")
+
+
+def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
+    swept = toy.run("drop", GRAVITIES, "walker.hip_mass_kg=[1, 2]")
+    assert (swept.done, swept.failed, swept.reused) == (10, 0, 0)
+    with opened(swept) as dataset:
+        assert dataset.period_s.dims == ("gravity_m_s2", "hip_mass_kg")
+        assert dataset.gravity_m_s2.values.tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+        assert dataset.hip_mass_kg.attrs["units"] == "kg"
+        assert dataset.period_s.attrs == {"units": "s", "long_name": "duration of the fall"}
+        assert dataset.speed_m_s.attrs["units"] == "m/s"
+        assert float(dataset.period_s.sel(gravity_m_s2=9.0, hip_mass_kg=1)) == math.sqrt(2 / 9)
+        assert dataset["losses_J.ground"].values.tolist() == [[1.0, 2.0]] * 5
+        assert dataset.bounces.dtype == np.int64
+        assert dataset.stable.dtype == bool
+        assert dataset.state.dims == ("gravity_m_s2", "hip_mass_kg", "state_index")
+        assert dataset.found_by.values[0, 0] == "looking; asking"
+        assert dataset["rows.0.error"].values.tolist() == [[0.5, 0.5]] * 5
+        assert not [name for name in dataset if "wall_s" in name or "left_out" in name]
+
+
+def test_a_row_is_what_the_stage_says_for_that_config(toy):
+    swept = toy.run("roll", GRAVITIES, "strides=[2, 3]")
+    config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").points.config(7)
+    report = execute(config, "roll", RunFolder(toy.runs / "elsewhere", "one"), graph=toy.graph)
+    assert swept.content[""]["way_m"].ravel()[7] == report.summary["way_m"]
+    assert set(swept.content[""]["outcome"].ravel()) == {"walked"}
+
+
+def test_points_without_an_answer_are_rows_that_say_why(toy):
+    swept = toy.run("drop", "slope_rad=[0.1, 0.35, 1.2]")
+    assert (swept.done, swept.failed) == (3, 0)
+    with opened(swept) as dataset:
+        assert dataset.outcome.values.tolist() == ["answered", "answered", "no-answer"]
+        assert str(dataset.said.values[2]) == "too steep: 1.2"
+        assert np.isnan(dataset.period_s.values).tolist() == [False, False, True]
+        assert dataset.bounces.values.tolist() == [3, 3, 0]
+        assert np.isfinite(dataset.slips_m).sum("slips_m_index").values.tolist() == [2, 4, 0]
+    needing = toy.run("roll", "slope_rad=[0.1, 1.2]")
+    assert needing.content[""]["said"].tolist() == ["", "it needs drop: too steep: 1.2"]
+
+
+def test_nothing_is_computed_twice(toy, marks):
+    toy.run("drop", GRAVITIES)
+    assert marks() == 5
+    assert toy.run("drop", GRAVITIES).reused == 5
+    more = toy.run("drop", "gravity_m_s2=1:9:9")
+    assert (more.reused, more.done) == (5, 9)
+    assert marks() == 9
+    other_run = toy.run("drop", GRAVITIES, sets=["strides=7"])
+    assert other_run.path.parent.name == "paper@strides=7"
+    assert other_run.reused == 5
+    assert marks() == 9
+
+
+def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, marks):
+    notes = []
+    reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
+    swept = toy.run("drop", GRAVITIES, "strides=[2, 3, 4]", reporter=reporter)
+    assert swept.done == 15
+    assert marks() == 5
+    assert any("drop does not read strides" in note for note in notes)
+
+
+def test_a_single_run_is_taken_over(toy, marks):
+    config = toy.sweep("drop", GRAVITIES).points.config(2)
+    execute(config, "drop", RunFolder(toy.runs, "alone"), graph=toy.graph)
+    assert marks() == 1
+    assert toy.run("drop", GRAVITIES).reused == 1
+    assert marks() == 5
+
+
+def test_keys_are_those_that_the_pipeline_stores_under(toy):
+    config = toy.sweep("roll", GRAVITIES).points.config(1)
+    report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
+    keys = Keys(toy.graph).of(config, "roll")
+    assert keys == {name: artifact.read(toy.runs / "alone" / f"{name}.h5").identity.key for name in ("drop", "roll")}
+    assert report.summary == InMemory(toy.graph).answer(config, "roll", keys).content.summary
+
+
+def test_what_several_points_need_is_computed_once(toy, marks):
+    toy.run("roll", "strides=2:9:8")
+    assert marks() == 1
+
+
+def test_a_damaged_chunk_is_computed_again(toy, marks):
+    first = toy.run("drop", GRAVITIES)
+    for path in (toy.runs / "paper" / FOLDER).iterdir():
+        path.write_bytes(path.read_bytes()[:-1])
+    again = toy.run("drop", GRAVITIES)
+    assert again.reused == 0
+    assert again.content.digest() == first.content.digest()
+    assert marks() == 5  # the same points, in the same process
+
+
+def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
+    whole = toy.run("drop", "gravity_m_s2=1:9:40").content.digest()
+    toy.runs = tmp_path / "again"
+    kept = []
+
+    def full_disk(folder, *rest):
+        if len(kept) == 2:
+            raise refused(folder.path, OSError(28, "No space left on device"))
+        kept.append(store(folder, *rest))
+
+    store = sweeps.store
+    monkeypatch.setattr(sweeps, "store", full_disk)
+    with pytest.raises(StorageError, match="No space left"):
+        toy.run("drop", "gravity_m_s2=1:9:40", chunk_s=1e-9)
+    monkeypatch.setattr(sweeps, "store", store)
+    resumed = toy.run("drop", "gravity_m_s2=1:9:40")
+    assert 0 < resumed.reused < 40
+    assert resumed.content.digest() == whole
+
+
+def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
+    with pytest.raises(ConfigError) as caught:
+        toy.run("drop", "gravity_m_s2=[1, -2, 3]", "walker.hip_mass_kg=[1, -7]")
+    assert "at gravity_m_s2=-2, walker.hip_mass_kg=1" in caught.value.message
+    assert "walker.hip_mass_kg: -7 is out of bounds" in caught.value.message
+    assert marks() == 0
+    assert not toy.runs.exists()
+
+
+def test_only_stages_without_files_can_be_swept(toy):
+    with pytest.raises(ConfigError, match="cannot be swept"):
+        toy.sweep("picture", GRAVITIES)
+
+
+def test_lists_of_points_have_their_parameters_as_coordinates(toy):
+    swept = toy.run("drop", "gravity_m_s2=1:9", "walker.hip_mass_kg=1:5", sample="latin-hypercube:6", seed=2)
+    with opened(swept) as dataset:
+        assert dataset.period_s.dims == ("point",)
+        assert set(dataset.coords) == {"gravity_m_s2", "hip_mass_kg"}
+        assert dataset.period_s.values == pytest.approx(np.sqrt(2 / dataset.gravity_m_s2.values), rel=1e-15)
+
+
+def test_a_dry_run_says_what_is_there_and_what_the_rest_will_take(toy):
+    toy.run("drop", GRAVITIES)
+    foreseen = toy.sweep("drop", "gravity_m_s2=1:9:9").foresee(workers=2, shown=3)
+    assert (foreseen.count, foreseen.there) == (9, 5)
+    assert foreseen.points == ("gravity_m_s2=1.0", "gravity_m_s2=2.0", "gravity_m_s2=3.0")
+    assert 0.0 < foreseen.estimate_s < 1.0
+    unknown = toy.sweep("roll", GRAVITIES).foresee(2, 1)
+    assert unknown.estimate_s is None
+
+
+def test_the_table_has_a_row_for_each_point(toy):
+    swept = toy.run("drop", "slope_rad=[0.1, 1.2]", "gravity_m_s2=[2, 8]")
+    rows = list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question))))
+    assert [(row["slope_rad"], row["gravity_m_s2"]) for row in rows] == [
+        ("0.1", "2"),
+        ("0.1", "8"),
+        ("1.2", "2"),
+        ("1.2", "8"),
+    ]
+    assert [row["period_s"] for row in rows] == ["1.0", "0.5", "", ""]
+    assert rows[0]["state_1"] == "1.0"
+
+
+def test_the_file_says_what_was_asked(toy):
+    swept = toy.run("drop", GRAVITIES)
+    stored = artifact.read(swept.path)
+    assert stored.summary["parameters"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
+    assert stored.identity.config_slice["over"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
+    assert json.dumps(stored.summary["outcomes"]) == '{"answered": 5}'
+    assert stored.digest() == swept.content.digest()

@@ -1,0 +1,1 @@
+"""A pipeline whose points are quick, without an answer, wrong, or deadly."""

@@ -1,0 +1,86 @@
+"""The package from Python."""
+
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab import api
+from walkerlab.errors import ConfigError, StaleError
+from walkerlab.store.code import Sources
+
+
+def test_the_examples_of_the_docstrings_say_what_happens(tmp_path):
+    found = doctest.testmod(api, extraglobs={"folder": tmp_path})
+    assert found.attempted > 10
+    assert found.failed == 0
+
+
+def test_everything_that_is_offered_is_there_and_described():
+    for name in walkerlab.__all__:
+        assert getattr(walkerlab, name).__doc__
+    assert set(walkerlab.__all__) <= set(dir(walkerlab))
+    with pytest.raises(AttributeError, match="no attribute 'sprint'"):
+        _ = walkerlab.sprint
+
+
+def test_importing_the_package_loads_nothing():
+    command = "import sys; before = set(sys.modules); import walkerlab; print(*(set(sys.modules) - before))"
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert loaded <= {"walkerlab"} | sys.stdlib_module_names
+
+
+def test_no_stage_is_made_of_the_python_interface():
+    """Else every result would be out of date once a docstring of it is edited."""
+    names = {module.name for module in Sources().closure("walkerlab.stages.fixedpoint")}
+    assert "walkerlab" in names
+    assert "walkerlab.api" not in names
+
+
+def test_a_run_from_python_is_the_run_of_the_command_line(tmp_path):
+    result = walkerlab.run("simulate", set={"slope_deg": 2}, runs=tmp_path, strides=1)
+    assert result.artifact == tmp_path / "paper@slope_deg=2,strides=1" / "simulate.h5"
+    assert result.summary["stage"] == "simulate"
+    assert result.summary["steps"] == 2
+    again = walkerlab.run("simulate", set={"slope_deg": 2}, runs=tmp_path, strides=1)
+    assert again.summary["reused"]
+    opened = walkerlab.open_run("paper@slope_deg=2,strides=1", tmp_path)
+    assert opened.stages == ("fixedpoint", "simulate")
+    assert opened.config.strides == 1
+    assert opened.result("simulate").summary["steps"] == 2
+    with pytest.raises(StaleError, match="tune"):
+        opened.result("tune")
+
+
+def test_in_memory_is_what_the_run_finds_and_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    walk = walkerlab.simulate(slope_deg=2, strides=1)
+    assert not list(tmp_path.iterdir())
+    stored = walkerlab.run("simulate", set={"slope_deg": 2}, strides=1)
+    assert {key: stored.summary[key] for key in walk.summary if key != "left_out"} == {
+        key: value for key, value in walk.summary.items() if key != "left_out"
+    }
+    assert walk.dataset("steps").equals(stored.dataset("steps"))
+
+
+def test_no_answer_is_a_value():
+    gait = walkerlab.find_gait(slope_deg=-1)
+    assert "no gait at a slope" in gait.no_answer
+    walk = walkerlab.simulate(slope_deg=-1)
+    assert walk.no_answer.startswith("it needs fixedpoint: no gait")
+    assert walk.summary == {}
+
+
+def test_what_cannot_be_meant_is_refused():
+    with pytest.raises(ConfigError, match="did you mean hip_mass_kg"):
+        walkerlab.compass(hip_mas_kg=3)
+    with pytest.raises(ConfigError, match="no such stage"):
+        walkerlab.run("walk")
+    with pytest.raises(KeyError, match="there are"):
+        walkerlab.find_gait().dataset("gaits")
+    with pytest.raises(StaleError, match="there is no run"):
+        walkerlab.open_run("nothing", Path("nowhere"))

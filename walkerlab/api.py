@@ -1,0 +1,304 @@
+"""The package from Python: runs that are stored as the command line stores them, and plain objects in memory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from walkerlab.config.loader import load, template
+from walkerlab.config.overlay import tree_of
+from walkerlab.config.placing import on_the_slope
+from walkerlab.config.schema import Config, Contact
+from walkerlab.config.tree import Mapping as Tree
+from walkerlab.config.tree import Position
+from walkerlab.config.validation import typed
+from walkerlab.errors import ConfigError, StaleError
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.stages.runner import execute
+from walkerlab.stages.runs import config_of, results_in, run_named
+from walkerlab.store import artifact
+from walkerlab.store.artifact import Damaged
+from walkerlab.store.content import Content, Group
+from walkerlab.store.runfolder import RunFolder
+
+RUNS = "runs"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a stage found.
+
+    stage      its name
+    summary    the keys that `--json` prints, SI units
+    content    all labelled arrays, in groups
+    no_answer  why there is no answer, in words; None if there is one
+    artifact   its file; None if it was computed in memory
+    """
+
+    stage: str
+    summary: Mapping[str, Any]
+    content: Content
+    no_answer: str | None = None
+    artifact: Path | None = None
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The groups that `dataset` gives."""
+        return tuple(path for path, group in self.content.groups.items() if group.variables)
+
+    def dataset(self, group: str) -> Any:
+        """One group as an xarray Dataset, with units and long names.
+
+        Raises KeyError for a group that is not there.
+        """
+        if group not in self.groups:
+            raise KeyError(f"{self.stage} has no group {group!r}; there are {', '.join(self.groups) or 'none'}")
+        return dataset(self.content[group])
+
+
+@dataclass(frozen=True)
+class Run:
+    """A folder of stored results."""
+
+    folder: RunFolder
+
+    @property
+    def config(self) -> Config:
+        """The config that its last result was made with; StaleError if it cannot be told."""
+        config = config_of(self.folder)
+        if config is None:
+            raise StaleError(f"{self.folder.path} has no result that tells its config.")
+        return config
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages that it has results of."""
+        return tuple(results_in(self.folder))
+
+    @property
+    def sweeps(self) -> tuple[str, ...]:
+        """The sweeps that it has, as `sweep` takes them."""
+        return tuple(sorted(path.stem for path in self.folder.path.glob("sweep-*.h5")))
+
+    def result(self, stage: str) -> Result:
+        """The stored result of a stage, whether or not it is up to date; StaleError if there is none."""
+        return stored(self.folder.artifact(stage), stage)
+
+    def sweep(self, name: str = "") -> Any:
+        """A sweep as one xarray Dataset; without a name the only one there is."""
+        names = self.sweeps
+        if not name and len(names) != 1:
+            raise StaleError(f"{self.folder.path} has {len(names)} sweeps: {', '.join(names) or 'none'}.")
+        return stored(self.folder.path / f"{name or names[0]}.h5", "sweep").dataset("")
+
+
+def run(
+    stage: str,
+    config: str | Path = "paper",
+    set: Mapping[str, Any] | None = None,
+    runs: str | Path = RUNS,
+    *,
+    strides: int | None = None,
+    force: bool = False,
+    jobs: int = 1,
+) -> Result:
+    """Do what `walkerlab STAGE` does: reuse what is up to date, run the rest, store it.
+
+    config   a file, or the name of a built-in config
+    set      keys of the config with other values, as {"slope_deg": 3}
+    runs     the folder of all runs
+    strides  to walk, for stages that walk
+
+    Raises ConfigError for a config that is not usable. A question without an answer is told in `Result.no_answer`.
+
+    >>> gait = run("fixedpoint", set={"slope_deg": 3}, runs=folder)
+    >>> round(gait.summary["period_s"], 4)
+    0.7343
+    >>> float(gait.dataset("corrected/gaits").period_s.max()) == gait.summary["period_s"]
+    True
+    """
+    from walkerlab.cli.stage import as_json
+
+    refuse_unknown_stage(stage)
+    loaded = load(Path(config), settings(set), strides)
+    folder = RunFolder(Path(runs), loaded.run_name)
+    report = execute(loaded.config, stage, folder, force=force, jobs=jobs)
+    content = artifact.read(report.artifact) if report.artifact is not None else Content()
+    said = None if report.no_answer is None else report.no_answer.message
+    return Result(stage, as_json(report), content, said, report.artifact)
+
+
+def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
+    """A run that is stored: by its name in the folder of all runs, or by its own folder.
+
+    Raises StaleError if there is none.
+
+    >>> _ = run("fixedpoint", runs=folder)
+    >>> open_run("paper", folder).result("fixedpoint").summary["stable"]
+    True
+    """
+    return Run(run_named(str(name), Path(runs)))
+
+
+def sweep(
+    stage: str,
+    over: Mapping[str, Sequence[Any] | str],
+    config: str | Path = "paper",
+    set: Mapping[str, Any] | None = None,
+    runs: str | Path = RUNS,
+    *,
+    zip: bool = False,
+    sample: str = "",
+    seed: int = 1,
+    engine: str = "local",
+    jobs: int = 0,
+) -> Any:
+    """Do what `walkerlab sweep` does, and give its file as one xarray Dataset.
+
+    over    for each key of a config its values, or "FROM:TO:N"
+    jobs    chunks computed at once; 0 leaves it to the engine
+
+    Worker processes import the calling script anew: call it under `if __name__ == "__main__":` there.
+
+    >>> gaits = sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=folder, jobs=1)
+    >>> [round(float(period), 4) for period in gaits.period_s]
+    [0.7036, 0.7343]
+    """
+    from walkerlab.sweeps.engines import Order, engine_named
+    from walkerlab.sweeps.question import asked
+    from walkerlab.sweeps.sweep import Sweep, Work, modules_of
+
+    read = template(Path(config), settings(set))
+    listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
+    question = asked(stage, listed, zip, sample, seed)
+    chosen, address = engine_named(engine)
+    folder = RunFolder(Path(runs), read.base.run_name)
+    order = Order(jobs, address, modules_of(stage, read.base.config, PIPELINE), folder.path)
+    return dataset(Sweep(question, read, folder).run(Work(chosen, order)).content[""])
+
+
+def walker(type: str, **keys: Any) -> Any:
+    """A walker of any type, as a block of a config: keys that are left out have their defaults.
+
+    Raises ConfigError for a key or value that the type does not have.
+    """
+    return typed_lines({"walker": {"type": type, **keys}})[0].walker
+
+
+def compass(**keys: Any) -> Any:
+    """The compass walker: two straight legs with a mass on each, and a mass at the hip; the paper's by default.
+
+    >>> compass(hip_mass_kg=20).total_mass_kg
+    30.0
+    """
+    return walker("compass", **keys)
+
+
+def contact(**keys: Any) -> Contact:
+    """The ground of the physical model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
+
+    >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
+    100000.0
+    """
+    made = typed_lines({"contact": keys})[0].contact
+    assert made is not None, "a block that is given is there"
+    return made
+
+
+def find_gait(walker: Any = None, slope_deg: float = 1.0, **keys: Any) -> Result:
+    """The periodic gaits of a walker on a slope, in memory: the chosen one in `summary`, all of them in `dataset`.
+
+    walker     from `compass` or `walker`; the paper's if left out
+    slope_deg  positive downhill, deg
+    keys       other keys of a config, such as gravity_m_s2, equations, seed
+
+    >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
+    >>> gait.summary["stable"], round(gait.summary["period_s"], 4)
+    (True, 0.7343)
+    """
+    return in_memory("fixedpoint", config_of_scene(walker, slope_deg, keys))
+
+
+def simulate(
+    walker: Any = None, slope_deg: float = 1.0, contact: Contact | None = None, strides: int = 5, **keys: Any
+) -> Result:
+    """Walk, in memory: the rigid model, or with `contact` the physical one; from the gait unless `start` is given.
+
+    walker     from `compass` or `walker`; the paper's if left out
+    slope_deg  positive downhill, deg
+    contact    the ground, from `contact`; None is the rigid model
+    keys       other keys of a config, such as start, gravity_m_s2, solver
+
+    >>> walk = simulate(slope_deg=1, strides=2)
+    >>> walk.summary["outcome"], walk.summary["steps"]
+    ('walked', 4)
+    >>> walk.dataset("trajectory").angle.dims
+    ('time', 'leg')
+    """
+    more = {} if contact is None else {"contact": contact.model_dump(mode="json")}
+    config = config_of_scene(walker, slope_deg, {**keys, **more, "strides": strides})
+    return in_memory("simulate" if contact is None else "contact-sim", config)
+
+
+def dataset(group: Group) -> Any:
+    """A group of labelled arrays as an xarray Dataset: variables named as a dimension are its coordinates."""
+    try:
+        import xarray
+    except ImportError as error:
+        raise ConfigError("a Dataset needs xarray, which is not installed.", "pip install xarray") from error
+    data = {
+        name: (variable.dims, variable.values, {"units": variable.units, "long_name": variable.long_name})
+        for name, variable in group.variables.items()
+    }
+    made = xarray.Dataset(data, attrs=dict(group.attrs))
+    return made.set_coords(str(group.attrs.get("coordinates", "")).split())
+
+
+def in_memory(stage: str, config: Config) -> Result:
+    """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
+    refuse_unknown_stage(stage)
+    answer = InMemory().answer(config, stage, Keys().of(config, stage))
+    said = None if answer.no_answer is None else answer.no_answer.message
+    return Result(stage, answer.content.summary, answer.content, said)
+
+
+def config_of_scene(walker: Any, slope_deg: float, keys: Mapping[str, Any]) -> Config:
+    """The config of a walker on a slope; ConfigError for keys that configs do not have."""
+    lines: dict[str, Any] = {"name": "memory", "slope_deg": float(slope_deg), **keys}
+    if walker is not None:
+        lines["walker"] = walker.model_dump(mode="json")
+    config, tree = typed_lines(lines)
+    return on_the_slope(config, tree)[0]
+
+
+def typed_lines(lines: Mapping[str, Any]) -> tuple[Config, Tree]:
+    """Keys of a config, nested, as plain values, as a config; ConfigError for what is wrong with them."""
+    tree = tree_of(dict(lines), Position("walkerlab", 1, 1))
+    assert isinstance(tree, Tree)
+    return typed(tree), tree
+
+
+def settings(values: Mapping[str, Any] | None) -> list[str]:
+    """Values of keys as `--set` options."""
+    return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
+
+
+def refuse_unknown_stage(stage: str) -> None:
+    """Raise ConfigError for a stage that there is not."""
+    names = [one.name for one in PIPELINE.stages]
+    if stage not in names:
+        raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
+
+
+def stored(path: Path, what: str) -> Result:
+    """The result in a file; StaleError if there is none that can be trusted."""
+    try:
+        found = artifact.read(path)
+    except (OSError, Damaged) as error:
+        raise StaleError(f"{path} has no result: {error}.", f"`walkerlab {what}` makes it.") from error
+    said = found.summary.get("no_answer")
+    return Result(what, found.summary, found, None if said is None else str(said["message"]), path)

@@ -1,0 +1,135 @@
+"""Commands over whole runs: `walkerlab diff`, and the list that `walkerlab status` ends with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from walkerlab.cli.failures import exit_on_failure, print_json
+from walkerlab.cli.options import RUNS, AsJson, Runs, Verbose
+from walkerlab.stages.graph import Graph
+
+if TYPE_CHECKING:
+    from walkerlab.stages.runs import Difference, Pair, RunSummary
+
+SAME = 1e-12
+"""Relative change below which two numbers are shown as the same."""
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    """Add the commands to a program for a pipeline."""
+
+    @app.command()
+    def diff(
+        first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
+        second: Annotated[str, typer.Argument(metavar="RUN_B", help="Another one.")],
+        runs: Runs = RUNS,
+        as_json: AsJson = False,
+        verbose: Verbose = False,
+    ) -> None:
+        """Say how two runs differ: configs, numbers with relative change, walks over one another."""
+        with exit_on_failure("diff", as_json):
+            from walkerlab.errors import StaleError
+            from walkerlab.stages.runs import difference, results_in, run_named
+
+            folders = (run_named(first, runs), run_named(second, runs))
+            results = [results_in(folder, graph) for folder in folders]
+            for folder, found in zip(folders, results, strict=True):
+                if not found:
+                    raise StaleError(f"{folder.path} has no results.", "A stage's command makes them.")
+            found_difference = difference(results[0], results[1])
+            figures = draw(folders, results)
+            if as_json:
+                print_json(as_object(folders, found_difference, figures))
+            else:
+                print("\n".join(lines(folders, found_difference, figures, verbose)))
+
+
+def draw(folders: tuple[Any, Any], results: list[dict[str, Any]]) -> list[Path]:
+    """The figure of both walks, in the first run's folder of figures."""
+    from walkerlab.figures.overlay import overlaid
+    from walkerlab.store.files import make_folder, write_atomically
+
+    drawn = overlaid(results[0], results[1], (folders[0].name, folders[1].name))
+    if drawn is None:
+        return []
+    make_folder(folders[0].figures)
+    paths = [folders[0].figures / f"diff-{folders[1].name}.{kind}" for kind in ("svg", "png")]
+    for path, data in zip(paths, drawn, strict=True):
+        write_atomically(path, data)
+    return paths
+
+
+def as_object(folders: tuple[Any, Any], found: Difference, figures: list[Path]) -> dict[str, Any]:
+    """A difference as JSON."""
+    return {
+        "stage": "diff",
+        "runs": [str(folder.path) for folder in folders],
+        "config": [{"key": key, "first": first, "second": second} for key, first, second in found.config],
+        "numbers": {
+            stage: [
+                {"name": pair.name, "first": pair.first, "second": pair.second, "change": pair.change} for pair in pairs
+            ]
+            for stage, pairs in found.numbers.items()
+        },
+        "only_first": list(found.only_first),
+        "only_second": list(found.only_second),
+        "figures": [str(path) for path in figures],
+    }
+
+
+def lines(folders: tuple[Any, Any], found: Difference, figures: list[Path], verbose: bool) -> list[str]:
+    """A difference for people: what differs, and with `verbose` what does not."""
+    from walkerlab.cli.text import aligned, in_words
+
+    names = [folder.name for folder in folders]
+    result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
+    if not found.config:
+        result[1:] = ["  the same"]
+    for stage, pairs in found.numbers.items():
+        shown = [pair for pair in pairs if verbose or differs(pair)]
+        rows = [[pair.name, in_words(pair.first), in_words(pair.second), percent(pair)] for pair in shown]
+        result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
+    for name, only in zip(names, (found.only_first, found.only_second), strict=True):
+        if only:
+            result.append(f"only in {name}: {', '.join(only)}")
+    return [*result, *(f"figure: {path}" for path in figures[1:])]
+
+
+def differs(pair: Pair) -> bool:
+    """Whether two values are worth showing beside one another."""
+    if pair.change is not None:
+        return abs(pair.change) > SAME
+    return bool(pair.first != pair.second)
+
+
+def percent(pair: Pair) -> str:
+    """A relative change in per cent."""
+    return "" if pair.change is None else f"{100.0 * pair.change:+.3g} %"
+
+
+def rows_of_runs(found: list[RunSummary]) -> list[list[str]]:
+    """All runs as a table's rows."""
+    head = ["run", "results", "up to date", "sweeps", "size", "last written"]
+    return [head, *(row_of(run) for run in found)]
+
+
+def row_of(run: RunSummary) -> list[str]:
+    """One run as a row."""
+    current = "unknown config" if run.current is None else str(len([s for s in run.stages if s in run.current]))
+    return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed]
+
+
+def run_object(run: RunSummary) -> dict[str, Any]:
+    """One run as JSON."""
+    return {
+        "name": run.name,
+        "run_dir": str(run.run_dir),
+        "stages": list(run.stages),
+        "current": None if run.current is None else [name for name in run.stages if name in run.current],
+        "sweeps": list(run.sweeps),
+        "bytes": run.bytes,
+        "changed_utc": run.changed,
+    }

@@ -1,0 +1,246 @@
+"""`walkerlab sweep`: one question over many configs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from walkerlab.cli.failures import described, exit_on_failure, print_json, say
+from walkerlab.cli.options import RUNS, AsJson, ConfigFile, DryRun, Force, NoWait, Quiet, Runs, Sets, Strides, Verbose
+from walkerlab.stages.graph import PIPELINE, Graph
+
+if TYPE_CHECKING:
+    from walkerlab.cli.request import Request
+    from walkerlab.sweeps.sweep import Foreseen, Swept
+
+SHOWN = 20
+"""Points that a dry run lists."""
+
+Over = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
+    ),
+]
+Of = Annotated[str | None, typer.Option("--stage", metavar="NAME", help="The stage whose numbers are wanted.")]
+Zip = Annotated[bool, typer.Option("--zip", help="The n-th values make the n-th point, not each with each.")]
+Sample = Annotated[
+    str | None, typer.Option("--sample", metavar="SAMPLER:N", help="Draw points: latin-hypercube:500, sobol:512.")
+]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of that drawing; default 1.")]
+EngineName = Annotated[
+    str, typer.Option("--engine", metavar="NAME", help="Where it is computed: local, dask[=ADDRESS] or slurm.")
+]
+EngineOptions = Annotated[
+    list[str] | None,
+    typer.Option("--engine-option", metavar="NAME=VALUE", help="Of slurm: slurm_partition, timeout_min, cluster, ..."),
+]
+Jobs = Annotated[
+    int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; default: all cores, of slurm 16.")
+]
+ChunkSeconds = Annotated[
+    float | None, typer.Option("--chunk-seconds", metavar="S", help="How long a chunk is to take; default by engine.")
+]
+Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="A number to draw; may be repeated.")]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Print the points as a table, and keep it beside the result.")]
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    """Add the command to a program for a pipeline."""
+
+    @app.command()
+    def sweep(
+        over: Over = None,
+        stage: Of = None,
+        zipped: Zip = False,
+        sample: Sample = None,
+        seed: Seed = None,
+        config: ConfigFile = None,
+        sets: Sets = None,
+        strides: Strides = None,
+        runs: Runs = RUNS,
+        engine: EngineName = "local",
+        engine_option: EngineOptions = None,
+        jobs: Jobs = 0,
+        chunk_seconds: ChunkSeconds = None,
+        show: Show = None,
+        force: Force = False,
+        dry_run: DryRun = False,
+        no_wait: NoWait = False,
+        as_csv: AsCsv = False,
+        as_json: AsJson = False,
+        quiet: Quiet = False,
+        verbose: Verbose = False,
+    ) -> None:
+        """Ask a stage over many values of parameters; what is computed already is taken over."""
+        with exit_on_failure("sweep", as_json):
+            from walkerlab.cli.request import Request
+            from walkerlab.sweeps.engines import Order, engine_named
+            from walkerlab.sweeps.question import axis_of_text
+            from walkerlab.sweeps.sweep import Sweep, Work, modules_of
+
+            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
+            chosen, address = engine_named(engine)
+            template = request.template
+            texts = [axis_of_text(text) for text in over or ()]
+            question = question_of(template.base.config.sweep, texts, stage, zipped, sample, seed)
+            asked = Sweep(question, template, request.folder, graph)
+            if dry_run:
+                show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
+                return
+            order = Order(
+                workers=jobs,
+                address=address,
+                modules=modules_of(question.stage, template.base.config, graph),
+                folder=request.folder.path,
+                options=options_of(engine_option or ()),
+            )
+            work = Work(chosen, order, chunk_seconds, not no_wait, force, where(graph))
+            swept = asked.run(work, request.console)
+            show_result(request, swept, tuple(show or ()), as_csv)
+
+
+def question_of(
+    block: Any,
+    over: list[tuple[str, Any, str]],
+    stage: str | None,
+    zipped: bool,
+    sample: str | None,
+    seed: int | None,
+) -> Any:
+    """What is asked: the options, and of what they leave open the config's `sweep` block."""
+    from walkerlab.config.sweep import Sweep
+    from walkerlab.sweeps.question import asked
+
+    given = block or Sweep()
+    listed = over or [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+    return asked(
+        stage or given.stage,
+        listed,
+        zipped or (given.zip and not over),
+        sample if sample is not None else "" if over else given.sample,
+        given.seed if seed is None else seed,
+    )
+
+
+def options_of(texts: tuple[str, ...] | list[str]) -> dict[str, str]:
+    """An engine's own options; typer.BadParameter for one that is not NAME=VALUE."""
+    options = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--engine-option")
+        options[name] = value
+    return options
+
+
+def where(graph: Graph) -> str:
+    """Where a worker finds the pipeline, as module:NAME."""
+    from walkerlab.sweeps.sweep import PIPELINE_AT
+
+    if graph is PIPELINE:
+        return PIPELINE_AT
+    module = graph.stages[0].module.partition(".")[0]
+    return f"{module}.pipeline:GRAPH"
+
+
+def show_plan(request: Request, foreseen: Foreseen) -> None:
+    """Say what would be done."""
+    missing = foreseen.count - foreseen.there
+    if request.as_json:
+        print_json(
+            {
+                **common(request, foreseen.path, 0.0),
+                "dry_run": True,
+                "points": foreseen.count,
+                "reused": foreseen.there,
+                "to_compute": missing,
+                "estimate_s": foreseen.estimate_s,
+                "first_points": list(foreseen.points),
+            }
+        )
+        return
+    more = foreseen.count - len(foreseen.points)
+    lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
+    known = foreseen.estimate_s
+    time = "no such point was timed so far" if known is None else f"about {in_time(known)}"
+    counts = f"{foreseen.count} points, {foreseen.there} there already, {missing} to compute: {time}"
+    print("\n".join([f"in {foreseen.path}:", *lines, counts]))
+
+
+def in_time(seconds: float) -> str:
+    """A time for people."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200.0 else f"{seconds / 3600:.1f} h"
+
+
+def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
+    """The keys that every command's object has."""
+    return {
+        "stage": "sweep",
+        "run_dir": str(request.folder.path),
+        "artifact": str(path),
+        "wall_s": wall_s,
+        "left_out": [],
+        "file": str(path),
+    }
+
+
+def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: bool) -> None:
+    """Draw and print a sweep; typer.Exit(4) if points could not be computed."""
+    from walkerlab.store.files import write_atomically
+    from walkerlab.sweeps.drawing import draw
+    from walkerlab.sweeps.result import as_csv as table_of
+
+    drawn = draw(swept, request.folder, names)
+    summary = swept.content.summary
+    value = {
+        **common(request, swept.path, swept.wall_s),
+        "reused": swept.reused,
+        **{name: summary[name] for name in ("of", "parameters", "points", "done", "failed", "outcomes")},
+        "figures": [str(path) for path in drawn.figures],
+        "html": str(drawn.page),
+    }
+    if as_csv:
+        table = table_of(swept.content, swept.question)
+        beside = swept.path.with_suffix(".csv")
+        write_atomically(beside, table.encode())
+        value["csv"] = str(beside)
+    error = failed(swept)
+    if request.as_json:
+        print_json(value | ({"error": described(error)} if error is not None else {}))
+    elif as_csv:
+        print(table, end="")
+    else:
+        print("\n".join(printed(swept, drawn.page)))
+    if error is not None:
+        say(error)
+        raise typer.Exit(error.exit_code)
+
+
+def printed(swept: Swept, page: Path) -> list[str]:
+    """The result for people."""
+    summary = swept.content.summary
+    outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
+    over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
+    return [
+        f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}; {swept.reused} were there",
+        f"  numbers  {swept.path}",
+        f"  page     {page}",
+    ]
+
+
+def failed(swept: Swept) -> Any:
+    """What the command fails with if points were not computed."""
+    from walkerlab.errors import NoAnswer
+
+    if not swept.failed:
+        return None
+    return NoAnswer(
+        f"{swept.failed} of {len(swept.question)} points were not computed; `said` in {swept.path} says why.",
+        "The same command tries them again and keeps the rest.",
+    )

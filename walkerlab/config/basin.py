@@ -1,0 +1,99 @@
+"""The basin block: which starts are led to an attractor or a fall."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, get_args
+
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from walkerlab.config.fields import Block, key
+
+Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
+COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
+LARGEST: Final = 1e6  # of a window's bounds
+
+_HERE: Final = "this project"
+_UNIT: Final = "rad, rad/s"
+_WIDTH: Final = "the gait's own, 0.15 rad and 0.25 sqrt(g/L) away"
+_Bound = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+_Bounds = tuple[_Bound, ...] | None
+
+
+class Basin(Block):
+    """Starts on a grid over coordinates of the section just after heel strike; the others are the gait's."""
+
+    model: Annotated[Literal["rigid", "contact"], key("", "which model walks", _HERE)] = "rigid"
+    plane: Annotated[
+        tuple[Coordinate, ...],
+        key(
+            "",
+            "coordinates of the grid: two for a plane through the gait, or all three; theta_1 follows from the slope",
+            "stance angle and its rate, as in Schwab and Wisse 2001",
+            bounds=f"two or three of {', '.join(COORDINATES)}, each once",
+            sequence=True,
+        ),
+    ] = ("theta_2", "dtheta_2")
+    cells: Annotated[
+        tuple[Annotated[int, Field(ge=2, le=4000)], ...],
+        key(
+            "1", "cells along each of them", _HERE, bounds="a number from 2 to 4000 for each coordinate", sequence=True
+        ),
+    ] = (400, 400)
+    lower: Annotated[
+        _Bounds,
+        key(
+            _UNIT,
+            "where the window begins",
+            _HERE,
+            bounds="a number for each",
+            default=f"below {_WIDTH}",
+            sequence=True,
+        ),
+    ] = None
+    upper: Annotated[
+        _Bounds,
+        key(
+            _UNIT,
+            "where the window ends",
+            _HERE,
+            bounds="a number for each, above `lower`",
+            default=f"above {_WIDTH}",
+            sequence=True,
+        ),
+    ] = None
+    refine: Annotated[
+        int,
+        key("1", "parts along each axis that cells at edges of basins are divided into; 1: none", _HERE, ge=1, le=32),
+    ] = 4
+    steps: Annotated[
+        int, key("1", "steps of the rigid model after which a walk is called unsettled", _HERE, ge=1, le=1_000_000)
+    ] = 300
+    contact_steps: Annotated[int, key("1", "steps that the contact model walks", _HERE, ge=2, le=10_000)] = 12
+
+    @field_validator("plane")
+    @classmethod
+    def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
+        if len(value) not in (2, 3) or len(set(value)) != len(value):
+            raise PydanticCustomError("plane", "must be two or three coordinates, each once")
+        return value
+
+    @field_validator("cells", "lower", "upper")
+    @classmethod
+    def _one_for_each_coordinate(
+        cls, value: tuple[float, ...] | None, info: ValidationInfo
+    ) -> tuple[float, ...] | None:
+        plane = info.data.get("plane")
+        if value is not None and plane is not None and len(value) != len(plane):
+            raise PydanticCustomError(
+                "count", "must have {wanted} numbers, one for each of plane", {"wanted": len(plane)}
+            )
+        return value
+
+    @field_validator("upper")
+    @classmethod
+    def _above_lower(cls, value: tuple[float, ...] | None, info: ValidationInfo) -> tuple[float, ...] | None:
+        lower = info.data.get("lower")
+        if value is not None and lower is not None and any(b <= a for a, b in zip(lower, value, strict=False)):
+            raise PydanticCustomError("order", "must be above lower")
+        return value

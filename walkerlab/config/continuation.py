@@ -1,0 +1,76 @@
+"""The continuation block: over which key gaits are followed, from where to where, and how far down the cascade."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+from pydantic import Field, ValidationInfo, create_model, field_validator
+from pydantic_core import PydanticCustomError
+
+from walkerlab.config.fields import Block, key
+
+FollowedModel = Literal["rigid", "contact", "both"]
+FollowedKey = Annotated[
+    str,
+    key("", "key of the config that changes, a number such as slope_deg or walker.hip_mass_kg", "this project",
+        bounds="a key with its blocks, dotted"),
+    Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"),
+]  # fmt: skip
+_UNIT: Final = "that of the key"
+_From = Annotated[float, key(_UNIT, "where the span begins", "this project", bounds="a number below `to`")]
+_To = Annotated[float, key(_UNIT, "where the span ends", "this project", bounds="a number above `from`")]
+
+
+def _above_from(cls: type[Block], value: float, info: ValidationInfo) -> float:  # noqa: ARG001 - pydantic passes it
+    least = info.data.get("from")
+    if least is not None and value <= least:
+        raise PydanticCustomError("order", "must be above `from`, {least}", {"least": f"{least:g}"})
+    return value
+
+
+if TYPE_CHECKING:
+
+    class _Span(Block):
+        """A range of values; its keys are `from` and `to`."""
+
+else:
+    # `from` is a word of the language, and so a class body cannot declare it
+    _Span = create_model(
+        "_Span",
+        __base__=Block,
+        __validators__={"above_from": field_validator("to")(classmethod(_above_from))},
+        **{"from": (_From, 1.0e-4), "to": (_To, 0.1)},
+    )
+
+
+class Span(_Span):
+    """A key and a range of its values."""
+
+    over: FollowedKey = "slope_rad"
+
+    @property
+    def least(self) -> float:
+        """Where the span begins, in the unit of the key."""
+        return float(getattr(self, "from"))
+
+    @property
+    def most(self) -> float:
+        """Where the span ends, in the unit of the key."""
+        found: Any = getattr(self, "to")  # noqa: B009 - declared above, out of the type checker's sight
+        return float(found)
+
+
+class Continuation(Span):
+    """What `walkerlab continuation` follows."""
+
+    model: Annotated[
+        FollowedModel, key("", "which model's gaits: rigid, contact, or both on the same axes", "this project")
+    ] = "rigid"
+    periods: Annotated[
+        int, key("1", "steps of the longest gaits that the cascade is followed to", "this project", ge=1, le=64)
+    ] = 16
+    points: Annotated[int, key("1", "points of one branch, at most", "this project", ge=2, le=100_000)] = 400
+    second: Annotated[
+        Span | None,
+        key("", "a second key, for the curves of folds and flips in the plane of both", "this project"),
+    ] = None

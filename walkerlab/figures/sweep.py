@@ -1,0 +1,213 @@
+"""Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from walkerlab.figures.canvas import blank, png_of, settle, styled, svg_of
+from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
+from walkerlab.store.content import Group, Variable
+
+PANEL_HEIGHT: Final = 1.9
+MAP_HEIGHT: Final = 2.9
+MOST_PANELS: Final = 4
+MOST_SCATTERED: Final = 20_000
+"""Points that a panel shows one by one; of more, evenly chosen ones."""
+PREFERRED: Final[tuple[str, ...]] = (
+    "period_s", "spectral_radius", "step_length_m", "steps", "mean_period_s", "slip_per_step_m", "max_penetration_m",
+    "min_normal_force_N", "energy_drift_J", "end_time_s",
+)  # fmt: skip
+RADIUS: Final = "spectral_radius"
+LABELS: Final = {RADIUS: "largest multiplier (1)"}
+WHITE: Final = "#FFFFFF"
+LOG_SPAN: Final = 50.0
+"""Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure's bytes and words."""
+
+    svg: bytes
+    png: bytes
+    title: str
+    caption: str
+
+
+def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
+    """The numbers that say most by default: the well-known ones, then others that vary."""
+    numbers = [name for name in group.variables if is_number(group, name, dims) and name not in parameters]
+    varying = [name for name in numbers if varies(group[name])]
+    known = [name for name in PREFERRED if name in varying]
+    return (known or [name for name in varying if "." not in name] or varying)[:MOST_PANELS]
+
+
+def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
+    """Whether a variable is one number for each point."""
+    return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
+
+
+def varies(values: NDArray[Any]) -> bool:
+    """Whether a variable has more than one value."""
+    there = values[np.isfinite(values)] if values.dtype.kind == "f" else values.ravel()
+    return there.size > 0 and bool(np.ptp(there.astype(float)) > 0.0)
+
+
+def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Drawn:
+    """The figure of some numbers over the parameters.
+
+    parameters  names of the coordinates
+    dims        of the points
+    names       what to draw, at least one
+    """
+    title = f"{stage} over {', '.join(parameters)}"
+    with styled():
+        figure = maps(group, parameters, names) if len(dims) == 2 else panels(group, parameters, dims, names)
+        settle(figure)
+        svg, png = svg_of(figure, f"sweep-{stage}", title), png_of(figure, title)
+    return Drawn(svg, png, title, caption(group, dims, parameters, names))
+
+
+def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], names: Sequence[str]) -> str:
+    """What is seen, in a sentence or two."""
+    outcomes, counts = np.unique(group["outcome"].astype(str), return_counts=True)
+    said = ", ".join(f"{count} {name}" for name, count in zip(outcomes, counts, strict=True))
+    what = ", ".join(words(group.variables[name]) for name in names)
+    gaps = bool(np.any(group["status"] != "answered"))
+    end = " Where there is no answer the map is grey." if gaps and len(dims) == 2 else ""
+    if gaps and len(dims) == 1:
+        end = " Marks at the bottom: no answer there."
+    one = " The line is a largest multiplier of one: beyond it the gait is unstable." if RADIUS in names else ""
+    return f"{what[:1].upper()}{what[1:]} over {', '.join(parameters)}: {said}.{end}{one}"
+
+
+def words(variable: Variable) -> str:
+    """What a variable is, short."""
+    return variable.long_name.replace("_", " ")
+
+
+def label(group: Group, name: str) -> str:
+    """A variable's axis: its name in words, and its unit."""
+    unit = group.variables[name].units or "1"
+    ending = re.sub(r"[^A-Za-z0-9]+", "_", unit.replace("^", ""))
+    spoken = name.rpartition(".")[2].removesuffix(f"_{ending}").replace("_", " ")
+    return LABELS.get(name, f"{spoken} ({unit})")
+
+
+def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
+    """A row for each number, a column for each parameter; lines where the parameter orders the points."""
+    shown = list(parameters)[:MOST_PANELS]
+    figure = blank(0.5 + PANEL_HEIGHT * len(names))
+    axes = figure.subplots(len(names), len(shown), sharex="col", sharey="row", squeeze=False)
+    for column, parameter in enumerate(shown):
+        x = spread(group, parameter, dims)
+        for row, name in enumerate(names):
+            draw_panel(axes[row][column], group, x, parameter, name, joined=len(dims) == 1 and column == 0)
+            if column == 0:
+                axes[row][column].set_ylabel(label(group, name))
+        axes[-1][column].set_xlabel(label(group, parameter))
+    return figure
+
+
+def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
+    """A parameter's value at every point, flat."""
+    variable = group.variables[parameter]
+    values = variable.values if variable.values.dtype.kind != "O" else np.arange(variable.values.size)
+    if variable.dims == dims:
+        return values.astype(float).ravel()
+    shape = group["outcome"].shape
+    along = [1] * len(dims)
+    along[dims.index(parameter)] = -1
+    return np.broadcast_to(values.astype(float).reshape(along), shape).ravel()
+
+
+def draw_panel(axes: Axes, group: Group, x: NDArray[Any], parameter: str, name: str, joined: bool) -> None:
+    """One number over one parameter."""
+    y = group[name].astype(float).ravel()
+    few = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_SCATTERED)).astype(int))
+    ordered = joined and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
+    if ordered:
+        axes.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
+    else:
+        axes.plot(x[few], y[few], linestyle="none", color=BLUE, marker="o", markersize=2.2, rasterized=few.size > 2000)
+    if name == RADIUS:
+        axes.axhline(1.0, color=GREY, linewidth=0.8)
+    missing = x[np.isnan(y)]
+    if missing.size:
+        axes.plot(
+            missing, np.full(missing.size, 0.02), color=VERMILLION, marker="|", linestyle="none", markersize=5.0,
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+    if is_logarithmic(np.unique(x)):
+        axes.set_xscale("log")
+    name_ticks(axes, group, parameter, "x")
+
+
+def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
+    """Words where a parameter is no number."""
+    values = group[parameter]
+    if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
+        getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
+
+
+def is_logarithmic(values: NDArray[Any]) -> bool:
+    """Whether values are evenly spaced powers over a wide range."""
+    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < LOG_SPAN:
+        return False
+    gaps = np.diff(np.log(np.sort(values)))
+    return bool(gaps.max() < 1.01 * gaps.min())
+
+
+def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+    """A map for each number, two in a row; the second parameter runs upward."""
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    figure = blank(0.4 + MAP_HEIGHT * rows)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for place, name in enumerate(names):
+        draw_map(figure, axes[place // columns][place % columns], group, parameters, name)
+    for place in range(len(names), rows * columns):
+        axes[place // columns][place % columns].set_axis_off()
+    return figure
+
+
+def draw_map(figure: Figure, axes: Axes, group: Group, parameters: Sequence[str], name: str) -> None:
+    """One number by colour over two parameters."""
+    across, up = (numbers(group, parameter) for parameter in parameters)
+    values = np.ma.masked_invalid(group[name].astype(float)).T
+    axes.set_facecolor("#D9D9D9")
+    mesh = axes.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
+    figure.colorbar(mesh, ax=axes, label=label(group, name))
+    if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
+        axes.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
+    for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
+        getattr(axes, f"set_{axis}label")(label(group, parameter))
+        if is_logarithmic(scale):
+            getattr(axes, f"set_{axis}scale")("log")
+        name_ticks(axes, group, parameter, axis)
+    assert figure.get_figwidth() == WIDTH
+
+
+def numbers(group: Group, parameter: str) -> NDArray[Any]:
+    """A parameter's values as numbers; places of words."""
+    values = group[parameter]
+    return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)
+
+
+def edges(centres: NDArray[Any]) -> NDArray[Any]:
+    """Bounds of cells about values, halfway between neighbours, on their own scale."""
+    scale = np.log(centres) if is_logarithmic(centres) else centres
+    if scale.size == 1:
+        found = np.array([scale[0] - 0.5, scale[0] + 0.5])
+    else:
+        middle = 0.5 * (scale[1:] + scale[:-1])
+        found = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
+    return np.exp(found) if is_logarithmic(centres) else found

@@ -1,0 +1,356 @@
+"""Many walks of the rigid model, side by side in lanes: each with its own step size, a new start as soon as one ends.
+
+All lanes take a Runge-Kutta step together. A lane that may have met a heel strike or a fall in it is looked at alone:
+the event is located on Hermite's quintic of its event function, the step is taken again up to there, and Newton's last
+correction does the rest. What becomes of a walk does not depend on which walks are beside it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
+from walkerlab.kernels import by_type, inlined, kernel
+from walkerlab.mechanics.impact import heel_strike
+from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing
+from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
+from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
+from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
+from walkerlab.solvers.lanes import WIDTH, Lanes, any_positive, choose, load_lanes, store_lanes
+from walkerlab.solvers.system import State, derivative
+from walkerlab.solvers.vectors import combine
+
+# rows of a batch's memory, each with one number a lane
+START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
+STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # next step, step tried last, time, time until a heel strike must have come, s
+ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
+ROWS = 25
+SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
+
+GOES_ON = -1
+NOBODY = -1
+FIRST_STEP = 0.1  # pendulum times
+ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
+REFINEMENTS = 6
+MOST_TRIES = 20_000  # of steps in one swing
+SMALLEST_STEP = 1e-13  # pendulum times
+NO_ERROR = 1e-300
+WALKED, FELL, REJECTED = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.REJECTED)
+NO_HEEL_STRIKE, BUDGET_EXHAUSTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.BUDGET_EXHAUSTED)
+SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
+
+
+class TwoLegs(NamedTuple):
+    """The rigid model of two straight legs, with what lanes need of it."""
+
+    model: Standing
+    slope: float  # rad
+    upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
+    fallen: float  # rad from there, beyond which the hip is too low
+    pendulum_time: float  # s
+
+
+def two_legs(model: Standing) -> TwoLegs | None:
+    """The model as that of two straight legs; None if it has more bodies."""
+    if len(model.tree.arm_x) != 2 or not isinstance(model.knee, NoKnee):
+        return None
+    x, y = model.hip_x[STANCE], model.hip_y[STANCE]
+    lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
+    return TwoLegs(
+        model,
+        model.slope,
+        math.atan2(x, y),
+        math.acos(max(-1.0, lowest)),
+        math.sqrt(model.leg_length / model.gravity),
+    )
+
+
+class LaneMemory(NamedTuple):
+    """What a batch needs besides its starts and results, however many walks it has."""
+
+    rtol: float
+    atol: float
+    rows: Any  # (ROWS, WIDTH)
+    slots: Any  # (2, WIDTH) number of the start, and steps taken
+    finder: CrossingFinder
+
+
+def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
+    """Memory for batches at these tolerances."""
+    return LaneMemory(
+        rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
+    )
+
+
+class Fates(NamedTuple):
+    """How the walks of a batch ended; written."""
+
+    outcome: Any  # (n,)
+    steps: Any  # (n,) taken
+
+
+def new_fates(n: int) -> Fates:
+    """Room for n walks."""
+    return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
+
+
+class Strikes(NamedTuple):
+    """An observer that keeps every heel strike; a walk is over when there is no more room."""
+
+    times: Any  # (n, steps) s
+    after: Any  # (n, steps, 4) states just after them
+
+
+@by_type
+def struck(observer: Any, walk: int, step: int, t: float, y: State) -> int:
+    """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
+
+    walk  number of the start
+    step  from 0
+    """
+
+
+@struck.case(Strikes)
+def keep_strike(observer: Strikes, walk: int, step: int, t: float, y: State) -> int:
+    """Keep it."""
+    observer.times[walk, step] = t
+    for i in range(4):
+        observer.after[walk, step, i] = y[i]
+    return WALKED if step + 1 == observer.times.shape[1] else GOES_ON
+
+
+@kernel
+def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
+    """Walk from every start, until the observer ends the walk or it ends by itself.
+
+    starts  (n, 4) states, both feet on the slope
+    """
+    slots = memory.slots
+    waiting = 0
+    for lane in range(WIDTH):
+        waiting = refill(walker, memory, starts, fates, lane, waiting)
+    walking = True
+    while walking:
+        if try_steps(walker, memory):
+            walking = False
+            for lane in range(WIDTH):
+                if slots[SLOT_OF_START, lane] == NOBODY:
+                    continue
+                if memory.rows[EVENT, lane] > 0.0:
+                    outcome = look_at(walker, memory, observer, lane)
+                    if outcome != GOES_ON:
+                        fates.outcome[slots[SLOT_OF_START, lane]] = outcome
+                        fates.steps[slots[SLOT_OF_START, lane]] = slots[STEPS_TAKEN, lane]
+                        waiting = refill(walker, memory, starts, fates, lane, waiting)
+                walking = walking or slots[SLOT_OF_START, lane] != NOBODY
+
+
+@inlined
+def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
+    """Give a lane the next start that is one; returns how many starts have been given out."""
+    while waiting < starts.shape[0]:
+        y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
+        waiting += 1
+        if hip_above_fall(walker.model, y) >= 0.0:
+            memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
+            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * walker.pendulum_time)
+            return waiting
+        fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
+    memory.slots[SLOT_OF_START, lane] = NOBODY
+    begin_swing(walker, memory, lane, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0)
+    return waiting
+
+
+@inlined
+def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
+    """Have a lane start a swing from state y at time t (s), with a step h."""
+    rows = memory.rows
+    rate = derivative(Mode(walker.model, walker.model.bent), t, y)
+    for i in range(4):
+        rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
+    rows[STEP, lane], rows[TIME, lane] = h, t
+    rows[LEFT, lane] = LONGEST_SWING * walker.pendulum_time
+    rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
+
+
+@inlined
+def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Four rows as a state in lanes."""
+    return (
+        load_lanes(rows, row),
+        load_lanes(rows, row + 1),
+        load_lanes(rows, row + 2),
+        load_lanes(rows, row + 3),
+    )
+
+
+@inlined
+def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
+    """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
+
+    A lane needs one if an event may lie in its step, if it arrives at one, if its time is over or its steps are too
+    many or too small.
+    """
+    rows = memory.rows
+    y, k1 = four(rows, START), four(rows, START_RATE)
+    left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
+    h = min(load_lanes(rows, STEP), left)
+    used, end, end_rate = stages_of(Mode(walker.model, walker.model.bent), 0.0, y, k1, h)
+    error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
+    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
+    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
+    change = min(GROW_MOST, max(SHRINK_MOST, change))
+    accepted = 1.0 - error
+    over = NO_ERROR - (left - h)
+    pendulum_time = walker.pendulum_time
+    stuck = max(tries - MOST_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
+    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
+    event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
+    quiet = choose(event, 0.0, accepted)
+    for i in range(4):
+        store_lanes(choose(quiet, end[i], y[i]), rows, START + i)
+        store_lanes(choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
+        store_lanes(end[i], rows, END + i)
+        store_lanes(end_rate[i], rows, END_RATE + i)
+    gone = choose(quiet, h, 0.0)
+    store_lanes(h * change, rows, STEP)
+    store_lanes(h, rows, TRIED)
+    store_lanes(load_lanes(rows, TIME) + gone, rows, TIME)
+    store_lanes(left - gone, rows, LEFT)
+    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST)), rows, FIRST)
+    store_lanes(tries, rows, TRIES)
+    store_lanes(event, rows, EVENT)
+    return any_positive(event)
+
+
+@inlined
+def feet_on_slope(walker: TwoLegs, theta_1: Any, theta_2: Any) -> Any:
+    """See `standing.feet_on_slope`."""
+    return theta_1 + theta_2 + 2.0 * (walker.slope + walker.model.lean)
+
+
+@inlined
+def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
+    """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
+    ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
+    start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
+    guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
+    return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope - walker.upright) - walker.fallen)
+
+
+@inlined
+def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+    """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
+    rows = memory.rows
+    if rows[TRIES, lane] >= MOST_TRIES:
+        return BUDGET_EXHAUSTED
+    if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
+        return SOLVER_FAILED
+    if rows[ARRIVING, lane] > 0.0:
+        return arrive(walker, memory, observer, lane)
+    strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
+    if fall < strike:
+        return FELL
+    if strike <= 1.0:
+        rows[ARRIVING, lane], rows[USUAL, lane] = 1.0, rows[STEP, lane]
+        rows[STEP, lane] = max(strike * rows[TRIED, lane], 2.0 * SMALLEST_STEP)
+        return GOES_ON
+    if rows[LEFT, lane] <= rows[TRIED, lane]:
+        return NO_HEEL_STRIKE
+    move_on(memory, lane)
+    return GOES_ON
+
+
+@inlined
+def move_on(memory: LaneMemory, lane: int) -> None:
+    """Accept the step of one lane."""
+    rows = memory.rows
+    for i in range(4):
+        rows[START + i, lane], rows[START_RATE + i, lane] = rows[END + i, lane], rows[END_RATE + i, lane]
+    rows[TIME, lane] += rows[TRIED, lane]
+    rows[LEFT, lane] -= rows[TRIED, lane]
+    rows[FIRST, lane] = 0.0
+
+
+@inlined
+def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+    """Strike if the step has led to the slope, else take the rest of the way."""
+    rows, slots = memory.rows, memory.slots
+    move_on(memory, lane)
+    pendulum_time = walker.pendulum_time
+    rate = rows[START + 2, lane] + rows[START + 3, lane]
+    guard = feet_on_slope(walker, rows[START, lane], rows[START + 1, lane])
+    wait = -guard / rate if rate != 0.0 else 0.0
+    if abs(wait) > ARRIVED * pendulum_time and rows[ARRIVING, lane] <= REFINEMENTS:
+        rows[ARRIVING, lane] += 1.0
+        usual = abs(rows[USUAL, lane])
+        rows[STEP, lane] = max(-usual, min(usual, wait))
+        return GOES_ON
+    y = bridged(rows, lane, wait)
+    new = heel_strike(walker.model, y)
+    step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
+    slots[STEPS_TAKEN, lane] += 1
+    outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
+    if outcome == GOES_ON:
+        begin_swing(walker, memory, lane, t, new, rows[USUAL, lane])
+    return outcome
+
+
+@inlined
+def bridged(rows: Any, lane: int, wait: float) -> State:
+    """The state a moment later: Taylor's expansion, of second order in the angles, which the guard consists of."""
+    omega_1, omega_2 = rows[START + 2, lane], rows[START + 3, lane]
+    alpha_1, alpha_2 = rows[START_RATE + 2, lane], rows[START_RATE + 3, lane]
+    return (
+        rows[START, lane] + wait * (omega_1 + 0.5 * wait * alpha_1),
+        rows[START + 1, lane] + wait * (omega_2 + 0.5 * wait * alpha_2),
+        omega_1 + wait * alpha_1,
+        omega_2 + wait * alpha_2,
+    )
+
+
+@inlined
+def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
+    """swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a lane's step."""
+    return (
+        swing * rows[at, lane] + stance * rows[at + 1, lane],
+        swing * rows[at + 2, lane] + stance * rows[at + 3, lane],
+        swing * rows[at + 6, lane] + stance * rows[at + 7, lane],
+    )
+
+
+@inlined
+def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
+    """swing theta_1 + stance theta_2 + constant over a lane's step."""
+    rows = memory.rows
+    a = event_function(rows, START, lane, swing, stance)
+    b = event_function(rows, END, lane, swing, stance)
+    return hermite(rows[TRIED, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
+
+
+@inlined
+def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
+    """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
+    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * (walker.slope + walker.model.lean))
+    at_start = memory.rows[FIRST, lane] > 0.0
+    strike = first_fall(memory.finder, guard, at_start, 0.0)
+    if strike > 1.0:
+        return NO_CROSSING
+    ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
+    while strike <= 1.0 and value_of(ahead, strike) <= 0.0:
+        strike = first_fall(memory.finder, guard, at_start, strike + 1e-12)
+    return strike
+
+
+@inlined
+def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
+    """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
+    from_upright = walker.slope - walker.upright
+    angle = memory.rows[END + 1, lane] + from_upright
+    if abs(angle) <= walker.fallen:
+        return NO_CROSSING
+    side = 1.0 if angle > 0.0 else -1.0
+    height = in_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
+    return first_fall(memory.finder, height, False, 0.0)

@@ -1,0 +1,159 @@
+"""Where walks settle: the attractor of a step map over a parameter, and how fast neighbours on it part.
+
+The largest Lyapunov exponent is the mean growth of a tangent vector led along by the step map's exact derivative, per
+step; its uncertainty is the standard error of the means of blocks, each much longer than the walk's memory.
+
+Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.continuation import Floats
+from walkerlab.orbits.families import Seed
+from walkerlab.orbits.step_maps import StepMap
+
+LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
+REPEATS = 1e-5  # distance of points that are called the same
+BLOCKS = 10
+CANDIDATES = 4  # near returns that are tried, of one number of steps
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """Where walks settle at a value of the parameter.
+
+    period     steps after which it repeats itself; 0 if it does not
+    periods_s, angles  (kept,) of the steps on it
+    last       (d,) a point on it
+    """
+
+    value: float
+    period: int
+    periods_s: Floats
+    angles: Floats
+    last: Floats
+
+
+@dataclass(frozen=True)
+class Lyapunov:
+    """Largest Lyapunov exponent, per step, with its standard error."""
+
+    value: float
+    exponent: float
+    uncertainty: float
+
+
+@dataclass(frozen=True, eq=False)
+class Attractors:
+    """The attractor over values of the parameter, up to where it is lost.
+
+    lost_at, reason  the first value at which the walk did not go on, and how it ended; None if it always did
+    """
+
+    found: tuple[Attractor, ...] = ()
+    lost_at: float | None = None
+    reason: str = ""
+
+
+def period_of(points: Floats) -> int:
+    """After how many steps points (steps, d) repeat themselves; 0 if they do not."""
+    for period in range(1, min(LONGEST_PERIOD, points.shape[0] // 2) + 1):
+        if np.max(np.abs(points[period:] - points[:-period])) < REPEATS:
+            return period
+    return 0
+
+
+def settled(step_map: StepMap, z: Floats, value: float, transient: int, kept: int) -> Attractor | Outcome:
+    """Where a walk from z settles; the outcome if it does not go on for `transient + kept` steps."""
+    walk = step_map.iterate(z, value, transient + kept, None)
+    if walk.outcome is not Outcome.WALKED:
+        return walk.outcome
+    points = walk.points[transient:]
+    return Attractor(value, period_of(points), walk.periods_s[transient:], walk.angles[transient:], points[-1])
+
+
+def swept(
+    step_map: StepMap,
+    z: Floats,
+    values: Iterable[float],
+    transient: int,
+    kept: int,
+    advance: Callable[[], None] = lambda: None,
+) -> Attractors:
+    """The attractor that contains z at the first value, followed from value to value."""
+    found: list[Attractor] = []
+    for value in values:
+        here = settled(step_map, z, float(value), transient, kept)
+        advance()
+        if isinstance(here, Outcome):
+            return Attractors(tuple(found), float(value), here.label)
+        found.append(here)
+        z = here.last
+    return Attractors(tuple(found), None, "")
+
+
+def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
+    """The largest Lyapunov exponent of the attractor that z lies on; None if the walk ends.
+
+    transient  steps that turn the tangent into the direction of fastest growth
+    steps      that are averaged over
+    """
+    tangent = np.full(z.size, 1.0 / math.sqrt(z.size))
+    walk = step_map.iterate(z, value, transient + steps, tangent)
+    if walk.outcome is not Outcome.WALKED:
+        return None
+    growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
+    means = np.array([block.mean() for block in np.array_split(growth, BLOCKS)])
+    return Lyapunov(value, float(growth.mean()), float(means.std(ddof=1) / math.sqrt(BLOCKS)))
+
+
+def feigenbaum_ratios(flips: list[float]) -> list[float]:
+    """Ratios of successive distances between the flips of a cascade; they tend to 4.669."""
+    gaps = np.diff(np.array(flips))
+    return [float(one / other) for one, other in pairwise(gaps)]
+
+
+def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
+    """Points of an attractor that nearly return after so many steps: near unstable gaits of as many, a few each.
+
+    steps  that are walked to look for them
+    """
+    walk = step_map.iterate(attractor.last, attractor.value, steps, None)
+    points, found = walk.points, []
+    for period in periods:
+        if points.shape[0] <= period:
+            continue
+        misses = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        for _ in range(CANDIDATES):
+            nearest = int(np.argmin(misses))
+            found.append(Seed(points[nearest], attractor.value, period))
+            misses[max(0, nearest - 2 * period) : nearest + 2 * period] = np.inf
+    return found
+
+
+def settled_elsewhere(
+    step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
+) -> list[Seed]:
+    """Periodic gaits that walks from starts scattered about an attractor settle on, other than itself.
+
+    starts  walks
+    spread  standard deviation of the starts' coordinates, as a share of the largest
+    """
+    found: list[Seed] = []
+    periods = {attractor.period}
+    scale = spread * float(np.max(np.abs(attractor.last)))
+    for _ in range(starts):
+        start = attractor.last + scale * generator.standard_normal(attractor.last.size)
+        here = settled(step_map, start, attractor.value, transient, 2 * LONGEST_PERIOD)
+        if not isinstance(here, Outcome) and here.period and here.period not in periods:
+            periods.add(here.period)
+            found.append(Seed(here.last, attractor.value, here.period))
+    return found

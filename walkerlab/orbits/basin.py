@@ -1,0 +1,255 @@
+"""Basins of attraction of the rigid walker: which attractor a start comes to, in how many steps, or how it fails.
+
+All of it happens with the similar walker of unit size, on the section just after a heel strike, whose coordinates are
+z = (theta_2, dtheta_1, dtheta_2). Attractors are found by walking: long walks from many starts, and what they repeat. A
+walk has reached an attractor once it is so near that everything around there stays near, which is tried out too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
+from walkerlab.solvers.system import State
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+RTOL, ATOL = 1e-6, 1e-8  # of the walks of a basin: errors of 1e-7 a step
+FOUND_RTOL, FOUND_ATOL = 1e-11, 1e-13  # of the walks that attractors are taken from
+COORDINATES = 3
+NONE = -1  # no attractor
+LONGEST_PERIOD = 32  # steps; an attractor that repeats itself later, or never, is aperiodic
+REPEATS = 1e-7  # distance of states that are called the same
+SETTLING = 2_000  # steps after which walks are looked at
+WATCHED = 32  # walks that are looked at
+CAPTURE = 1e-3  # distance from an attractor at which it is called reached
+NEARER, NARROWINGS = 0.25, 6
+AROUND = 24  # starts around each point of an attractor that must come back to it
+
+
+class Capture(NamedTuple):
+    """An observer that ends walks that come near to an attractor, or that have taken so many steps."""
+
+    points: Any  # (m, 3) points of attractors
+    owner: Any  # (m,) which attractor each belongs to
+    reach: Any  # (m,) square of the distance at which it is reached
+    most: int  # steps
+    attractor: Any  # (n,) reached; NONE; written
+    last: Any  # (n, 3) where each walk was last; written
+
+
+@struck.case(Capture)
+def captured(observer: Capture, walk: int, step: int, t: float, y: State) -> int:
+    """Whether the walk is near to an attractor now."""
+    for i in range(3):
+        observer.last[walk, i] = y[i + 1]
+    for k in range(observer.owner.size):
+        a, b, c = y[1] - observer.points[k, 0], y[2] - observer.points[k, 1], y[3] - observer.points[k, 2]
+        if a * a + b * b + c * c < observer.reach[k]:
+            observer.attractor[walk] = observer.owner[k]
+            return WALKED
+    return WALKED if step + 1 >= observer.most else GOES_ON
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """An attractor that repeats itself.
+
+    points  (period, 3) of the section, as one walk meets them, the one with the smallest angle first
+    reach   distance from which all walks come to it; zero if none was found
+    """
+
+    points: Floats
+    reach: float
+
+    @property
+    def period(self) -> int:
+        """Steps after which it repeats itself."""
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Attractors:
+    """Where walks from some starts settle.
+
+    cycles     in order of their periods
+    aperiodic  whether walks also go on for ever without repeating themselves
+    """
+
+    cycles: tuple[Cycle, ...] = ()
+    aperiodic: bool = False
+
+    def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
+        """An observer for n walks of at most so many steps; `share` of the distance counts as reached."""
+        points = np.concatenate([np.zeros((0, COORDINATES)), *(cycle.points for cycle in self.cycles)])
+        owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
+        reach = np.array([(share * self.cycles[one].reach) ** 2 for one in owner])
+        return Capture(points, owner, reach, most, np.full(n, NONE, np.int64), np.zeros((n, COORDINATES)))
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """How walks from many starts ended: (n,) each."""
+
+    outcome: Integers
+    steps: Integers
+    attractor: Integers  # number of a cycle; NONE
+    last: Floats  # (n, 3) where they were last
+
+
+def on_section(walker: TwoLegs, z: Floats) -> Floats:
+    """States (n, 4) of section coordinates (n, 3)."""
+    return np.column_stack([-2.0 * (walker.slope + walker.model.lean) - z[:, 0], z])
+
+
+def arrivals(
+    walker: TwoLegs,
+    attractors: Attractors,
+    z: Floats,
+    most: int,
+    share: float = 1.0,
+    tolerances: tuple[float, float] = (RTOL, ATOL),
+) -> Arrivals:
+    """Walk from section coordinates z (n, 3) to an attractor, a failure, or `most` steps."""
+    fates: Fates = new_fates(len(z))
+    capture = attractors.capture(len(z), most, share)
+    walk_lanes(walker, new_lane_memory(*tolerances), capture, on_section(walker, z), fates)
+    return Arrivals(fates.outcome, fates.steps, capture.attractor, capture.last)
+
+
+def find_attractors(walker: TwoLegs, starts: Floats, seed: int) -> Attractors:
+    """The attractors that walks from section coordinates `starts` (n, 3) come to.
+
+    walker  the unit walker
+    seed    of the starts around attractors
+    """
+    tight = (FOUND_RTOL, FOUND_ATOL)
+    rough = arrivals(walker, Attractors(), starts, SETTLING)
+    alive = np.flatnonzero(rough.outcome == Outcome.WALKED)
+    distinct = distinct_points(rough.last[alive])[:WATCHED]
+    settled = arrivals(walker, Attractors(), distinct, SETTLING, tolerances=tight)
+    cycles: list[Floats] = []
+    aperiodic = False
+    for point in settled.last[settled.outcome == Outcome.WALKED]:
+        cycle = cycle_through(walker, point)
+        if cycle is None:
+            aperiodic = True
+        elif not any(same_cycle(cycle, other) for other in cycles):
+            cycles.append(cycle)
+    cycles.sort(key=lambda points: (len(points), *points[0]))
+    generator = np.random.default_rng(seed)
+    reached = tuple(Cycle(points, reach_of(walker, points, cycles, generator)) for points in cycles)
+    return Attractors(reached, aperiodic)
+
+
+def distinct_points(points: Floats) -> Floats:
+    """Points that differ by more than REPEATS, in order; of equal ones the first."""
+    _, first = np.unique(np.round(points / (10.0 * REPEATS)), axis=0, return_index=True)
+    return np.asarray(points[np.sort(first)])
+
+
+def cycle_through(walker: TwoLegs, point: Floats) -> Floats | None:
+    """The cycle (period, 3) that a walk from a point (3,) is on, rotated to begin with its smallest angle."""
+    orbit = [point]
+    for _ in range(LONGEST_PERIOD):
+        step = arrivals(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(FOUND_RTOL, FOUND_ATOL))
+        if step.outcome[0] != Outcome.WALKED:
+            return None
+        orbit.append(step.last[0])
+        if np.abs(orbit[-1] - point).max() < REPEATS:
+            points = np.array(orbit[:-1])
+            return np.roll(points, -int(np.argmin(points[:, 0])), axis=0)
+    return None
+
+
+def same_cycle(one: Floats, other: Floats) -> bool:
+    """Whether two cycles are the same."""
+    return len(one) == len(other) and bool(np.abs(one - other).max() < 100.0 * REPEATS)
+
+
+def reach_of(walker: TwoLegs, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
+    """Distance from a cycle within which walks from all sides came back to it; zero if not even the nearest did.
+
+    It also stays clear of the other cycles.
+    """
+    others = [other for other in cycles if other is not points]
+    gap = min((float(np.linalg.norm(p - other, axis=1).min()) for other in others for p in points), default=np.inf)
+    reach = min(CAPTURE, 0.25 * gap)
+    ways = generator.normal(size=(len(points) * AROUND, COORDINATES))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    for _ in range(NARROWINGS):
+        around = np.repeat(points, AROUND, axis=0) + reach * ways
+        back = arrivals(walker, Attractors((Cycle(points, reach),)), around, SETTLING, share=0.1)
+        if (back.attractor == 0).all():
+            return reach
+        reach *= NEARER
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Window:
+    """Starts on a grid over some coordinates of the section, SI units.
+
+    axes          which coordinates, numbers into (theta_2, dtheta_1, dtheta_2)
+    lower, upper  of each
+    cells         along each
+    rest          (3) the section's coordinates; those of the axes are replaced
+    """
+
+    axes: tuple[int, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    cells: tuple[int, ...]
+    rest: tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        """Cells in all."""
+        return int(np.prod(self.cells))
+
+    def along(self, axis: int) -> Floats:
+        """Middles of the cells along an axis, by its place in `axes`."""
+        width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
+        return self.lower[axis] + width * (np.arange(self.cells[axis]) + 0.5)
+
+    def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
+        """Section coordinates (n, 3) of cells by their number, the last axis running fastest.
+
+        inside  (n, axes) where in each cell, from -1/2 to 1/2; None is the middle
+        """
+        z = np.tile(np.array(self.rest), (len(cells), 1))
+        for place, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
+            width = (self.upper[place] - self.lower[place]) / self.cells[place]
+            offset = 0.0 if inside is None else inside[:, place]
+            z[:, axis] = self.lower[place] + width * (index + 0.5 + offset)
+        return z
+
+    def drawn(self, n: int, generator: np.random.Generator) -> Floats:
+        """Section coordinates (n, 3) drawn from the window."""
+        z = np.tile(np.array(self.rest), (n, 1))
+        z[:, list(self.axes)] = generator.uniform(self.lower, self.upper, (n, len(self.axes)))
+        return z
+
+
+def edge_cells(classes: NDArray[Any]) -> Integers:
+    """Numbers of the cells of a grid that have another class beside them along an axis."""
+    edge = np.zeros(classes.shape, bool)
+    for axis in range(classes.ndim):
+        differs = np.diff(classes, axis=axis) != 0
+        before = tuple(slice(None, -1) if one == axis else slice(None) for one in range(classes.ndim))
+        after = tuple(slice(1, None) if one == axis else slice(None) for one in range(classes.ndim))
+        edge[before] |= differs
+        edge[after] |= differs
+    return np.flatnonzero(edge)
+
+
+def inside_cell(refine: int, axes: int) -> Floats:
+    """Middles (refine^axes, axes) of the parts of a cell, from -1/2 to 1/2."""
+    middles = (np.arange(refine) + 0.5) / refine - 0.5
+    return np.stack(np.meshgrid(*[middles] * axes, indexing="ij"), axis=-1).reshape(-1, axes)

@@ -1,0 +1,206 @@
+"""Where a family of gaits changes: folds, flips and tori as zeros of test functions, and the branch beyond a flip.
+
+Test functions of the derivative DP of n steps: det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
+det(DP ^ DP - 1), where DP ^ DP acts on pairs of directions and has the products of pairs of multipliers as its
+eigenvalues (the bialternate product). Each is smooth along a branch, so that zeros are found by fast iterations.
+
+Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.continuation import Evaluated, Floats, Segment, Solved, root_along
+from walkerlab.orbits.step_maps import Cycle, StepMap, multipliers_of, walk_steps
+
+Kind = Literal["fold", "flip", "torus"]
+KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
+PROBE = 1e-3  # how far the differences of the normal form reach, coordinates being of magnitude one
+REFINEMENTS = 4
+FIRST_FALL = 0.2  # by how much the multiplier of a new branch's first point has left 1
+TOUCHING = 1e-4  # a product of multipliers this close to one is that of a pair
+
+
+class GaitEquations:
+    """P^n(z) - z = 0 over x = (z, p / scale)."""
+
+    def __init__(self, step_map: StepMap, period: int, scale: float) -> None:
+        """Gaits of `period` steps; `scale` makes the parameter of magnitude one."""
+        self.step_map, self.period, self.scale = step_map, period, scale
+
+    def at(self, x: Floats) -> Evaluated[Cycle]:
+        """Residual and its derivative at x (d + 1,)."""
+        z = x[:-1]
+        cycle = walk_steps(self.step_map, z, self.value(x), self.period)
+        jacobian = np.column_stack((cycle.DP - np.eye(z.size), self.scale * cycle.Dp))
+        return Evaluated(cycle.outcome, cycle.z - z, jacobian, cycle)
+
+    def value(self, x: Floats) -> float:
+        """The parameter at x."""
+        return self.scale * float(x[-1])
+
+
+@lru_cache(16)
+def _pairs(d: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    pairs = np.array(list(combinations(range(d), 2)), np.int64)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def on_pairs(DP: Floats) -> Floats:
+    """Action of DP (d, d) on pairs of directions: (d (d-1) / 2, same), eigenvalues the products of pairs of DP's."""
+    first, second = _pairs(DP.shape[0])
+    straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
+    crossed = DP[np.ix_(first, second)] * DP[np.ix_(second, first)]
+    return np.asarray(straight - crossed)
+
+
+def critical_value(kind: Kind, DP: Floats) -> float:
+    """The test function of a kind of bifurcation."""
+    if kind == "torus":
+        pairs = on_pairs(DP)
+        return float(np.linalg.det(pairs - np.eye(pairs.shape[0])))
+    return float(np.linalg.det(DP - np.eye(DP.shape[0]) if kind == "fold" else DP + np.eye(DP.shape[0])))
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A point where a branch folds, or its gait gives rise to one of twice the period or to a torus."""
+
+    kind: Kind
+    value: float  # of the parameter
+    multiplier: complex
+    point: Solved[Cycle]
+
+
+def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
+    """The bifurcation of a kind between two neighbours of a branch; None if there is none."""
+    tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
+    if tests[0] * tests[1] >= 0.0:
+        return None
+    point = root_along(segment, lambda solved: critical_value(kind, solved.evaluated.data.DP))
+    if point is None:
+        return None
+    multipliers = multipliers_of(point.evaluated.data.DP)
+    if kind == "torus":
+        on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < TOUCHING]
+        if not on_circle:  # two real multipliers whose product is one: a saddle, and no bifurcation
+            return None
+        multiplier = complex(on_circle[0])
+    else:
+        target = 1.0 if kind == "fold" else -1.0
+        multiplier = complex(min(multipliers, key=lambda m: abs(m - target)))
+    return Bifurcation(kind, scale * float(point.x[-1]), multiplier, point)
+
+
+@dataclass(frozen=True)
+class FlipForm:
+    """The flip on its centre manifold: xi -> -(1 + rate s) xi + cubic xi^3, s the branch's arclength.
+
+    direction  (d,) eigenvector to -1, of unit length
+    adjoint    (d,) left eigenvector, adjoint . direction = 1
+    bend       (d,) second-order part of the centre manifold: z = z* + xi direction + xi^2 bend
+    """
+
+    direction: Floats
+    adjoint: Floats
+    bend: Floats
+    cubic: float
+    rate: float
+
+    @property
+    def supercritical(self) -> bool:
+        """Whether the gait of twice the period is stable where its parent is not."""
+        return self.cubic > 0.0
+
+    @property
+    def amplitude(self) -> float:
+        """At which the new gait's multiplier, 1 - 4 cubic xi^2, has left 1 by FIRST_FALL."""
+        return math.sqrt(0.25 * FIRST_FALL / abs(self.cubic))
+
+
+def eigenvector(A: Floats, value: float) -> Floats:
+    """Unit right null vector of A - value."""
+    _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
+    return np.asarray(rows[-1])
+
+
+def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[Cycle]) -> FlipForm | None:
+    """The normal form at a flip, by differences of exact maps and derivatives; None if a probe cannot be walked.
+
+    segment  the part of the branch that the flip lies on
+    """
+    A = flip.point.evaluated.data.DP
+    v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
+    w = w / (w @ v)
+    rate = _growth_rate(flip, segment, v, w)
+    if rate is None:
+        return None
+    form, probe = None, PROBE
+    for _ in range(REFINEMENTS):
+        found = _cubic(equations, flip, v, w, probe)
+        if found is None:
+            return form
+        form = FlipForm(v, w, *found, rate)
+        if probe <= 0.5 * form.amplitude:
+            break
+        probe = 0.2 * form.amplitude
+    return form
+
+
+def _growth_rate(flip: Bifurcation, segment: Segment[Cycle], v: Floats, w: Floats) -> float | None:
+    """How fast the multiplier passes -1 along the branch."""
+    s = float(segment.first.tangent @ (flip.point.x - segment.first.x))
+    gap = 1e-3 * segment.length
+    beside = [segment.at(s + h) for h in (-gap, gap)]
+    multipliers = [float(w @ point.evaluated.data.DP @ v) for point in beside if isinstance(point, Solved)]
+    return (multipliers[0] - multipliers[1]) / (2.0 * gap) if len(multipliers) == 2 else None
+
+
+def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h: float) -> tuple[Floats, float] | None:
+    """`bend` and `cubic` of the normal form, by differences that reach h."""
+    z, p = flip.point.x[:-1], equations.value(flip.point.x)
+    A = flip.point.evaluated.data.DP
+
+    def beside(direction: Floats) -> tuple[Floats, Floats] | None:
+        cycles = [walk_steps(equations.step_map, z + sign * h * direction, p, equations.period) for sign in (1, -1)]
+        if any(cycle.outcome is not Outcome.WALKED for cycle in cycles):
+            return None
+        return cycles[0].DP @ v, cycles[1].DP @ v
+
+    along = beside(v)
+    if along is None:
+        return None
+    B_vv = (along[0] - along[1]) / (2.0 * h)
+    C_vvv = (along[0] - 2.0 * (A @ v) + along[1]) / h**2
+    inner = np.asarray(np.linalg.solve(np.eye(v.size) - A, B_vv), np.float64)
+    size = float(np.linalg.norm(inner))
+    across = beside(inner / size)
+    if across is None:
+        return None
+    B_inner = size * (across[0] - across[1]) / (2.0 * h)
+    cubic = float(w @ (C_vvv + 3.0 * B_inner)) / 6.0
+    return (0.5 * inner, cubic) if cubic != 0.0 else None
+
+
+def onto_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
+    """Where the branch of twice the period is expected near a flip, for `corrected`.
+
+    share  of the normal form's amplitude
+
+    Returns the guess x (d + 1,), the normal of the plane of constant amplitude, and the amplitude.
+    """
+    xi = share * form.amplitude
+    s = form.cubic * xi * xi / form.rate
+    guess = flip.point.x + s * flip.point.tangent
+    guess[:-1] += xi * form.direction + xi * xi * form.bend
+    normal = np.append(form.adjoint, 0.0)
+    return guess, normal / np.linalg.norm(normal), xi

@@ -1,0 +1,423 @@
+"""Families of gaits over a parameter: every branch from some seeds, its bifurcations, and the cascade beyond its flips.
+
+A branch is followed from a gait both ways until it leaves the span or cannot go on. At each flip the branch of twice
+the period is entered along the eigenvector to -1, as far as the flip's normal form says, and followed alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.bifurcations import (
+    KINDS,
+    Bifurcation,
+    FlipForm,
+    GaitEquations,
+    bifurcation_in,
+    flip_form,
+    onto_doubled,
+)
+from walkerlab.orbits.continuation import (
+    Floats,
+    Lost,
+    Segment,
+    Solved,
+    StepControl,
+    corrected,
+    stepped,
+)
+from walkerlab.orbits.step_maps import Cycle, Monitor, StepMap, multipliers_of
+
+SAME = 1e-6  # distance of states below which two gaits are one
+HALVINGS = 12  # of the amplitude on the way onto a branch
+TURN_OF_MULTIPLIERS = 0.6  # by how much a multiplier may change between neighbours, near the unit circle
+NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
+SHORTEST_STEP_S = 1e-3
+
+
+@dataclass(frozen=True)
+class Span:
+    """The values of the parameter that are asked for."""
+
+    least: float
+    most: float
+
+    @property
+    def size(self) -> float:
+        """From end to end."""
+        return self.most - self.least
+
+    def __contains__(self, value: float) -> bool:
+        """Whether a value lies inside."""
+        return self.least <= value <= self.most
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a branch is given up.
+
+    points  on one branch, at most
+    growth  of a disturbance over a cycle, beyond which a gait of many steps is not resolved
+    """
+
+    points: int = 400
+    growth: float = 1e4
+
+
+CONTROL, LIMITS = StepControl(), Limits()
+
+
+@dataclass(frozen=True, eq=False)
+class GaitPoint:
+    """A gait on a branch.
+
+    z            (d,) where it begins
+    multipliers  (d,) of its whole cycle, largest first
+    periods_s, lengths_m, angles  (n,) of its steps, angles of the stance leg after them in rad
+    monitors     (monitors,) the worst over the cycle
+    """
+
+    value: float
+    z: Floats
+    multipliers: NDArray[np.complex128]
+    periods_s: Floats
+    lengths_m: Floats
+    angles: Floats
+    monitors: Floats
+    solved: Solved[Cycle]
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+
+@dataclass(frozen=True)
+class BranchEnd:
+    """Where a branch ends, and why."""
+
+    value: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where on a branch an assumption of the model begins or ceases to hold."""
+
+    monitor: Monitor
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Gaits of one number of steps along a curve."""
+
+    period: int
+    points: tuple[GaitPoint, ...]
+    ends: tuple[BranchEnd, BranchEnd]
+    bifurcations: tuple[Bifurcation, ...]
+    crossings: tuple[Crossing, ...]
+    segments: tuple[tuple[Bifurcation, Segment[Cycle]], ...] = field(repr=False, default=())
+
+    @cached_property
+    def values(self) -> Floats:
+        """(points,) of the parameter."""
+        return np.array([point.value for point in self.points])
+
+    @property
+    def stable_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of the parameter over which the branch is stable, bounded by its bifurcations and its ends."""
+        found: list[list[float]] = []
+        values = [self.ends[0].value]  # of the stable stretch being passed through
+        stable = self.points[0].stable
+        for one, other in pairwise(self.points):
+            if one.stable:
+                values.append(one.value)
+            if one.stable != other.stable:
+                edge = self._edge(one, other)
+                if stable:
+                    found.append([*values, edge])
+                values, stable = [edge], other.stable
+        if stable:
+            found.append([*values, self.points[-1].value, self.ends[1].value])
+        return tuple((min(stretch), max(stretch)) for stretch in found)
+
+    def _edge(self, one: GaitPoint, other: GaitPoint) -> float:
+        """The bifurcation between two neighbours, of which one is stable."""
+        both = (one.solved.x, other.solved.x)
+        for bifurcation, segment in self.segments:
+            ends = (segment.first.x, segment.second.x)
+            if all(any(np.array_equal(x, end) for end in ends) for x in both):
+                return bifurcation.value
+        return 0.5 * (one.value + other.value)
+
+
+class Seed(NamedTuple):
+    """Section coordinates z (d,) near a gait of `period` steps at a value of the parameter."""
+
+    z: Floats
+    value: float
+    period: int = 1
+
+
+class Follower:
+    """Follows branches of one model over one span."""
+
+    def __init__(
+        self,
+        step_map: StepMap,
+        span: Span,
+        control: StepControl = CONTROL,
+        limits: Limits = LIMITS,
+        advance: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Nothing is followed yet; `advance` is told of each point."""
+        self.step_map, self.span, self.control, self.limits, self.advance = step_map, span, control, limits, advance
+
+    def family(self, seeds: Iterable[Seed], periods: int, known: tuple[Branch, ...] = ()) -> tuple[Branch, ...]:
+        """Every branch that the seeds lie on, and the cascades beyond their flips, after those that are known.
+
+        periods  steps of the longest gaits wanted
+        """
+        branches = list(known)
+        for seed in seeds:
+            start = self.solved_at(seed.z, seed.value, seed.period)
+            if start is None or repeats_sooner(start, seed.period):
+                continue
+            if not any(self.lies_on(branch, start) for branch in branches if branch.period == seed.period):
+                branches.append(self.both_ways(start, seed.period))
+        for branch in branches:  # grows on the way
+            if 2 * branch.period <= periods and branch not in known:
+                branches.extend(self.doubled(branch, branches))
+        return tuple(branches)
+
+    def equations(self, period: int) -> GaitEquations:
+        """Of gaits of so many steps."""
+        return GaitEquations(self.step_map, period, self.span.size)
+
+    def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
+        """The gait near z at a value of the parameter; None if Newton's method finds none."""
+        fixed = np.append(np.zeros(z.size), 1.0)
+        found = corrected(
+            self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, 20
+        )
+        if isinstance(found, Lost) or found.evaluated.data.period_s < SHORTEST_STEP_S:
+            return None
+        return found
+
+    def lies_on(self, branch: Branch, gait: Solved[Cycle]) -> bool:
+        """Whether a gait is on a branch already, at whichever of its steps it is looked at."""
+        value = float(gait.x[-1]) * self.span.size
+        starts = [gait.x[:-1], *(step.z for step in gait.evaluated.data.steps)]
+        for one, other in pairwise(branch.points):
+            if not min(one.value, other.value) <= value <= max(one.value, other.value) or one.value == other.value:
+                continue
+            share = (value - one.value) / (other.value - one.value)
+            guess = one.z + share * (other.z - one.z)
+            here = self.solved_at(guess, value, branch.period)
+            if here is not None and min(float(np.max(np.abs(here.x[:-1] - z))) for z in starts) < SAME:
+                return True
+        return False
+
+    def both_ways(self, start: Solved[Cycle], period: int) -> Branch:
+        """The branch through a gait, in the order in which the parameter rises at it."""
+        rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
+        ahead = self.trace(rising, period)
+        behind = self.trace(replace(rising, tangent=-rising.tangent), period)
+        return joined(behind, ahead)
+
+    def doubled(self, parent: Branch, known: Iterable[Branch]) -> list[Branch]:
+        """The branches of twice the period that begin at the flips of a branch."""
+        found: list[Branch] = []
+        equations = self.equations(parent.period)
+        for flip, segment in parent.segments:
+            if flip.kind != "flip" or any(ends_at(branch, flip, 2 * parent.period) for branch in (*known, *found)):
+                continue
+            form = flip_form(equations, flip, segment)
+            start = None if form is None else self.beyond(flip, form, parent.period)
+            if start is not None:
+                branch = self.trace(start, 2 * parent.period)
+                first = BranchEnd(flip.value, f"flip of the gait of {parent.period} {steps_word(parent.period)}")
+                found.append(replace(branch, ends=(first, branch.ends[1])))
+        return found
+
+    def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[Cycle] | None:
+        """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away."""
+        doubled = self.equations(2 * period)
+        for halving in range(HALVINGS):
+            guess, normal, xi = onto_doubled(flip, form, 0.5**halving)
+            found = corrected(doubled, guess, normal, self.control.tolerance)
+            if isinstance(found, Solved) and np.linalg.norm(found.x - guess) < 0.5 * xi:
+                return found
+        return None
+
+    def trace(self, start: Solved[Cycle], period: int) -> Branch:
+        """The branch from a gait along its tangent until it ends."""
+        equations = self.equations(period)
+        points, bifurcations, segments = [self.point(start, period)], [], []
+        crossings: list[Crossing] = []
+        step = min(self.control.first, 0.5 * period_amplitude(start, period))
+        last, end = start, None
+        while end is None:
+            if len(points) >= self.limits.points:
+                end = BranchEnd(points[-1].value, f"{self.limits.points} points are used up")
+                break
+            following = stepped(equations, last, step, self.control, self.near_enough(last))
+            if isinstance(following, Lost):
+                end = BranchEnd(points[-1].value, why_lost(following))
+                break
+            solved, _, step = following
+            end, solved = self.within(equations, last, solved)
+            segment = Segment(equations, last, solved, self.control.tolerance)
+            closing = closes(last, solved, period)
+            if closing:
+                end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
+                break
+            for kind in KINDS:
+                bifurcation = bifurcation_in(segment, kind, equations.scale)
+                if bifurcation is not None:
+                    bifurcations.append(bifurcation)
+                    segments.append((bifurcation, segment))
+            points.append(self.point(solved, period))
+            crossings += crossings_between(self.step_map.monitors, points[-2], points[-1])
+            if end is None and abs(points[-1].multipliers[0]) > self.limits.growth:
+                end = BranchEnd(
+                    points[-1].value, f"a disturbance grows more than {self.limits.growth:.0e}-fold a cycle"
+                )
+            last = solved
+        first = BranchEnd(points[0].value, "start")
+        return Branch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
+
+    def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
+        """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
+        before = multipliers_of(last.evaluated.data.DP)
+
+        def near(found: Solved[Cycle]) -> bool:
+            after = multipliers_of(found.evaluated.data.DP)
+            critical = [one for one in before if 1.0 / NEAR_CIRCLE < abs(one) < NEAR_CIRCLE]
+            return all(min(abs(one - other) for other in after) < TURN_OF_MULTIPLIERS for one in critical)
+
+        return near
+
+    def within(
+        self, equations: GaitEquations, last: Solved[Cycle], solved: Solved[Cycle]
+    ) -> tuple[BranchEnd | None, Solved[Cycle]]:
+        """A point that has left the span is brought back to its end, where the branch ends."""
+        value = equations.value(solved.x)
+        if value in self.span:
+            return None, solved
+        edge = self.span.least if value < self.span.least else self.span.most
+        share = (edge - equations.value(last.x)) / (value - equations.value(last.x))
+        guess = last.x + share * (solved.x - last.x)
+        guess[-1] = edge / self.span.size
+        at_edge = corrected(equations, guess, np.append(np.zeros(guess.size - 1), 1.0), self.control.tolerance)
+        if isinstance(at_edge, Lost):
+            return BranchEnd(value, "end of the span"), solved
+        along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent
+        return BranchEnd(edge, "end of the span"), replace(at_edge, tangent=along)
+
+    def point(self, solved: Solved[Cycle], period: int) -> GaitPoint:
+        """What is kept of a gait."""
+        self.advance()
+        cycle, value, z = solved.evaluated.data, float(solved.x[-1]) * self.span.size, solved.x[:-1]
+        return GaitPoint(
+            value,
+            z,
+            multipliers_of(cycle.DP),
+            strike_to_strike(cycle),
+            np.array([step.length_m for step in cycle.steps]),
+            np.array([step.angle for step in cycle.steps]),
+            self.step_map.watch(z, value, period),
+            solved,
+        )
+
+
+def strike_to_strike(cycle: Cycle) -> Floats:
+    """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
+    waits = [step.period_s - step.strike_s for step in cycle.steps]
+    return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(cycle.steps)])
+
+
+def steps_word(n: int) -> str:
+    """Step or steps."""
+    return "step" if n == 1 else "steps"
+
+
+def repeats_sooner(solved: Solved[Cycle], period: int) -> bool:
+    """Whether a gait of `period` steps is one of fewer."""
+    steps = solved.evaluated.data.steps[: period - 1]
+    return any(float(np.max(np.abs(step.z - solved.x[:-1]))) < SAME for step in steps)
+
+
+def apart(solved: Solved[Cycle], period: int) -> Floats:
+    """From a gait's first state to that half a cycle on: zero where it is a gait of half as many steps."""
+    return np.asarray(solved.evaluated.data.steps[period // 2 - 1].z - solved.x[:-1])
+
+
+def period_amplitude(solved: Solved[Cycle], period: int) -> float:
+    """How far apart the halves of a cycle are; no bound for one step."""
+    return float(np.linalg.norm(apart(solved, period))) if period > 1 else np.inf
+
+
+def closes(last: Solved[Cycle], solved: Solved[Cycle], period: int) -> bool:
+    """Whether between two neighbours the halves of the cycle changed places: the branch met its parent."""
+    return period % 2 == 0 and float(apart(last, period) @ apart(solved, period)) < 0.0
+
+
+def ends_at(branch: Branch, flip: Bifurcation, period: int) -> bool:
+    """Whether a branch of this period closes on this flip."""
+    if branch.period != period or not branch.ends[1].reason.startswith("closes"):
+        return False
+    last, before = branch.points[-1], branch.points[-2]
+    return abs(branch.ends[1].value - flip.value) <= 2.0 * abs(last.value - before.value) + 1e-12
+
+
+def why_lost(lost: Lost) -> str:
+    """Why a branch goes no further, in words."""
+    if lost.outcome is Outcome.WALKED:
+        return "Newton's method finds no further gait"
+    if lost.outcome is Outcome.REJECTED:
+        return "no walker has the parameter's next value"
+    return f"{lost.outcome.label}: {WHY[lost.outcome]}"
+
+
+WHY = {
+    Outcome.FELL: "the walker falls before the foot comes down",
+    Outcome.OFF_PAD: "the swinging foot meets a pad's flank, or its own pad again",
+    Outcome.LIFTED_OFF: "the ground would have to pull",
+    Outcome.SLID: "the stance foot slides away",
+    Outcome.NO_HEEL_STRIKE: "the swinging foot does not come down",
+    Outcome.BUDGET_EXHAUSTED: "a step takes more right-hand sides than it may",
+    Outcome.SOLVER_FAILED: "the solver's step fell to rounding",
+}
+
+
+def crossings_between(monitors: Iterable[Monitor], one: GaitPoint, other: GaitPoint) -> list[Crossing]:
+    """Limits of assumptions that lie between two neighbours, by linear interpolation."""
+    found = []
+    for monitor, before, after in zip(monitors, one.monitors, other.monitors, strict=True):
+        limit = monitor.limit
+        if limit is not None and (before - limit) * (after - limit) < 0.0:
+            share = (limit - before) / (after - before)
+            found.append(Crossing(monitor, one.value + share * (other.value - one.value)))
+    return found
+
+
+def joined(behind: Branch, ahead: Branch) -> Branch:
+    """Two halves of a branch that begin at one gait."""
+    return Branch(
+        ahead.period,
+        (*reversed(behind.points[1:]), *ahead.points),
+        (behind.ends[1], ahead.ends[1]),
+        (*reversed(behind.bifurcations), *ahead.bifurcations),
+        (*reversed(behind.crossings), *ahead.crossings),
+        (*reversed(behind.segments), *ahead.segments),
+    )

@@ -1,0 +1,65 @@
+"""From a config and a parameter to the step maps that its families of gaits are followed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.step_maps import RigidMap
+from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.rigid import rigid_walker
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+    from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
+
+CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET = 1e-10, 1e-12, 60_000
+"""Of one step of the contact model; right-hand sides."""
+
+
+def rigid_walkers(config: Config, parameter: Parameter) -> Callable[[float], Standing | None]:
+    """The rigid walker at a value of the parameter; None where the config refuses the value."""
+
+    def walker_at(value: float) -> Standing | None:
+        changed = parameter.config_at(config, value)
+        return None if changed is None else rigid_walker(changed, changed.equations)
+
+    return walker_at
+
+
+def rigid_map(config: Config, parameter: Parameter, scale: float) -> RigidMap:
+    """The rigid model's step map over the parameter."""
+    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
+
+
+def walkers_on_ground(
+    config: Config, parameter: Parameter, step_length_m: float
+) -> Callable[[float], WalkerOnGround | None]:
+    """The contact model at a value of the parameter; None where the config refuses the value."""
+    from walkerlab.orbits.contact_map import WalkerOnGround
+    from walkerlab.scene.contact import contact_scene
+
+    def walker_at(value: float) -> WalkerOnGround | None:
+        changed = parameter.config_at(config, value)
+        if changed is None:
+            return None
+        scene = replace(contact_scene(changed, step_length_m, step_length_m), pinned=None)
+        return WalkerOnGround(scene.walker, scene.ground)
+
+    return walker_at
+
+
+def contact_map(config: Config, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
+    """The contact model's step map over the parameter; steps are judged by a length (m)."""
+    from walkerlab.hybrid.contact_run import MethodSettings
+    from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import contact_scene
+    from walkerlab.solvers.registry import method_named
+
+    methods = MethodSettings(method_named("radau5"), CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET)
+    on_pads = config.contact is not None and config.contact.terrain == "checkerboard"
+    walkers = walkers_on_ground(config, parameter, step_length_m)
+    like = contact_scene(config, step_length_m, step_length_m).walker
+    return ContactMap(walkers, scale, methods, step_length_m, on_pads, like)

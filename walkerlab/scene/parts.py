@@ -1,0 +1,76 @@
+"""From the walker of a config to the parts that both models are made of."""
+
+from __future__ import annotations
+
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
+from walkerlab.errors import ConfigError
+from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
+from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
+
+SHOWN_IN = "docs/walkers.md shows a walker described by its parts."
+AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
+
+
+def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
+    """The parts of a walker.
+
+    rigid  for the rigid model, where a compass has point feet
+
+    Raises ConfigError for parts that make no walker.
+    """
+    if isinstance(walker, CompassWalker):
+        leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
+        parts = straight_legs(leg, walker.hip_mass_kg, Arc(0.0 if rigid else walker.foot_radius_m))
+    elif isinstance(walker, StraightLegs):
+        leg = Limb(
+            walker.leg_length_m,
+            walker.leg_mass_kg,
+            walker.leg_mass_below_hip_m,
+            walker.leg_mass_ahead_m,
+            walker.leg_inertia_kg_m2,
+        )
+        parts = straight_legs(leg, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
+    elif isinstance(walker, Kneed):
+        upper, lower = walker.thigh, walker.shank
+        thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
+        shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
+        parts = kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m))
+    else:
+        parts = own_parts(walker)
+    return carrying(parts, walker.torso)
+
+
+def carrying(parts: Assembly, torso: Torso | None) -> Assembly:
+    """The walker with its torso, if it has one."""
+    if torso is None:
+        return parts
+    return with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
+
+
+def own_parts(walker: PartsWalker) -> Assembly:
+    """The parts that a config lists; ConfigError, in words, if they do not fit together."""
+    knees = [hinge for hinge in walker.hinges if hinge.locks]
+    try:
+        return Assembly(
+            bodies=tuple(Body(body.name, body.mass_kg, body.centre_m, body.inertia_kg_m2) for body in walker.bodies),
+            joints=tuple(
+                Revolute(hinge.name, hinge.parent, hinge.parent_point_m, hinge.child, hinge.child_point_m)
+                for hinge in walker.hinges
+            ),
+            particles=tuple(Particle(each.name, each.mass_kg, each.body, each.at_m) for each in walker.particles),
+            feet=tuple(
+                BallFoot(f"foot of {foot.body}", foot.body, foot.centre_m, foot.radius_m) for foot in walker.feet
+            ),
+            knees=tuple(Knee(hinge.name, hinge.parent, hinge.child) for hinge in knees),
+            couplings=tuple(Coupling(each.body, each.of, each.weights) for each in walker.couplings),
+            legs=walker.legs,
+        )
+    except (KeyError, ValueError) as error:
+        raise ConfigError(
+            f"walker: {error.args[0]}", "docs/walkers.md shows a walker described by its parts."
+        ) from None
+
+
+def knee_locked_at_strike(walker: AnyWalker) -> bool:
+    """Whether the trailing knee is rigid during the heel strike."""
+    return not isinstance(walker, Kneed | PartsWalker) or walker.knee.at_heel_strike == "locked"

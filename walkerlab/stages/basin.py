@@ -1,0 +1,244 @@
+"""Which starts walk, which attractor each comes to and in how many steps; made piece by piece: a run may be cut off."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.basin import COORDINATES, Basin
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_lanes import two_legs
+from walkerlab.orbits.basin import NONE, Attractors, Floats, Window, edge_cells, find_attractors
+from walkerlab.orbits.scaled_starts import scaled_starts
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.scene.contact import contact_gait, start_state
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.basin_pieces import (
+    ContactQuestion,
+    Found,
+    Piece,
+    Question,
+    RigidQuestion,
+    cells_of,
+    edges_of,
+    unpacked,
+)
+from walkerlab.stages.progress import Progress
+from walkerlab.stages.tune import BUDGET_FACTOR, LEAST_BUDGET, MAP_ATOL, MAP_RTOL, free_scene
+from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.parts import Parts
+from walkerlab.verification.processes import in_order
+
+HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
+DRAWN = 4_000  # starts from which attractors are sought
+SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
+FAILED = NONE - 1  # class of a cell that does not walk
+UNITS = ("rad", "rad/s", "rad/s")
+TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
+
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1) -> Content:
+    """Walk from every cell that is not there yet, then from the parts of those at edges.
+
+    parts  cells that an earlier run has left, and where new ones are kept
+    jobs   processes
+
+    Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
+    there is not.
+    """
+    gait = inputs["fixedpoint"].summary
+    window = window_of(config, [float(number) for number in gait["state"][1:]])
+    progress.start("basin: attractors")
+    question = question_of(config, inputs, window)
+    clock = Stopwatch()
+    pieces = cells_of(question, window)
+    finish(pieces, "basin", progress, parts, jobs, clock)
+    found = unpacked(np.concatenate([parts.kept[piece.name] for piece in pieces]))
+    walked = found.outcome == Outcome.WALKED
+    edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
+    walking = walked.astype(float)
+    if config.basin.refine > 1 and edges.size:
+        pieces = edges_of(question, window, edges, config.basin.refine)
+        finish(pieces, "basin: edges", progress, parts, jobs, clock)
+        walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
+    group = group_of(config.basin, window, found, walking)
+    aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
+    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, gait), aperiodic)
+    said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
+    return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
+
+
+class Stopwatch:
+    """How many walks were walked, and in what time."""
+
+    def __init__(self) -> None:
+        """None so far."""
+        self.walks, self.started = 0, time.perf_counter()
+
+    def summary(self) -> dict[str, Any]:
+        """Walks a second, of those of this run; without it if all had been there."""
+        if self.walks == 0:
+            return {}
+        return {"trajectories_per_s": self.walks / (time.perf_counter() - self.started)}
+
+
+def finish(pieces: list[Piece], label: str, progress: Progress, parts: Parts, jobs: int, clock: Stopwatch) -> None:
+    """Compute the pieces that are not there yet."""
+    waiting = [piece for piece in pieces if piece.name not in parts.kept]
+    progress.start(label, sum(piece.walks for piece in pieces))
+    progress.advance(sum(piece.walks for piece in pieces if piece.name in parts.kept))
+    worth_sharing = sum(piece.walks for piece in waiting) >= waiting[0].question.shared_from if waiting else False
+    for piece, numbers in zip(waiting, in_order(waiting, jobs if worth_sharing else 1, (0,)), strict=True):
+        parts.keep(piece.name, numbers)
+        clock.walks += piece.walks
+        progress.advance(piece.walks)
+
+
+def window_of(config: Config, z: list[float]) -> Window:
+    """The grid of a config around the gait's section coordinates z (3)."""
+    settings = config.basin
+    axes = tuple(COORDINATES.index(name) for name in settings.plane)
+    rate = math.sqrt(config.gravity_m_s2 / config.walker.leg_length_m)
+    half = (HALF_WIDTH[0], HALF_WIDTH[1] * rate, HALF_WIDTH[2] * rate)
+    lower = settings.lower or tuple(z[axis] - half[axis] for axis in axes)
+    upper = settings.upper or tuple(z[axis] + half[axis] for axis in axes)
+    if any(b <= a for a, b in zip(lower, upper, strict=True)):
+        raise ConfigError("basin.lower lies above the window's other side.", "Give basin.upper too.")
+    return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
+
+
+def question_of(config: Config, inputs: Mapping[str, Content], window: Window) -> Question:
+    """What is walked."""
+    if config.basin.model == "contact":
+        return contact_question(config, inputs)
+    unit, units = unit_walker(rigid_walker(config, config.equations))
+    walker = two_legs(unit)
+    if walker is None:
+        raise ConfigError(
+            "basin.model: rigid walks in lanes, which have room for two straight legs; this walker has more bodies.",
+            "Ask the contact model: --set basin.model=contact.",
+        )
+    scale = (1.0, units.time, units.time)
+    generator = np.random.default_rng(config.seed)
+    drawn = np.concatenate([np.array([window.rest]), window.drawn(DRAWN, generator)])
+    attractors = find_attractors(walker, drawn * np.array(scale), config.seed)
+    return RigidQuestion(walker, scale, attractors, config.basin.steps)
+
+
+def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQuestion:
+    """The contact model at the tolerances of `tune`'s map."""
+    if config.contact is None:
+        raise ConfigError("basin.model: contact needs a contact block, and the config has none.", "Add one.")
+    gait = inputs["fixedpoint"].summary
+    state = tuple(float(number) for number in gait["state"])
+    answer = contact_gait(config, float(gait["step_length_m"]), state)
+    scene = free_scene(config, float(gait["step_length_m"]), answer)
+    own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
+
+    def start_of(swing: float, stance: float) -> tuple[float, ...]:
+        return start_state(scene, (state[0], state[1], swing * state[2], stance * state[3]))
+
+    starts = scaled_starts(scene.walker, scene.ground, start_of, config.basin.contact_steps, own)
+    settings = config.solver.contact
+    starts = replace(starts, rtol=settings.rtol, atol=settings.atol)
+    usual = starts.walk(1.0, 1.0).evaluations
+    rigid = rigid_walker(config, config.equations)
+    return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
+
+
+def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Period and a state (SI) of each attractor."""
+    if isinstance(question, ContactQuestion):
+        own = question.starts.gait
+        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
+    found: Attractors = question.attractors
+    rows = []
+    for cycle in found.cycles:
+        z = cycle.points[0] / np.array(question.scale)
+        state = [-2.0 * float(gait["slope_rad"]) - float(z[0]), *(float(number) for number in z)]
+        rows.append({"period": cycle.period, "state": state, "reached_within": cycle.reach})
+    return rows
+
+
+def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> Group:
+    """The grid."""
+    dims = tuple(settings.plane)
+    variables = {
+        name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
+        for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
+    }
+
+    def over(values: Any, text: str) -> Variable:
+        return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
+
+    settled = np.where(found.attractor == NONE, 0, found.steps)
+    variables |= {
+        "outcome": over(found.outcome, "how the walk ended, see attribute outcomes"),
+        "attractor": over(found.attractor, "number of the attractor that was reached; -1 for none"),
+        "steps": over(found.steps, "steps taken"),
+        "steps_to_settle": over(settled, "steps until the attractor was reached; 0 where none was"),
+        "walking": over(walking, "share of the cell that walks; of cells at edges from their parts"),
+    }
+    outcomes = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
+    rest = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
+    return Group(variables, {"outcomes": outcomes, "model": settings.model, **rest})
+
+
+def summary(
+    config: Config, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
+) -> dict[str, Any]:
+    """What the command prints."""
+    settings = config.basin
+    numbers, counts = np.unique(found.outcome, return_counts=True)
+    walked = found.outcome == Outcome.WALKED
+    for number, row in enumerate(attractors):
+        there = walked & (found.attractor == number)
+        row["cells"] = int(np.count_nonzero(there))
+        if row["cells"]:
+            row["median_steps_to_settle"] = float(np.median(found.steps[there]))
+    names = dict(zip(COORDINATES, window.rest, strict=True))
+    sides = zip(settings.plane, window.lower, window.upper, strict=True)
+    return {
+        "model": settings.model,
+        "plane": list(settings.plane),
+        "cells": list(settings.cells),
+        "window": {name: [low, high] for name, low, high in sides},
+        "held": {name: value for name, value in names.items() if name not in settings.plane},
+        "share_walking": float(walking.mean()),
+        "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
+        "outcomes": {Outcome(int(one)).label: int(many) for one, many in zip(numbers, counts, strict=True)},
+        "attractors": attractors,
+        "aperiodic": aperiodic,
+        "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == NONE))),
+        "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
+    }
+
+
+def gaussian(window: Window) -> Floats:
+    """Weights of the cells, their sum 1: a normal distribution in the middle of the window, SIGMAS to its sides."""
+    weights = np.ones(window.cells)
+    for place, cells in enumerate(window.cells):
+        sigma = 0.5 * cells / SIGMAS
+        along = np.exp(-0.5 * ((np.arange(cells) + 0.5 - 0.5 * cells) / sigma) ** 2)
+        weights = weights * along.reshape([-1 if one == place else 1 for one in range(len(window.cells))])
+    return np.asarray(weights / weights.sum())
+
+
+def margin_of(config: Config, window: Window, found: Found, gait: Mapping[str, Any]) -> dict[str, Any]:
+    """Distance from a stable gait to the nearest cell that does not walk: a measure that no window enters.
+
+    In rad and sqrt(g/L). Left out if the gait is unstable, or the window holds no such cell.
+    """
+    failing = np.flatnonzero(found.outcome != Outcome.WALKED)
+    if not gait["stable"] or not failing.size:
+        return {}
+    time_unit = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
+    away = (window.starts(failing) - np.array(window.rest)) * np.array((1.0, time_unit, time_unit))
+    return {"margin": float(np.sqrt((away**2).sum(axis=1)).min())}

@@ -1,0 +1,171 @@
+"""The independent pieces of a basin: cells of the window, walked in their middles, and cells at edges, part by part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.rigid_lanes import TwoLegs
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.basin import NONE, Attractors, Window, arrivals, inside_cell
+from walkerlab.orbits.scaled_starts import ScaledStarts
+from walkerlab.orbits.step_map import on_section
+from walkerlab.scene.contact import ContactScene, start_state
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+OUTCOMES: Final = 16  # more than there are
+ATTRACTORS: Final = 4096
+SETTLED: Final = 0.02  # of the gait's period and step length: a contact walk whose last steps are so near has settled
+
+
+@dataclass(frozen=True)
+class Found:
+    """How walks ended: (n,) each; `attractor` is NONE where none was reached, else `steps` says after how many."""
+
+    outcome: Integers
+    attractor: Integers
+    steps: Integers
+
+    def packed(self) -> list[float]:
+        """One number for each."""
+        code = self.outcome + OUTCOMES * (self.attractor - NONE + ATTRACTORS * self.steps)
+        return [float(number) for number in code]
+
+
+def unpacked(numbers: Floats) -> Found:
+    """What `packed` made numbers of."""
+    rest, outcome = np.divmod(numbers.astype(np.int64), OUTCOMES)
+    steps, attractor = np.divmod(rest, ATTRACTORS)
+    return Found(outcome, attractor + NONE, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidQuestion:
+    """Starts of the rigid model.
+
+    walker  the unit walker
+    scale   (3) units of the section's coordinates: unit walker's over SI
+    """
+
+    walker: TwoLegs
+    scale: tuple[float, float, float]
+    attractors: Attractors
+    steps: int
+    cells_at_once: int = 10_000
+    edges_at_once: int = 1_000
+    shared_from: int = 200_000  # walks that take longer than starting another process
+
+    def walked(self, z: Floats) -> Found:
+        """Walk from section coordinates z (n, 3), SI."""
+        found = arrivals(self.walker, self.attractors, z * np.array(self.scale), self.steps)
+        return Found(found.outcome, found.attractor, found.steps)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactQuestion:
+    """Starts of the contact model: those of the rigid one with the stance foot just touching, at rest and rolling."""
+
+    scene: ContactScene
+    rigid: Standing
+    starts: ScaledStarts
+    cells_at_once: int = 100
+    edges_at_once: int = 10
+    shared_from: int = 500
+
+    def walked(self, z: Floats) -> Found:
+        """Walk from section coordinates z (n, 3), SI."""
+        rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
+        return Found(*np.array(rows, np.int64).reshape(-1, 3).T)
+
+    def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
+        """Outcome, attractor and steps of one walk."""
+        state = on_section(self.rigid, z)
+        walk = self.starts.walked_from(start_state(self.scene, state))
+        settled = self.settled_after(walk.touch_time, walk.touch_along) if walk.outcome == Outcome.WALKED else None
+        if settled is None:
+            return walk.outcome, NONE, walk.touch_time.size
+        return walk.outcome, 0, settled
+
+    def settled_after(self, touch_time: Floats, touch_along: Floats) -> int | None:
+        """Steps after which all periods and lengths are the gait's; None if the last step's are not."""
+        if self.starts.gait is None:
+            return None
+        period, length = self.starts.gait
+        periods, lengths = np.diff(touch_time, prepend=0.0), np.diff(touch_along, prepend=0.0)
+        near = (np.abs(periods - period) <= SETTLED * period) & (np.abs(lengths - length) <= SETTLED * abs(length))
+        off = np.flatnonzero(~near)
+        first = int(off[-1]) + 1 if off.size else 0
+        return first if first < near.size else None
+
+
+Question = RigidQuestion | ContactQuestion
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of the window by their numbers, from `first` up to `last`, walked from their middles."""
+
+    name: str
+    question: Question
+    window: Window
+    first: int
+    last: int
+
+    @property
+    def walks(self) -> int:
+        """How many."""
+        return self.last - self.first
+
+    def run(self) -> list[float]:
+        """One number for each cell, see `unpacked`."""
+        return self.question.walked(self.window.starts(np.arange(self.first, self.last))).packed()
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeCells:
+    """Cells at edges, walked from the middles of their parts."""
+
+    name: str
+    question: Question
+    window: Window
+    cells: tuple[int, ...]
+    refine: int
+
+    @property
+    def walks(self) -> int:
+        """How many."""
+        return len(self.cells) * self.refine ** len(self.window.axes)
+
+    def run(self) -> list[float]:
+        """The share of each cell that walks."""
+        inside = inside_cell(self.refine, len(self.window.axes))
+        cells = np.repeat(np.array(self.cells), len(inside))
+        found = self.question.walked(self.window.starts(cells, np.tile(inside, (len(self.cells), 1))))
+        walking = (found.outcome == Outcome.WALKED).reshape(len(self.cells), -1)
+        return [float(share) for share in walking.mean(axis=1)]
+
+
+Piece = Cells | EdgeCells
+
+
+def cells_of(question: Question, window: Window) -> list[Piece]:
+    """Every cell."""
+    many = question.cells_at_once
+    return [
+        Cells(f"cells {first}", question, window, first, min(first + many, window.size))
+        for first in range(0, window.size, many)
+    ]
+
+
+def edges_of(question: Question, window: Window, edges: Integers, refine: int) -> list[Piece]:
+    """The cells at edges."""
+    many = question.edges_at_once
+    return [
+        EdgeCells(f"edge {edges[first]}", question, window, tuple(edges[first : first + many].tolist()), refine)
+        for first in range(0, len(edges), many)
+    ]

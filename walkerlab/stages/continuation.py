@@ -1,0 +1,294 @@
+"""Families of gaits over a key of the config: branches, bifurcations, cascades, and the chaos beyond them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from walkerlab.config.continuation import Continuation
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.attractors import (
+    Attractors,
+    Lyapunov,
+    close_returns,
+    largest_exponent,
+    settled_elsewhere,
+    swept,
+)
+from walkerlab.orbits.bifurcation_curves import BifurcationCurve, curve_through
+from walkerlab.orbits.continuation import Floats, StepControl
+from walkerlab.orbits.families import Branch, Follower, Limits, Seed, Span
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_maps import StepMap
+from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
+from walkerlab.scene.parameter import Parameter, parameter_of
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.continuation_results import groups, summary
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content
+
+RIGID, CONTACT = "rigid", "contact"
+LOOKED_AT = 5  # values of the span at which gaits are sought, its ends among them
+BEFORE_FLIP = 0.02  # of the span: how far before the first flip the attractor is looked at
+CONTACT_RESIDUAL, CONTACT_SHORTEST, CONTACT_PERIODS = 1e-9, 1e-4, 4
+OTHERS_AT, OTHER_PERIODS, RETURNS = 12, (3, 5, 6), 4000  # values, steps of gaits looked for, steps walked for them
+STARTS, SCATTER, SETTLING = 40, 0.1, 400  # walks from scattered starts at each value, and how long they settle
+LONGEST_OF_CURVES, CURVE_POINTS, CONFIGS = 4, 120, 256
+
+
+@dataclass(frozen=True)
+class Samples:
+    """How finely attractors are looked at.
+
+    values     of the parameter
+    transient, kept  steps walked before the attractor, and on it
+    exponents  values at which the Lyapunov exponent is measured
+    averaged   steps it is averaged over
+    """
+
+    values: int
+    transient: int
+    kept: int
+    exponents: int
+    averaged: int
+
+
+RIGID_SAMPLES = Samples(240, 500, 96, 16, 1500)
+CONTACT_SAMPLES = Samples(24, 40, 16, 4, 100)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is followed: a parameter of a config over a span."""
+
+    config: Config
+    parameter: Parameter
+    span: Span
+    periods: int
+    points: int
+
+    def looked_at(self) -> list[float]:
+        """Values of the span at which gaits are sought: the config's own first."""
+        own = self.parameter.value_in(self.config)
+        spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
+        return [*([own] if own in self.span else []), *(float(one) for one in spread)]
+
+
+NO_ATTRACTORS = Attractors()
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What was found of one model; no map if there was no gait to begin from."""
+
+    model: str
+    step_map: StepMap | None
+    branches: tuple[Branch, ...]
+    attractors: Attractors = NO_ATTRACTORS
+    exponents: tuple[Lyapunov, ...] = ()
+    curves: tuple[BifurcationCurve, ...] = ()
+
+
+def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Follow the families that the config asks for.
+
+    Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
+    """
+    block = config.continuation
+    parameter = parameter_of(block.over, config)
+    asked = Question(config, parameter, Span(block.least, block.most), block.periods, block.points)
+    found = []
+    for model in models_of(block, config, asked):
+        followed = FOLLOW[model](asked, progress)
+        found.append(with_curves(followed, asked, progress) if block.second is not None else followed)
+    content = Content(groups(found, parameter, block), summary(found, parameter, block))
+    if not any(followed.branches for followed in found):
+        raise NoAnswer(
+            f"no gait with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}",
+            "Choose another span (--from, --to), or change what else the config fixes.",
+            content,
+        )
+    return content
+
+
+def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str, ...]:
+    """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
+    if block.model != RIGID and config.contact is None:
+        raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
+    wanted = (RIGID, CONTACT) if block.model == "both" else (block.model,)
+    refuse_values(asked)
+    touched = tuple(model for model in wanted if touches(asked, model))
+    if not touched:
+        raise ConfigError(
+            f"continuation.over: {asked.parameter.key} does not touch the {' or the '.join(wanted)} model",
+            "Choose a key that the model is made of, or another model (--model).",
+        )
+    return touched
+
+
+def refuse_values(asked: Question) -> None:
+    """Raise ConfigError if the schema refuses an end of the span."""
+    for name, value in (("from", asked.span.least), ("to", asked.span.most)):
+        if asked.parameter.config_at(asked.config, value) is None:
+            raise ConfigError(
+                f"continuation.{name}: {asked.parameter.key} cannot be {value:g} {asked.parameter.unit}",
+                f"`walkerlab schema {asked.parameter.key}` says what the key allows.",
+            )
+
+
+def touches(asked: Question, model: str) -> bool:
+    """Whether a model changes over the span."""
+    walker_at: Callable[[float], object] = (
+        rigid_walkers(asked.config, asked.parameter)
+        if model == RIGID
+        else walkers_on_ground(asked.config, asked.parameter, 1.0)
+    )
+    return walker_at(asked.span.least) != walker_at(asked.span.most)
+
+
+def with_curves(followed: Followed, asked: Question, progress: Progress) -> Followed:
+    """Curves of the model's folds and flips over the plane of both parameters; of the rigid model only."""
+    block = asked.config.continuation.second
+    if block is None or followed.model != RIGID:
+        return followed
+    second = parameter_of(block.over, asked.config)
+    plane = (asked.span, Span(block.least, block.most))
+
+    @lru_cache(CONFIGS)
+    def map_at(value: float) -> StepMap | None:
+        changed = second.config_at(asked.config, value)
+        return None if changed is None else rigid_map(changed, asked.parameter, asked.span.size)
+
+    own = second.value_in(asked.config)
+    if own not in plane[1]:
+        raise ConfigError(
+            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
+            "Curves begin at the config's own value; choose a range around it.",
+        )
+    progress.start(f"continuation: curves of bifurcations of the {followed.model} model")
+    found = []
+    for branch in followed.branches:
+        if branch.period > LONGEST_OF_CURVES:
+            continue
+        for one in branch.bifurcations:
+            if one.kind != "torus":
+                curve = curve_through(one, branch.period, map_at, plane, own, CURVE_POINTS, progress.advance)
+                found.append(curve)
+    return replace(followed, curves=tuple(curve for curve in found if curve is not None))
+
+
+def follow_rigid(asked: Question, progress: Progress) -> Followed:
+    """Every branch of the rigid model, its cascades, attractor and exponents."""
+    config, parameter, span = asked.config, asked.parameter, asked.span
+    walker_at = rigid_walkers(config, parameter)
+    step_map = rigid_map(config, parameter, span.size)
+    progress.start("continuation: branches of the rigid model")
+    follower = Follower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
+    seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
+    branches = follower.family(seeds, asked.periods)
+    followed = Followed(RIGID, step_map, branches)
+    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+
+
+def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
+    """The rigid gaits of one step at a value of the parameter, as the section has them."""
+    if walker is None:
+        return []
+    _, units = unit_walker(walker)
+    in_units = [1.0] + [units.time] * (len(walker.picked) - 1)
+    sections = (np.array([gait.state[i] for i in walker.picked]) for gait in find_gaits(walker, seed).gaits)
+    return [Seed(section * in_units, value) for section in sections]
+
+
+def follow_contact(asked: Question, progress: Progress) -> Followed:
+    """The contact model's branch, its first cascades and its attractor."""
+    from walkerlab.scene.contact import contact_gait
+
+    progress.start("continuation: a gait of the contact model")
+    for value in asked.looked_at():
+        changed = asked.parameter.config_at(asked.config, value)
+        rigid = None if changed is None else find_gaits(rigid_walker(changed, changed.equations), changed.seed).gait
+        if changed is None or changed.contact is None or rigid is None:
+            continue
+        contact = changed.contact
+        if contact.terrain == "checkerboard":
+            contact = contact.model_copy(update={"terrain": "after-mid-swing"})
+        found = contact_gait(changed.model_copy(update={"contact": contact}), rigid.step_length, rigid.state)
+        if found.gait is None:
+            progress.note(f"contact model at {value:g} {asked.parameter.unit}: {found.reason}")
+            continue
+        step_map = contact_map(asked.config, asked.parameter, asked.span.size, found.gait.step.length_m)
+        progress.start("continuation: branches of the contact model")
+        control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
+        follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
+        seed = Seed(step_map.of_section(found.gait.z, value), value)
+        branches = follower.family([seed], min(asked.periods, CONTACT_PERIODS))
+        return beyond_flips(Followed(CONTACT, step_map, branches), asked, CONTACT_SAMPLES, progress)
+    return Followed(CONTACT, None, ())
+
+
+def beyond_flips(followed: Followed, asked: Question, samples: Samples, progress: Progress) -> Followed:
+    """The attractor from before the first flip of a stable branch on, and the exponents along it."""
+    begun = first_flip(followed.branches)
+    if begun is None or followed.step_map is None or asked.periods == 1:
+        return followed
+    flip, start = begun
+    begin = max(asked.span.least, flip - BEFORE_FLIP * asked.span.size)
+    values = np.linspace(begin, asked.span.most, samples.values)
+    progress.start(f"continuation: attractor of the {followed.model} model", samples.values)
+    attractors = swept(followed.step_map, start, values, samples.transient, samples.kept, progress.advance)
+    if not attractors.found:
+        return replace(followed, attractors=attractors)
+    chosen = attractors.found[:: max(1, len(attractors.found) // samples.exponents)]
+    progress.start(f"continuation: Lyapunov exponents of the {followed.model} model", len(chosen))
+    exponents = []
+    for attractor in chosen:
+        exponents.append(
+            largest_exponent(followed.step_map, attractor.last, attractor.value, samples.kept, samples.averaged)
+        )
+        progress.advance()
+    found = tuple(one for one in exponents if one is not None)
+    return replace(followed, attractors=attractors, exponents=found)
+
+
+def with_others(followed: Followed, asked: Question, follower: Follower, progress: Progress) -> Followed:
+    """Gaits of other numbers of steps: near returns of chaotic walks, and where scattered starts settle."""
+    if followed.step_map is None or not followed.attractors.found:
+        return followed
+    generator = np.random.default_rng(asked.config.seed)
+    sampled = []
+    for chaotic in (False, True):
+        found = [one for one in followed.attractors.found if (one.period == 0) is chaotic]
+        sampled += found[:: max(1, len(found) // OTHERS_AT)]
+    progress.start(f"continuation: other gaits of the {followed.model} model", len(sampled))
+    seeds: list[Seed] = []
+    for attractor in sampled:
+        if attractor.period == 0:
+            seeds += close_returns(followed.step_map, attractor, OTHER_PERIODS, RETURNS)
+        seeds += settled_elsewhere(followed.step_map, attractor, STARTS, SCATTER, SETTLING, generator)
+        progress.advance()
+    progress.start(f"continuation: branches of other gaits of the {followed.model} model")
+    return replace(followed, branches=follower.family(seeds, asked.periods, followed.branches))
+
+
+def first_flip(branches: tuple[Branch, ...]) -> tuple[float, Floats] | None:
+    """The least value at which a gait of one step flips, and the stable gait nearest to it."""
+    flips = [
+        (one.value, branch) for branch in branches if branch.period == 1
+        for one in branch.bifurcations if one.kind == "flip"
+    ]  # fmt: skip
+    for flip, branch in sorted(flips, key=lambda one: one[0]):
+        stable = [point for point in branch.points if point.stable]
+        if stable:
+            return flip, min(stable, key=lambda point: abs(point.value - flip)).z
+    return None
+
+
+FOLLOW: Final[Mapping[str, Callable[[Question, Progress], Followed]]] = {RIGID: follow_rigid, CONTACT: follow_contact}

@@ -1,0 +1,115 @@
+"""A stage computed in memory, with what it needs and without a file: points of a sweep, objects of the Python API."""
+
+from __future__ import annotations
+
+import importlib
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+from walkerlab.config.canonical import only, slice_of
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.stages.plan import NO_CONTACT
+from walkerlab.stages.progress import Progress, Silent
+from walkerlab.store.code import Sources
+from walkerlab.store.content import Content
+from walkerlab.store.key import Identity
+
+REMEMBERED = 256
+"""Results of needed stages that are kept: those of neighbouring points are often the same."""
+
+
+def refuse_files(stage: Stage) -> None:
+    """Raise ConfigError for a stage that works with files of its run."""
+    if stage.draws or stage.keeps_parts:
+        raise ConfigError(f"{stage.name} works with the files of its run; it has no result without them.")
+
+
+class Keys:
+    """The stage keys that results would be stored under, without looking at a file."""
+
+    def __init__(self, graph: Graph = PIPELINE) -> None:
+        """Read no code yet."""
+        self.graph = graph
+        self._sources = Sources()
+        self._digests: dict[str, str] = {}
+
+    def code_digest(self, stage: Stage) -> str:
+        """The digest of a stage's code, as it was when it was first asked for."""
+        if stage.name not in self._digests:
+            self._digests[stage.name] = self._sources.code_digest(stage.module)
+        return self._digests[stage.name]
+
+    def of(self, config: Config, target: str) -> dict[str, str]:
+        """The key of a stage and of each that it needs, by name; ConfigError if the config has not what it needs."""
+        keys: dict[str, str] = {}
+        for stage in self.graph.needed_for(target, config):
+            refuse_files(stage)
+            if stage.needs_contact and config.contact is None:
+                raise ConfigError(
+                    f"{target} cannot be had: {NO_CONTACT}.",
+                    "Add one to the config; `walkerlab schema` lists its keys.",
+                )
+            given = {name: keys[name] for name in stage.inputs(config)}
+            part = slice_of(config, stage.reads)
+            keys[stage.name] = Identity(stage.name, part, given, self.code_digest(stage)).key
+        return keys
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a stage said: its content, which is partial if there is no answer and `no_answer` says why."""
+
+    content: Content
+    no_answer: NoAnswer | None = None
+
+
+class InMemory:
+    """Computes stages; remembers the results of those that others need."""
+
+    def __init__(self, graph: Graph = PIPELINE, remembered: int = REMEMBERED) -> None:
+        """Nothing is computed yet."""
+        self.graph = graph
+        self.remembered = remembered
+        self._inputs: OrderedDict[str, Answer] = OrderedDict()
+
+    def answer(self, config: Config, target: str, keys: dict[str, str], progress: Progress | None = None) -> Answer:
+        """The answer of a stage under a config, as the stage gives it when it is run.
+
+        keys  of the stage and what it needs, from `Keys.of`
+        """
+        progress = progress or Silent()
+        results: dict[str, Content] = {}
+        for stage in self.graph.needed_for(target, config):
+            if stage.name == target:
+                return self._computed(stage, config, results, progress)
+            found = self._remembered(stage, config, results, progress, keys[stage.name])
+            if found.no_answer is not None:
+                said = NoAnswer(f"it needs {stage.name}: {found.no_answer.message}", found.no_answer.advice)
+                return Answer(Content(), said)
+            results[stage.name] = found.content
+        raise AssertionError("a stage needs itself")
+
+    def _remembered(
+        self, stage: Stage, config: Config, results: dict[str, Content], progress: Progress, key: str
+    ) -> Answer:
+        if key in self._inputs:
+            self._inputs.move_to_end(key)
+            return self._inputs[key]
+        answer = self._inputs[key] = self._computed(stage, config, results, progress)
+        if len(self._inputs) > self.remembered:
+            self._inputs.popitem(last=False)
+        return answer
+
+    @staticmethod
+    def _computed(stage: Stage, config: Config, results: dict[str, Content], progress: Progress) -> Answer:
+        run = importlib.import_module(stage.module).run
+        inputs = {name: results[name] for name in stage.inputs(config)}
+        extra: dict[str, Any] = {"jobs": 1} if stage.has_cells else {}
+        try:
+            return Answer(run(only(config, stage.reads), inputs, progress, **extra))
+        except NoAnswer as error:
+            partial = error.partial if isinstance(error.partial, Content) else Content()
+            return Answer(partial, error)

@@ -1,0 +1,75 @@
+"""Results in other run folders: a stage key names a result wherever it lies."""
+
+from __future__ import annotations
+
+import contextlib
+import mmap
+import os
+import secrets
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from walkerlab.store import artifact
+from walkerlab.store.artifact import Stored
+from walkerlab.store.files import storing, write_atomically
+from walkerlab.store.runfolder import RunFolder
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """An intact result in another run folder."""
+
+    path: Path
+    result: Stored
+
+
+def find_elsewhere(folder: RunFolder, stage: str, key: str) -> Elsewhere | None:
+    """The result for a key in another run folder beside this one, or None; never raises for what files may be."""
+    for path in artifacts_beside(folder, stage):
+        if mentions(path, key):
+            verdict = artifact.check(path, key)
+            if verdict.accepted and verdict.artifact is not None:
+                return Elsewhere(path, verdict.artifact)
+    return None
+
+
+def artifacts_beside(folder: RunFolder, stage: str) -> Iterator[Path]:
+    """The files of a stage's results in the other run folders, by name."""
+    try:
+        names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
+    except OSError:
+        return
+    yield from (RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name)
+
+
+def mentions(path: Path, key: str) -> bool:
+    """Whether a file has a key in it: most have another, and need not be read and verified to know that."""
+    try:
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            return data.find(key.encode()) >= 0
+    except (OSError, ValueError):  # not there, no file, or empty
+        return False
+
+
+def take_over(found: Elsewhere, target: Path) -> None:
+    """Put a result from elsewhere in place under `target` too: a hard link, or a copy where the system has none.
+
+    Artifacts are only ever replaced, so that a shared file is as safe as one's own. Raises StorageError if the system
+    refuses.
+    """
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        os.link(found.path, temporary)
+    except OSError:
+        with storing(target):
+            data = found.path.read_bytes()
+        write_atomically(target, data)
+        return
+    try:
+        with storing(target):
+            temporary.replace(target)
+    finally:
+        # Replacing a name by another of the same file leaves both.
+        with contextlib.suppress(OSError):
+            temporary.unlink()

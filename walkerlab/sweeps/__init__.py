@@ -1,0 +1,1 @@
+"""One question over many configs: which points, computed where, and what became of each."""

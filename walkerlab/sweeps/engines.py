@@ -1,0 +1,246 @@
+"""Where chunks are computed: each engine is a factory of a concurrent.futures executor; none schedules itself."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from multiprocessing import connection, get_all_start_methods, get_context, parent_process
+from pathlib import Path
+from typing import Any
+
+from walkerlab.errors import ConfigError
+
+POLL_S = 0.5
+ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Order:
+    """What an engine is asked for.
+
+    workers  processes; 0 leaves it to the engine
+    address  of a scheduler that runs already; empty to have one made
+    modules  that workers will need
+    folder   for an engine's own files
+    options  an engine's own, by name
+    """
+
+    workers: int = 0
+    address: str = ""
+    modules: tuple[str, ...] = ()
+    folder: Path = Path()
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """An executor that is ready.
+
+    workers  chunks that it computes at once
+    """
+
+    executor: Executor
+    workers: int
+
+
+@dataclass(frozen=True)
+class Engine:
+    """One way to compute.
+
+    opened   a context that gives a pool and closes it
+    chunk_s  how long a chunk is to take, s: long against what a chunk costs the engine
+    """
+
+    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
+    chunk_s: float
+
+
+@contextlib.contextmanager
+def local(order: Order) -> Iterator[Pool]:
+    """Processes of this machine, one thread each; they end with this one, in whatever way it ends."""
+    from concurrent.futures import ProcessPoolExecutor
+
+    refuse_address("local", order)
+    workers = order.workers or os.cpu_count() or 1
+    method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+    context = get_context(method)
+    if method == "forkserver":
+        # Loaded once, by the process that all workers are forked from.
+        context.set_forkserver_preload(["walkerlab.sweeps.chunk", *order.modules])
+    with one_thread_each():
+        # The server that workers are forked from may be older than what the environment says now.
+        given = (order.modules, dict(os.environ))
+        executor = ProcessPoolExecutor(workers, context, initializer=begin_worker, initargs=given)
+        try:
+            yield Pool(executor, workers)
+        finally:
+            executor.shutdown(wait=False, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Have processes that are started meanwhile compute in one thread."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def begin_worker(modules: tuple[str, ...], environment: Mapping[str, str]) -> None:
+    """End with the process that began this one, and load what chunks need; an interrupt is the other's to deal with."""
+    import signal
+
+    os.environ.update(environment)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    for module in modules:
+        importlib.import_module(module)
+
+
+def end_with_parent() -> None:
+    """Wait for the parent's end, and follow."""
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+@contextlib.contextmanager
+def dask(order: Order) -> Iterator[Pool]:
+    """Workers of a Dask cluster that runs at an address, or of one that is made on this machine."""
+    distributed = extra("distributed", "dask")
+    with contextlib.ExitStack() as stack:
+        if order.address:
+            client = stack.enter_context(distributed.Client(order.address))
+        else:
+            workers = order.workers or os.cpu_count() or 1
+            with one_thread_each():
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+                )
+            stack.enter_context(cluster)
+            client = stack.enter_context(distributed.Client(cluster))
+        # A worker's death is dealt with chunk by chunk, here as in every engine.
+        executor = client.get_executor(retries=0, pure=False)
+        try:
+            yield Pool(executor, order.workers or max(1, len(client.scheduler_info()["workers"])))
+        finally:
+            executor.shutdown(wait=False)
+
+
+@contextlib.contextmanager
+def slurm(order: Order) -> Iterator[Pool]:
+    """Jobs of Slurm, one for each chunk; `cluster=local` runs them on this machine, to try a sweep out."""
+    submitit = extra("submitit", "slurm")
+    refuse_address("slurm", order)
+    options: dict[str, Any] = {name: number_if_it_is_one(value) for name, value in order.options.items()}
+    cluster = str(options.pop("cluster", "slurm"))
+    python = options.pop("python", None)
+    try:
+        made = submitit.AutoExecutor(
+            order.folder / "jobs", cluster=cluster, **({"slurm_python": python} if python else {})
+        )
+        made.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
+    except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
+        raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
+    executor = JobExecutor(made)
+    try:
+        yield Pool(executor, order.workers or 16)
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+
+
+class JobExecutor(Executor):
+    """Jobs of submitit as futures."""
+
+    def __init__(self, made: Any) -> None:
+        """Nothing is submitted yet.
+
+        made  a submitit executor
+        """
+        self._made = made
+        self._running: dict[Future[Any], Any] = {}
+        self._lock = threading.Lock()
+        self._closed = threading.Event()
+        self._poll = threading.Thread(target=self._collect, daemon=True)
+        self._poll.start()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit one job."""
+        future: Future[Any] = Future()
+        future.set_running_or_notify_cancel()
+        job = self._made.submit(fn, *args, **kwargs)
+        with self._lock:
+            self._running[future] = job
+        return future
+
+    def _collect(self) -> None:
+        while not self._closed.wait(POLL_S):
+            with self._lock:
+                ended = [(future, job) for future, job in self._running.items() if job.done()]
+                for future, _ in ended:
+                    del self._running[future]
+            for future, job in ended:
+                try:
+                    future.set_result(job.result())
+                except Exception as error:
+                    future.set_exception(error)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Stop looking; cancel jobs that still run if asked."""
+        while wait and self._running:
+            time.sleep(POLL_S)
+        self._closed.set()
+        self._poll.join()
+        if cancel_futures:
+            for job in self._running.values():
+                with contextlib.suppress(Exception):
+                    job.cancel(check=False)
+
+
+def refuse_address(name: str, order: Order) -> None:
+    """Raise ConfigError for an address that an engine has no use for."""
+    if order.address:
+        raise ConfigError(f"--engine {name}={order.address}: {name} takes no address.", "Only dask does.")
+
+
+def extra(module: str, name: str) -> Any:
+    """A library that comes with one of the package's extras; ConfigError if it is not installed."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ConfigError(
+            f"--engine {name} needs {module}, which is not installed.", f"pip install 'walkerlab[{name}]'"
+        ) from error
+
+
+def number_if_it_is_one(text: str) -> str | int:
+    """An engine's option as it takes it."""
+    return int(text) if text.isdigit() else text
+
+
+ENGINES: dict[str, Engine] = {
+    "local": Engine(local, chunk_s=5.0),
+    "dask": Engine(dask, chunk_s=10.0),
+    "slurm": Engine(slurm, chunk_s=60.0),
+}
+
+
+def engine_named(text: str) -> tuple[Engine, str]:
+    """The engine, and the address if there is one, of NAME or NAME=ADDRESS; ConfigError if there is none."""
+    name, _, address = text.partition("=")
+    if name not in ENGINES:
+        raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
+    return ENGINES[name], address

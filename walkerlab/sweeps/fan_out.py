@@ -1,0 +1,159 @@
+"""Points handed to an engine in chunks, and what comes back; a worker that dies takes nothing with it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import platform
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from walkerlab.errors import NoAnswer
+from walkerlab.sweeps.chunk import Chunk, Row, Task, compute
+from walkerlab.sweeps.engines import Engine, Order, Pool
+
+SCOUTS: Final = 2
+"""Points of the first chunk, which goes ahead alone: it has the kernels compiled once and says what a point takes."""
+LEAST_CHUNK_S: Final = 0.5
+LARGEST_CHUNK: Final = 5000
+SHARES: Final = 3
+"""A chunk is at most this part of what is left to a worker, so that all end together."""
+MOST_DEATHS: Final = 12
+"""Deaths before any chunk has come back, after which it is the machine and not the points."""
+
+
+@dataclass(frozen=True)
+class Try:
+    """A chunk on its way.
+
+    failures  how often it has come to nothing
+    alone     whether nothing else may run beside it: processes of one pool die together
+    """
+
+    task: Task
+    failures: int = 0
+    alone: bool = False
+
+
+class FanOut:
+    """One sweep's work on an engine."""
+
+    def __init__(
+        self, engine: Engine, order: Order, chunk_s: float, todo: Iterator[tuple[Any, dict[str, str]]], count: int
+    ) -> None:
+        """Begin nothing yet.
+
+        chunk_s  how long a chunk is to take, s
+        todo     config and keys of each point, of `count`
+        """
+        self.engine, self.order, self.chunk_s = engine, order, chunk_s
+        self.todo, self.left = todo, count
+        self.point_s: float | None = None
+        self._again: deque[Try] = deque()
+        self._running: dict[Future[Chunk], Try] = {}
+        self._deaths = 0
+        self._alive = False
+
+    def run(self, graph: str, target: str, keep: Callable[[Chunk], None]) -> None:
+        """Compute all points and hand each chunk to `keep`; points that could not be computed come as failed rows.
+
+        Raises NoAnswer if no worker lives long enough to compute anything.
+        """
+        self.graph, self.target, self.keep = graph, target, keep
+        with contextlib.ExitStack() as stack:
+            pool = stack.enter_context(self.engine.opened(self.order))
+            while self.left or self._again or self._running:
+                self._submit(pool)
+                if self._collect():
+                    stack.close()
+                    pool = stack.enter_context(self.engine.opened(self.order))
+
+    def _submit(self, pool: Pool) -> None:
+        """Hand out as much as the pool can work on, and one chunk more for each worker that waits."""
+        while len(self._running) < self._most_running(pool):
+            if self._again:
+                if self._again[0].alone and self._running:
+                    return
+                one = self._again.popleft()
+            elif self.left:
+                one = Try(self._next_task(pool.workers))
+            else:
+                return
+            try:
+                self._running[pool.executor.submit(compute, one.task)] = one
+            except BrokenExecutor as error:
+                self._running[failed_future(error)] = one
+                return
+
+    def _most_running(self, pool: Pool) -> int:
+        if self.point_s is None or any(one.alone for one in self._running.values()):
+            return 1
+        return pool.workers + 1
+
+    def _next_task(self, workers: int) -> Task:
+        size = min(self.left, self._chunk_size(workers))
+        self.left -= size
+        points = [next(self.todo) for _ in range(size)]
+        configs, keys = zip(*points, strict=True)
+        return Task(self.graph, self.target, configs, keys, platform.node())
+
+    def _chunk_size(self, workers: int) -> int:
+        if self.point_s is None:
+            return SCOUTS
+        least = LEAST_CHUNK_S / self.point_s
+        fair = self.left / (SHARES * workers)
+        return max(1, min(LARGEST_CHUNK, math.ceil(min(self.chunk_s / self.point_s, max(fair, least)))))
+
+    def _collect(self) -> bool:
+        """Wait for something to end and deal with it; True if the pool is broken and a new one is needed."""
+        ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
+        broken = any(isinstance(future.exception(), BrokenExecutor) for future in ended)
+        if broken:  # all that runs in it will end the same way
+            ended, _ = wait(self._running)
+        for future in ended:
+            one = self._running.pop(future)
+            error = future.exception()
+            if error is None:
+                self._arrived(future.result())
+            else:
+                self._failed(one, error, broken)
+        return broken
+
+    def _arrived(self, chunk: Chunk) -> None:
+        self._alive = True
+        wall = sum(row.wall_s for row in chunk.rows)
+        # The first points also load the compiled code; the last ones tell better what the next will take.
+        latest = max(1e-6, chunk.rows[-1].wall_s if self.point_s is None else wall / len(chunk.rows))
+        self.point_s = latest if self.point_s is None else 0.5 * (self.point_s + latest)
+        self.keep(chunk)
+
+    def _failed(self, one: Try, error: BaseException, together: bool) -> None:
+        """Try a chunk again, then split it, then give its point up."""
+        self._deaths += 1
+        said = f"{type(error).__name__}: {error}"
+        if self._deaths > MOST_DEATHS and not self._alive:
+            raise NoAnswer(
+                f"no worker lives: {said}",
+                "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
+            )
+        again = replace(one, failures=one.failures + 1, alone=together)
+        if one.failures == 0 or (together and not one.alone):
+            self._again.append(again)
+        elif len(one.task.configs) > 1:
+            self._again.extend(Try(half, 1, together) for half in one.task.split())
+        elif one.failures < 3:
+            self._again.append(again)
+        else:
+            self.point_s = self.point_s or 1.0
+            key = one.task.keys[0][self.target]
+            self.keep(Chunk((Row(key, "failed", f"its worker died: {said}", {}),), {}))
+
+
+def failed_future(error: BaseException) -> Future[Chunk]:
+    """A future that has failed."""
+    future: Future[Chunk] = Future()
+    future.set_exception(error)
+    return future

@@ -1,0 +1,271 @@
+"""What a sweep asks: a stage, parameters with their values, and how they are combined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from walkerlab.config.contact import Contact
+from walkerlab.config.fields import extra, leaves
+from walkerlab.config.layers import Setting
+from walkerlab.config.problems import Problem, nearest, refusal
+from walkerlab.config.reader import read
+from walkerlab.config.schema import Config, SlopeInDegrees
+from walkerlab.config.tree import Position, Scalar, plain
+from walkerlab.config.tree import Sequence as Listed
+
+Value = float | int | str | bool
+Layout = Literal["grid", "list"]
+
+POINT: Final = "point"
+MOST_POINTS: Final = 10_000_000
+FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
+SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One parameter.
+
+    key     dotted, as in a config
+    values  in order; of a list of points one for each point
+    source  what messages name as the values' origin
+    ends    least and largest value of an interval that is to be sampled; None if the values are given
+    """
+
+    key: str
+    values: tuple[Value, ...]
+    source: str
+    ends: tuple[float, float] | None = None
+
+    def setting(self, index: int) -> Setting:
+        """The `--set` of one value."""
+        value = self.values[index]
+        place = Position(f"{self.source}, {value}", 1, 1)
+        return Setting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
+
+
+@dataclass(frozen=True)
+class Question:
+    """A stage over parameters.
+
+    names   of the parameters in results: the last part of the key, with more parts where two would be the same
+    layout  grid: every value with every other; list: the n-th value of each makes the n-th point
+    """
+
+    stage: str
+    axes: tuple[Axis, ...]
+    layout: Layout = "grid"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return distinct_ends([axis.key for axis in self.axes])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the dimensions."""
+        if self.layout == "list":
+            return (len(self.axes[0].values),)
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return (POINT,) if self.layout == "list" else self.names
+
+    def __len__(self) -> int:
+        """How many points there are."""
+        return math.prod(self.shape)
+
+    def places(self, index: int) -> tuple[int, ...]:
+        """Which value of each parameter a point has; the last parameter changes fastest."""
+        if self.layout == "list":
+            return (index,) * len(self.axes)
+        places = []
+        for length in reversed(self.shape):
+            index, place = divmod(index, length)
+            places.append(place)
+        return tuple(reversed(places))
+
+    def settings(self, index: int) -> list[Setting]:
+        """The `--set` options of one point."""
+        return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
+
+    def said(self, index: int) -> str:
+        """One point in words."""
+        settings = self.settings(index)
+        return ", ".join(f"{axis.key}={plain(one.value)}" for axis, one in zip(self.axes, settings, strict=True))
+
+
+def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
+    """The fewest last parts of dotted keys that tell them apart."""
+    found = []
+    for key in keys:
+        parts = key.split(".")
+        ends = (".".join(parts[start:]) for start in range(len(parts) - 1, -1, -1))
+        others = [other for other in keys if other != key]
+        found.append(next(end for end in ends if not any(f".{other}".endswith(f".{end}") for other in others)))
+    return tuple(found)
+
+
+def asked(
+    stage: str,
+    over: Sequence[tuple[str, Any, str]],
+    zipped: bool = False,
+    sample: str = "",
+    seed: int = 1,
+) -> Question:
+    """The question of command-line options or of a `sweep` block.
+
+    over    for each parameter its key, its values (a list, or FROM:TO:N), and where that stands
+    sample  e.g. latin-hypercube:500; empty for the values themselves
+
+    Raises ConfigError for what cannot be meant.
+    """
+    axes = tuple(axis(key, values, source) for key, values, source in over)
+    repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
+    if not axes or repeated:
+        text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
+        raise refusal([Problem(None, f"sweep: {text}", "--over KEY=VALUES, each key once")])
+    if sample:
+        return Question(stage, sampled(axes, sample, seed), "list")
+    for one in axes:
+        if not one.values:
+            raise refusal([Problem(Position(one.source, 1, 1), f"{one.key}: how many values?", FORMS)])
+    if zipped and len({len(one.values) for one in axes}) > 1:
+        lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
+        raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
+    question = Question(stage, axes, "list" if zipped else "grid")
+    if len(question) > MOST_POINTS:
+        raise refusal([Problem(None, f"sweep: {len(question)} points", f"up to {MOST_POINTS} in one sweep")])
+    return question
+
+
+def axis_of_text(text: str) -> tuple[str, Any, str]:
+    """Key, values and origin of one `--over KEY=VALUES`; ConfigError if it is not of that form."""
+    key, equals, values = text.partition("=")
+    source = f"--over {text}"
+    key = key.strip()
+    if not equals or not all(key.split(".")):
+        raise refusal([Problem(Position(source, 1, 1), "is not of the form KEY=VALUES", FORMS)])
+    if values.lstrip().startswith("["):
+        node = read(values, source, len(key) + 2)
+        assert isinstance(node, Listed)
+        return key, [plain(item) for item in node.items], f"--over {key}"
+    return key, values.strip(), source
+
+
+def axis(key: str, values: Any, source: str) -> Axis:
+    """One parameter; ConfigError for an unknown key and for values of no known form."""
+    refuse_unknown(key, source)
+    if isinstance(values, list | tuple):
+        bad = next((value for value in values if not isinstance(value, Value)), None)
+        if bad is not None or not values:
+            raise refusal([Problem(Position(source, 1, 1), f"{key}: {bad if values else 'an empty list'}", FORMS)])
+        return Axis(key, tuple(values), source)
+    parts = str(values).split(":")
+    try:
+        low, high = float(parts[0]), float(parts[1])
+        count = int(parts[2]) if len(parts) > 2 else 0
+    except (ValueError, IndexError):
+        count = -1
+    logarithmic = parts[3:] == ["log"]
+    if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
+        raise refusal([Problem(Position(source, 1, 1), f"{key}: {values} is no range of values", FORMS)])
+    if logarithmic and min(low, high) <= 0.0:
+        raise refusal(
+            [Problem(Position(source, 1, 1), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
+        )
+    return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
+
+
+def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
+    """Whole numbers as integers where a key takes nothing else; what is not whole is left for the schema to refuse."""
+    field = next((field for path, field in leaves(Config) if ".".join(path) == key), None)
+    if field is None or field.annotation is not int:
+        return tuple(values)
+    return tuple(int(value) if value.is_integer() else value for value in values)
+
+
+def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
+    """`count` values from one end to the other, both included; one value is the first end."""
+    import numpy as np
+
+    space = np.geomspace if logarithmic else np.linspace
+    return tuple(float(value) for value in space(low, high, count))
+
+
+def refuse_unknown(key: str, source: str) -> None:
+    """Raise ConfigError for a key that configs do not have."""
+    known = [".".join(path) for path, _ in leaves(Config)]
+    if key == "slope_deg" or key in known or any(key.startswith(f"{one}.") for one in known):
+        return
+    if any(one.startswith(f"{key}.") for one in known):
+        raise refusal([Problem(Position(source, 1, 1), f"{key}: is a block of keys, not a value")])
+    # A walker of another type has keys of its own, which its schema checks point by point.
+    if key.startswith("walker."):
+        return
+    raise refusal([Problem(Position(source, 1, 1), f"{key}: unknown key", "", nearest(key, [*known, "slope_deg"]))])
+
+
+def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
+    """Points drawn from the intervals, or from the lists, of all parameters at once; ConfigError for no such sampler.
+
+    sample  SAMPLER:N
+    """
+    name, _, number = sample.partition(":")
+    if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MOST_POINTS:
+        allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
+        raise refusal([Problem(Position(f"--sample {sample}", 1, 1), "is no sampler with a number", allowed)])
+    unit = unit_sample(name, len(axes), int(number), seed)
+    return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
+
+
+def unit_sample(name: str, dimensions: int, number: int, seed: int) -> Any:
+    """Points of the unit cube, (number, dimensions)."""
+    import numpy as np
+
+    generator = np.random.default_rng(seed)
+    if name == "random":
+        return generator.random((number, dimensions))
+    from scipy.stats import qmc
+
+    if name == "sobol":
+        # In full powers of two, where the sequence is balanced; its first points are then a prefix of more.
+        return qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(number)))[:number]
+    return qmc.LatinHypercube(dimensions, seed=generator).random(number)
+
+
+def drawn(one: Axis, column: Any) -> Iterator[Value]:
+    """The values of one parameter for numbers from 0 to 1."""
+    for share in column.tolist():
+        if one.ends is not None:
+            yield from as_the_key_has_it(one.key, [one.ends[0] + share * (one.ends[1] - one.ends[0])])
+        else:
+            yield one.values[min(int(share * len(one.values)), len(one.values) - 1)]
+
+
+def described(config: Config, key: str) -> tuple[str, str]:
+    """Unit and meaning of a config's key; a unit that depends on the block's is that of this config."""
+    fields: Mapping[str, Any] = {".".join(path): field for path, field in leaves(Config)}
+    field = SlopeInDegrees.model_fields["slope_deg"] if key == "slope_deg" else fields.get(key)
+    field = field or own_field(config, key)
+    if field is None:
+        return "1", key
+    unit = extra(field, "unit")
+    if " or " in unit:
+        contact: Contact | None = config.contact
+        unit = unit.split(" or ")[0 if contact is None or contact.units == "adams" else 1]
+    return unit, field.description or key
+
+
+def own_field(config: Config, key: str) -> Any:
+    """The field of a key in the config's own blocks, which may be of a type that the schema only allows."""
+    block: Any = config
+    *above, last = key.split(".")
+    for name in above:
+        block = getattr(block, name, None)
+    return getattr(type(block), "model_fields", {}).get(last)

@@ -1,0 +1,153 @@
+"""A sweep's one file: parameters as coordinates, the stage's numbers as variables over them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.canonical import canonical_json
+from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.chunk import Chunk, Row
+from walkerlab.sweeps.columns import OWN, Columns
+from walkerlab.sweeps.question import Question, described
+
+OUTCOMES = {"answered": "answered", "no-answer": "no-answer", "failed": "failed"}
+MEANINGS = {
+    "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
+    "status": "answered, no-answer, or failed: not computed",
+    "said": "why there is no answer",
+}
+
+
+class Merge:
+    """The rows of a sweep's results put together.
+
+    size  number of different results
+    """
+
+    def __init__(self, size: int) -> None:
+        """There are no rows yet."""
+        self.columns = Columns(size)
+        self.own = {name: np.full(size, "", object) for name in OWN}
+        self.there = np.zeros(size, bool)
+
+    def put(self, place: int, row: Row) -> None:
+        """Take one result's row."""
+        self.there[place] = True
+        summary = dict(row.summary)
+        outcome = summary.pop("outcome", None) or OUTCOMES[row.status]
+        for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
+            self.own[name][place] = sys.intern(text)
+        self.columns.put(place, summary)
+
+    def put_all(self, chunk: Chunk, places: Mapping[str, int]) -> None:
+        """Take the rows of a chunk that have a place."""
+        self.columns.label(chunk.labels)
+        for row in chunk.rows:
+            if row.key in places:
+                self.put(places[row.key], row)
+
+    def content(self, question: Question, points: Any, inverse: NDArray[np.int64]) -> Content:
+        """What is stored of the sweep.
+
+        points   the sweep's `Points`
+        inverse  which result each point has
+        """
+        shape, dims = question.shape, question.dims
+        variables = dict(coordinates(question, points.template.base.config))
+        for name in OWN:
+            variables[name] = Variable(self.own[name][inverse].reshape(shape), dims, "", MEANINGS[name])
+        for name, variable in self.columns.variables(inverse, shape, dims):
+            # A number that is a parameter as well is its coordinate.
+            variables.setdefault(name, variable)
+        attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
+        statuses = self.own["status"][inverse]
+        summary = {
+            "of": question.stage,
+            "parameters": {name: parameter_values(question, place) for place, name in enumerate(question.names)},
+            "layout": question.layout,
+            "points": len(question),
+            "done": int(np.sum(statuses != "failed")),
+            "failed": int(np.sum(statuses == "failed")),
+            "outcomes": counted(self.own["outcome"][inverse]),
+        }
+        return Content({"": Group(variables, attrs)}, summary)
+
+
+def coordinates(question: Question, config: Any) -> Iterable[tuple[str, Variable]]:
+    """The parameters as variables."""
+    for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
+        unit, text = described(config, axis.key)
+        values = parameter_values(question, place)
+        numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+        array = np.array(values, float) if numbers else np.array([str(value) for value in values], object)
+        dims = question.dims if question.layout == "list" else (name,)
+        yield name, Variable(array, dims, unit if numbers else "", text)
+
+
+def parameter_values(question: Question, place: int) -> list[Any]:
+    """The values of one parameter, in order."""
+    return list(question.axes[place].values)
+
+
+def counted(texts: NDArray[Any]) -> dict[str, int]:
+    """How often each text occurs."""
+    names, counts = np.unique(texts.astype(str), return_counts=True)
+    return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
+
+
+def question_slice(question: Question, base: Mapping[str, Any]) -> dict[str, Any]:
+    """What a sweep's result is determined by, beside the code: the question and the config that it varies."""
+    over = {axis.key: list(axis.values) for axis in question.axes}
+    return {"of": question.stage, "over": over, "layout": question.layout, "config": dict(base)}
+
+
+def result_name(question: Question, part: Mapping[str, Any]) -> str:
+    """The name of a sweep's file without its ending: what was asked, and a digest that tells questions apart."""
+    digest = hashlib.sha256(canonical_json(dict(part)).encode()).hexdigest()[:8]
+    names = "-".join(question.names)[:60]
+    return f"sweep-{question.stage}-{names}-{digest}"
+
+
+def result_path(folder: RunFolder, name: str) -> Path:
+    """The file of a sweep's result."""
+    return folder.path / f"{name}.h5"
+
+
+def as_csv(content: Content, question: Question) -> str:
+    """A table with a row for each point: its parameters first, then every number and text; lists take columns."""
+    import csv
+
+    group = content[""]
+    count = len(question)
+    columns: dict[str, list[Any]] = {}
+    for place, name in enumerate(question.names):
+        values = parameter_values(question, place)
+        columns[name] = [values[question.places(index)[place]] for index in range(count)]
+    for name, variable in group.variables.items():
+        if name not in columns:
+            columns.update(flat_columns(name, variable, len(question.shape)))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
+    """A variable as columns, one for each place of a list; a gap is empty."""
+    values = variable.values
+    points, own = values.shape[:dimensions], values.shape[dimensions:]
+    rows = values.reshape((int(np.prod(points)), *own))
+    for place in np.ndindex(own):
+        column = rows[(slice(None), *place)].tolist()
+        ending = "".join(f"_{number}" for number in place)
+        yield f"{name}{ending}", ["" if value != value else value for value in column]

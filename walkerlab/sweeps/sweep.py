@@ -1,0 +1,215 @@
+"""A sweep from its question to its file: take over what is there, compute the rest, put it together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.loader import Template
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.stages.graph import PIPELINE, Graph
+from walkerlab.stages.progress import Reporter, Silent
+from walkerlab.store import artifact, provenance
+from walkerlab.store.content import Content
+from walkerlab.store.files import make_folder
+from walkerlab.store.key import Identity
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.chunk import (
+    Chunk,
+    Row,
+    chunk_files,
+    median_wall_s,
+    rows_of_single_runs,
+    store,
+    stored_chunk,
+)
+from walkerlab.sweeps.engines import ENGINES, Engine, Order
+from walkerlab.sweeps.fan_out import FanOut
+from walkerlab.sweeps.points import Points
+from walkerlab.sweeps.question import Question
+from walkerlab.sweeps.result import Merge, question_slice, result_name, result_path
+
+PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
+
+
+@dataclass(frozen=True)
+class Work:
+    """How a sweep is to be computed.
+
+    engine   where
+    order    what the engine is asked for
+    chunk_s  how long a chunk is to take, s; None is the engine's own
+    wait     for another process that works in the folder
+    force    compute every point, there or not
+    graph    where the pipeline is, as module:NAME
+    """
+
+    engine: Engine = ENGINES["local"]
+    order: Order = field(default_factory=Order)
+    chunk_s: float | None = None
+    wait: bool = True
+    force: bool = False
+    graph: str = PIPELINE_AT
+
+
+@dataclass(frozen=True)
+class Swept:
+    """How a sweep went.
+
+    path     its file
+    content  of the file
+    reused   points whose result was there
+    wall_s   time of the whole
+    """
+
+    question: Question
+    path: Path
+    content: Content
+    reused: int
+    wall_s: float
+
+    @property
+    def done(self) -> int:
+        """Points with a result, be it that there is no answer."""
+        return int(self.content.summary["done"])
+
+    @property
+    def failed(self) -> int:
+        """Points whose computation was not completed."""
+        return int(self.content.summary["failed"])
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What a sweep would do.
+
+    points     in words, the first of them
+    count      how many points there are
+    there      of these, how many have a result already
+    estimate_s time for the rest, s; None if nothing is known of such points
+    """
+
+    path: Path
+    points: tuple[str, ...]
+    count: int
+    there: int
+    estimate_s: float | None
+
+
+class Sweep:
+    """One question, its points checked."""
+
+    def __init__(self, question: Question, template: Template, folder: RunFolder, graph: Graph = PIPELINE) -> None:
+        """Check every point by the schema.
+
+        Raises ConfigError for points that are no configs and for a stage that has no result without files.
+        """
+        refuse_unknown_stage(question.stage, graph)
+        self.question, self.folder = question, folder
+        self.points = Points(question, template, graph)
+        keys = np.frombuffer(b"".join(self.points.checked_keys()), dtype="S32")
+        unique, self.inverse = np.unique(keys, return_inverse=True)
+        self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
+        # any one of the points that have a result will do to compute it
+        self.first = np.full(len(unique), len(keys))
+        np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
+        base = template.base.config.model_dump(mode="json")
+        base.pop("sweep", None)
+        self.slice = question_slice(question, base)
+        self.name = result_name(question, self.slice)
+        self.path = result_path(folder, self.name)
+
+    def foresee(self, workers: int, shown: int) -> Foreseen:
+        """What would be done; touches nothing."""
+        there = np.zeros(len(self.places), bool)
+        rows: list[Row] = []
+        for chunk in self._stored():
+            rows += chunk.rows
+            there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
+        count = len(self.question)
+        missing = int(np.sum(~there))
+        wall = median_wall_s(rows)
+        estimate = 0.0 if not missing else None if wall is None else wall * missing / max(1, workers)
+        said = tuple(self.question.said(index) for index in range(min(shown, count)))
+        return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
+
+    def run(self, work: Work, reporter: Reporter | None = None) -> Swept:
+        """Have the sweep's file, computing the points that have no result yet.
+
+        Raises LockedError (only without `wait`), StorageError, and NoAnswer if no worker lives.
+        """
+        started = time.perf_counter()
+        reporter = reporter or Silent()
+        for key in self.points.unread():
+            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
+        make_folder(self.folder.path)
+        with self.folder.locked(work.wait, reporter.note):
+            merge = Merge(len(self.places))
+            if not work.force:
+                self._take_over(merge)
+            reused = int(merge.there[self.inverse].sum())
+            if reused:
+                reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
+            begun = provenance.begin(self.points.template.base.config, {})
+            try:
+                self._compute(merge, work, reporter, begun)
+            finally:
+                reporter.finish()
+            content = merge.content(self.question, self.points, self.inverse)
+            identity = Identity("sweep", self.slice, {}, self.points.code_digest)
+            complete = content.summary["failed"] == 0
+            artifact.write(self.path, content, identity, begun.until_now(), complete)
+        return Swept(self.question, self.path, content, reused, time.perf_counter() - started)
+
+    def _stored(self) -> Iterator[Chunk]:
+        """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
+        runs, stage = self.folder.runs_dir, self.question.stage
+        for path in chunk_files(runs, stage, self.points.code_digest):
+            chunk = stored_chunk(path)
+            if chunk is not None:
+                yield chunk
+        for row, labels in rows_of_single_runs(runs, stage, self.places):
+            yield Chunk((row,), labels)
+
+    def _take_over(self, merge: Merge) -> None:
+        for chunk in self._stored():
+            merge.put_all(chunk, self.places)
+
+    def _compute(self, merge: Merge, work: Work, reporter: Reporter, begun: provenance.Provenance) -> None:
+        missing = np.sort(self.first[~merge.there])
+        if not missing.size:
+            return
+        reporter.start("sweep", int(missing.size))
+        stage, digest = self.question.stage, self.points.code_digest
+
+        def keep(chunk: Chunk) -> None:
+            store(self.folder, stage, digest, chunk, begun)
+            merge.put_all(chunk, self.places)
+            reporter.advance(len(chunk.rows))
+
+        chunk_s = work.chunk_s or work.engine.chunk_s
+        todo = self._configs(missing.tolist())
+        FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
+
+    def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str]]]:
+        for index in indices:
+            config = self.points.config(index)
+            yield config, self.points.keys(config)
+
+
+def refuse_unknown_stage(name: str, graph: Graph) -> None:
+    """Raise ConfigError for a stage that cannot be swept."""
+    can = [stage.name for stage in graph.stages if not stage.draws and not stage.keeps_parts]
+    if name not in can:
+        raise ConfigError(f"--stage {name}: cannot be swept.", f"Stages that can: {', '.join(can)}.")
+
+
+def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
+    """The modules that computing a stage takes."""
+    return tuple(one.module for one in graph.needed_for(stage, config))
