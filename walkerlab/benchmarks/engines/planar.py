@@ -18,7 +18,7 @@ FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 HINGED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
 SMALLEST_INERTIA = 1e-13  # of mass times length squared: engines refuse a body without inertia
-SMALLEST_BALL_M = 5e-4  # for point feet, which engines have not; larger than any penetration
+SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than any penetration
 
 
 @dataclass(frozen=True)
