@@ -198,7 +198,7 @@ def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own:
             ObjectContactSphereTriangle(
                 markerNumbers=[foot, ground],
                 nodeNumber=state,
-                radiusSphere=ball.radius_m,
+                sphereRadius=ball.radius_m,
                 trianglePoints=triangle(),
                 includeEdges=0,
                 dynamicFriction=settings["dynamic_friction"],
