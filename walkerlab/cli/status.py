@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
-from walkerlab.cli.runs import rows_of_runs, run_object
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
+from walkerlab.cli.runs import rows_of_runs, run_object
 from walkerlab.cli.text import aligned
 from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from walkerlab.figures import (
     accuracy,
+    engines,
     figure_02,
     figure_05,
     figure_06,
@@ -36,5 +37,6 @@ FIGURES: tuple[Illustration, ...] = (
     figure_15.FIGURE,
     figure_16.FIGURE,
     *accuracy.FIGURES,
+    *engines.FIGURES,
     *stability_maps.FIGURES,
 )

@@ -188,6 +188,15 @@ PIPELINE = Graph(
         alone=True,
     ),
     Stage(
+        "engines",
+        "walkerlab.stages.engines",
+        "Walk in other engines (MuJoCo, Drake, Exudyn): our law in their integrators, and their own contact.",
+        reads=("walker", "gravity", "slope", "equations", "start", "contact"),
+        inputs=gait_for_start_or_pads,
+        needs_contact=True,
+        on_demand=True,
+    ),
+    Stage(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
@@ -229,7 +238,7 @@ PIPELINE = Graph(
         "Draw the paper's figures from the stored results.",
         reads=("name",),
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
-        if_current=("accuracy", "tune", "stability-maps", "continuation", "basin"),
+        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
         draws=True,
     ),
     Stage(
@@ -238,7 +247,7 @@ PIPELINE = Graph(
         "Write the report, one HTML file.",
         reads=EVERYTHING,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
-        if_current=("stability-maps", "continuation", "basin"),
+        if_current=("engines", "stability-maps", "continuation", "basin"),
         draws=True,
         early_with=("fixedpoint", "simulate", "contact-sim"),
     ),

@@ -1,0 +1,88 @@
+"""Every engine that is installed: its swing converges to ours, its contact carries what it should, our law is ours."""
+
+import importlib
+
+import numpy as np
+import pytest
+from engine_scenes import compass
+
+from walkerlab.benchmarks.engines.adapter import Stepping
+from walkerlab.benchmarks.engines.experiments import STARTS, swing_truth, target_of, walked
+from walkerlab.benchmarks.engines.registry import ENGINES
+from walkerlab.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
+
+SWING_S, COARSE_S = 0.24, 4e-3
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request):
+    entry = ENGINES[request.param]
+    pytest.importorskip(entry.module, reason=f"{entry.name} is not installed: {entry.install_line}")
+    return entry
+
+
+def swing(engine, integrator, step_s, tolerance=None):
+    scene = compass()
+    model, chain = pinned_model(scene)
+    start = np.array((*scene.start[2:4], *scene.start[6:]))
+    stepping = Stepping(integrator, step_s, tolerance)
+    task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, 10_000)
+    truth, energy = swing_truth(scene, start, SWING_S)
+    end = task.run().end
+    return float(np.max(np.abs(end - truth))), abs(energy(end) - energy(start))
+
+
+def test_swings_converge_to_ours_with_the_order_that_is_promised(engine):
+    for name, entry in engine.adapter().INTEGRATORS.items():
+        if entry.adapts:
+            continue
+        coarse, fine = (swing(engine, name, h)[0] for h in (COARSE_S, 0.5 * COARSE_S))
+        assert np.log2(coarse / fine) == pytest.approx(entry.order, abs=0.2), name
+
+
+def test_energy_drifts_no_more_than_the_swing_errs(engine):
+    for name, entry in engine.adapter().INTEGRATORS.items():
+        error, drift = swing(engine, name, 1e-3, 1e-8 if entry.adapts else None)
+        # at most 25 kg m^2/s^2 per unit of angle or velocity
+        assert drift < 25.0 * error + 1e-12, name
+
+
+def test_a_ball_rests_where_the_law_has_it(engine):
+    target = target_of(compass())
+    for contact in engine.adapter().CONTACTS:
+        task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
+        depth = Bench(task, engine.adapter().tuned(contact, target)).at_rest()
+        assert depth == pytest.approx(target.penetration, rel=2e-3), contact
+
+
+def test_our_law_in_an_engine_is_our_walk(engine):
+    """To the first touch and through it."""
+    scene = compass()
+    until = 0.8
+    truth = walked(scene, "radau5", 1e-10, 2, until).samples.states[1]
+    errors = []
+    name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
+    for step in (4e-5, 2e-5):
+        task = WalkTask(engine.name, Stepping(name, until / round(until / step)), scene, 2, until, None, 50_000)
+        answer = task.run()
+        assert answer.outcome == "walked"
+        errors.append(float(np.max(np.abs(answer.end - truth))))
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 1e-2
+
+
+def test_a_run_is_the_same_each_time(engine):
+    scene = compass()
+    contact, integrator = next(iter(engine.adapter().CONTACTS.items()))
+    own = engine.adapter().tuned(contact, target_of(scene))
+    ends = []
+    for _ in range(2):
+        task = WalkTask(engine.name, Stepping(integrator, 2e-4), scene.started(STARTS[-1]), 1, 10.0, own, 6_000)
+        ends.append(task.run())
+    assert ends[0].touches_s.tolist() == ends[1].touches_s.tolist()
+    assert ends[0].steps == ends[1].steps
+
+
+def test_nothing_of_an_engine_is_imported_by_its_adapter(engine):
+    module = importlib.import_module(f"walkerlab.benchmarks.engines.{engine.name}")
+    assert not any(getattr(value, "__name__", "").split(".")[0] == engine.module for value in vars(module).values())

@@ -1,0 +1,116 @@
+"""What engines are told of a walker, and how a walk is judged from outside: no engine is needed for this."""
+
+import numpy as np
+import pytest
+from engine_scenes import compass
+
+from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of, walked
+from walkerlab.benchmarks.engines.follow import crossing, follower
+from walkerlab.benchmarks.engines.runs import pinned_model
+from walkerlab.ground.friction import friction_coefficient
+from walkerlab.hybrid.outcome import Outcome
+
+
+@pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])
+def scene(request):
+    return compass(*request.param)
+
+
+def our_samples(scene, interval_s, steps):
+    """Our own walk, as an engine with steps of `interval_s` would give it."""
+    result = walked(scene, "radau5", 1e-9, steps, interval_s)
+    return result, result.samples
+
+
+def test_coordinates_lead_to_an_engine_and_back(scene):
+    q, v = scene.from_base(scene.start)
+    assert scene.about_centre(q, v) == pytest.approx(scene.start, abs=1e-14)
+
+
+def test_the_whole_mass_goes_over_with_its_centre(scene):
+    model = scene.model
+    assert sum(link.mass_kg for link in model.links) == pytest.approx(20.0)
+    hip_leg = model.links[0]
+    # 10 kg at the hip and 5 kg half a metre below it
+    assert hip_leg.centre_m == pytest.approx((0.0, -0.5 * 5.0 / 15.0))
+    assert hip_leg.inertia_kg_m2 == pytest.approx(5.0 * 10.0 / 15.0 * 0.25)
+
+
+def test_a_hinged_walker_hangs_from_its_stance_foot(scene):
+    model, chain = pinned_model(scene)
+    assert model.freedoms == ("turn",)
+    assert model.links[0].point_m == scene.assembly.feet[scene.stance].centre_m
+    assert chain.tolist() == [[1.0, 1.0], [1.0, 0.0]]
+
+
+def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
+    """Generalised forces times velocities equal the contact forces times the velocities of their points."""
+    _, samples = our_samples(scene, 0.05, 3)
+    for i in range(1, 20):
+        q, v = scene.from_base(tuple(samples.states[i]))
+        rules = follower(scene, 3, *scene.from_base(scene.start))
+        rules.ledger.carried[:] = samples.carried[i]
+        forces = rules.look.forces(q, v).copy()
+        law, friction = scene.ours.normal, scene.ours.friction
+        power = 0.0
+        for foot, (_, height, slip, climb) in enumerate(rules.look.feet(q, v)):
+            if height < 0.0 and samples.carried[i, foot]:
+                depth = -height
+                share = min(1.0, depth / law.full_damping_penetration)
+                damping = law.damping * share**2 * (3.0 - 2.0 * share)
+                normal = max(0.0, law.stiffness * depth**law.exponent - damping * climb)
+                power += normal * (climb + friction_coefficient(friction, slip)[0] * slip)
+        assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
+
+
+def test_the_rules_see_our_own_walk_as_it_was(scene):
+    result, samples = our_samples(scene, 1e-4, 4)
+    rules = follower(scene, 4, *scene.from_base(scene.start))
+    for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
+        rules.follow(float(time_s), *scene.from_base(tuple(y)))
+    seen = rules.ledger.touch_time[:3]
+    # the ground stops the foot, at about 700 m/s^2 from 0.27 m/s, within the step that the cubic spans
+    bound = 700.0 * 1e-4**2 / (8.0 * 0.27)
+    assert seen == pytest.approx(result.touch_time_s[:3], abs=bound)
+    assert rules.ledger.touch_along[:3] == pytest.approx(result.touch_along_m[:3], abs=bound)
+    assert rules.ledger.slip[:3] == pytest.approx(result.slip_m[:3], abs=bound)
+
+
+def test_a_walk_whose_numbers_are_lost_is_a_failed_solver(scene):
+    q, v = scene.from_base(scene.start)
+    rules = follower(scene, 4, q, v)
+    rules.follow(1e-3, np.full_like(q, np.nan), v)
+    assert rules.outcome is Outcome.SOLVER_FAILED
+
+
+def test_a_walker_whose_hip_is_low_has_fallen(scene):
+    q, v = scene.from_base(scene.start)
+    rules = follower(scene, 4, q, v)
+    rules.follow(1e-3, q - np.array((0.0, 0.6, 0.0, 0.0)), v)
+    assert rules.outcome is Outcome.FELL
+
+
+def test_a_touch_between_two_steps_is_that_of_the_cubic():
+    h, touch = 0.1, 0.037
+
+    def height(t):
+        return (touch - t) * (1.0 + t + 3.0 * t * t)
+
+    def velocity(t):
+        return -(1.0 + t + 3.0 * t * t) + (touch - t) * (1.0 + 6.0 * t)
+
+    before, now = [0.0, height(0.0), 0.0, velocity(0.0)], [0.0, height(h), 0.0, velocity(h)]
+    assert h * crossing(before, now, h) == pytest.approx(touch, abs=1e-15)
+
+
+def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
+    scene = compass()
+    target = target_of(scene)
+    law = scene.ours.normal
+    assert law.stiffness * target.penetration**law.exponent == pytest.approx(20.0 * scene.ours.gravity_down)
+    assert target.damping_ratio == pytest.approx(3.714, abs=1e-3)
+    assert -friction_coefficient(scene.ours.friction, target.creep_velocity)[0] == pytest.approx(CREEP_LOAD)
+
+
+def test_there_is_nothing_to_tune_on_frictionless_ground():
+    assert target_of(compass("contact.friction=none")) is None

@@ -1,0 +1,38 @@
+"""An engine's crash, exception or endless loop ends its own task and nothing else."""
+
+import pytest
+from crashing_tasks import Answers, Crashes, Raises, Sleeps
+
+from walkerlab.benchmarks.engines import process
+from walkerlab.benchmarks.engines.process import Lost, OwnProcess
+
+
+@pytest.fixture
+def own():
+    with OwnProcess() as one:
+        yield one
+
+
+def test_results_come_back_and_what_an_engine_prints_does_not(own, capfd):
+    assert [own.do(Answers(number), 30.0) for number in (1, 2)] == [1, 2]
+    assert "engines talk" not in capfd.readouterr().out
+
+
+def test_a_crash_is_told_with_its_code_and_the_next_task_runs(own):
+    lost = own.do(Crashes(), 30.0)
+    assert isinstance(lost, Lost)
+    assert "-11" in lost.why
+    assert own.do(Answers(3), 30.0) == 3
+
+
+def test_an_exception_is_told_in_its_words(own):
+    assert own.do(Raises(), 30.0) == Lost("RuntimeError: bad model")
+
+
+def test_what_takes_for_ever_is_ended(own, monkeypatch):
+    assert own.do(Answers(1), 30.0) == 1
+    lost = own.do(Sleeps(), 0.2)
+    assert isinstance(lost, Lost)
+    assert lost.timed_out
+    monkeypatch.setattr(process, "START_UP_S", 30.0)
+    assert own.do(Answers(2), 1.0) == 2

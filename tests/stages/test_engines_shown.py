@@ -1,0 +1,85 @@
+"""What a reader sees of the walk in other engines: figures and the report's section, from a stored result."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from synthetic_engines import PERIOD, ROWS, content
+
+from walkerlab.config.loader import load
+from walkerlab.figures.canvas import styled
+from walkerlab.figures.engines import COLOURS, FIGURES, series_of
+from walkerlab.report.blocks import Findings, Table
+from walkerlab.report.results import Results
+from walkerlab.report.sections.engines import section
+
+ERRORS, PERIODS = FIGURES
+
+
+@pytest.fixture(scope="module")
+def results():
+    return {"engines": content()}
+
+
+@pytest.fixture(scope="module")
+def made(results):
+    return section(Results(load().config, results))
+
+
+def lines_of(axes):
+    return [line for line in axes.lines if len(line.get_xdata()) and line.get_marker() not in ("", "None", None)]
+
+
+def test_every_error_there_is_stands_against_its_run_time(results):
+    with styled():
+        left, right = ERRORS.plot(results).axes
+    for axes, experiment in ((left, "same-law"), (right, "own-law")):
+        drawn = sorted((x, y) for line in lines_of(axes) for x, y in zip(*line.get_data(), strict=True))
+        there = [(row.wall_s, row.error) for row in ROWS if row.experiment == experiment and row.error is not None]
+        np.testing.assert_allclose(drawn, sorted(there))
+
+
+def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
+    with styled():
+        (axes,) = PERIODS.plot(results).axes
+    levels = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "None"]
+    assert levels == pytest.approx([PERIOD, 0.7036])
+    drawn = sorted(y for line in lines_of(axes) for y in line.get_ydata())
+    walked = [row for row in ROWS if row.experiment == "own-law" and row.engine != "walkerlab"]
+    assert drawn == pytest.approx(sorted(row.period_s for row in walked if row.outcome == "walked"))
+
+
+def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
+    every = list(series_of("compass", "same-law", results))
+    assert len({to_hex(one.line.get_color()) for one in every}) == len({one.engine for one in every})
+    assert {one.engine for one in every} <= set(COLOURS)
+
+
+def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
+    assert "as a multiple of walkerlab's time" in ERRORS.caption(results)
+    assert "Not walked to the end: mujoco soft at 0.0005 s" in PERIODS.caption(results)
+
+
+def test_a_run_without_the_stage_has_neither_figure_nor_section():
+    assert ERRORS.why_left_out({}, {}) is not None
+    assert section(Results(load().config, {})) is None
+
+
+def test_conclusions_come_first_in_the_section(made):
+    assert isinstance(made.blocks[1], Findings)
+    assert [item.about for item in made.blocks[1].items] == ["compass, same law", "compass, own contact"]
+
+
+def test_every_run_has_its_row(made):
+    tables = {block.caption: block for block in made.blocks if isinstance(block, Table)}
+    for caption, experiment, more in (
+        ("ADAMS's law in each engine's integrators", "same-law", 0),
+        ("The walk on each engine's own contact", "own-law", 1),
+    ):
+        (body,) = tables[caption].bodies
+        assert len(body.rows) == more + sum(row.experiment == experiment for row in ROWS)
+
+
+def test_the_residual_of_tuning_is_shown(made):
+    table = next(block for block in made.blocks if isinstance(block, Table) and block.caption.startswith("Tuning"))
+    assert table.bodies[0].rows[0][-1].text == "-4.3 %"
+    assert np.isclose(0.67 / 0.7 - 1.0, -0.043, atol=1e-3)

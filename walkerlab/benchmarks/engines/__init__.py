@@ -1,0 +1,1 @@
+"""The walker in other engines: one adapter a file, one registry, one signature."""

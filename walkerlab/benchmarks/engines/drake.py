@@ -1,0 +1,301 @@
+"""Drake: point contact with Hunt and Crossley's damping, continuous or discrete (SAP, Similar, Lagged, TAMSI).
+
+The plane of the walk is Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so
+under the weight m g at rest x = m g / k and damping there is m g d. SAP's own model is linear: damping is k times the
+relaxation time. Friction rises over a stiction tolerance v_s in the continuous model as 10 s^3 - 15 s^4 + 6 s^5,
+s = v / v_s, in Lagged as s / sqrt(1 + s^2); SAP regularises it by itself.
+
+Source: Drake documentation, Multibody: contact modeling; Castro, Permenter, Han (2022).
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks.engines.adapter import (
+    Contact,
+    Forces,
+    Integrator,
+    Law,
+    OnStep,
+    OwnContact,
+    Simulation,
+    Stepping,
+)
+from walkerlab.benchmarks.engines.planar import Link, PlanarModel
+
+Floats = NDArray[np.float64]
+INTEGRATORS = {
+    "semi_explicit_euler": Integrator(1, 45_000),
+    "runge_kutta3": Integrator(3, 45_000),
+    "runge_kutta3 adaptive": Integrator(3, 60_000, adapts=True),
+    "discrete": Integrator(1, 45_000, for_contact_only=True),
+}
+EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
+CONTACTS = {
+    "sap": "discrete",
+    "lagged": "discrete",
+    "hunt-crossley": "runge_kutta3",
+}
+APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
+CANNOT_EXPRESS = (
+    "a force that grows with a power of the penetration: point contact is linear in it",
+    "damping that rises over the first 0.1 mm: it grows with the force, or (SAP) is linear",
+    "friction that rises linearly from rest in continuous time: its law is flat at zero slip",
+    "static above dynamic friction in discrete time: one coefficient is used",
+)
+
+
+def tuned(model: str, target: Contact) -> OwnContact:
+    """The closed forms above, solved for what the target says."""
+    stiffness = target.mass * target.gravity / target.penetration
+    omega = math.sqrt(target.gravity / target.penetration)
+    settings = {
+        "point_contact_stiffness": stiffness,
+        "hunt_crossley_dissipation": 2.0 * target.damping_ratio * omega / target.gravity,
+        "relaxation_time": 2.0 * target.damping_ratio / omega,
+        "friction": target.friction,
+        "stiction_tolerance": target.creep_velocity / slip_share(model, target.creep_load / target.friction),
+    }
+    unused = {"sap": ("hunt_crossley_dissipation", "stiction_tolerance"), "lagged": ("relaxation_time",)}
+    left = unused.get(model, ("relaxation_time",))
+    return OwnContact(model, {name: value for name, value in settings.items() if name not in left})
+
+
+def slip_share(model: str, load: float) -> float:
+    """The slip over the stiction tolerance at which a model gives a share `load` of full friction."""
+    if model in APPROXIMATIONS:
+        return load / math.sqrt(1.0 - load * load)
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        s = 0.5 * (low + high)
+        low, high = (s, high) if s**3 * (10.0 - 15.0 * s + 6.0 * s * s) < load else (low, s)
+    return high
+
+
+def simulation(model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> Simulation:
+    """The model at coordinates q with velocities v."""
+    return Run(model, stepping, q, v, law)
+
+
+class Run:
+    """A diagram, its simulator and its context."""
+
+    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
+        """Build the diagram and put it into its start state."""
+        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+        from pydrake.systems.analysis import Simulator
+        from pydrake.systems.framework import DiagramBuilder
+
+        logging.getLogger("drake").setLevel(logging.ERROR)
+        own = law if isinstance(law, OwnContact) else None
+        self._h, self._discrete = stepping.step_s, stepping.integrator == "discrete"
+        builder = DiagramBuilder()
+        self._plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, self._h if self._discrete else 0.0)
+        order, self._feet, self._floor = assembled(self._plant, model, own)
+        if self._discrete and own is not None:
+            set_approximation(self._plant, own.model)
+        self._plant.Finalize()
+        if own is not None and "stiction_tolerance" in own.settings:
+            self._plant.set_stiction_tolerance(own.settings["stiction_tolerance"])
+        if not isinstance(law, OwnContact) and law is not None:
+            apply(builder, self._plant, law, order)
+        diagram = builder.Build()
+        self._simulator = Simulator(diagram)
+        self._context = self._simulator.get_mutable_context()
+        self._at = self._plant.GetMyMutableContextFromRoot(self._context)
+        self._order = np.array(order)
+        self._declared: dict[int, Any] = {}
+        positions, velocities = np.zeros(len(q)), np.zeros(len(v))
+        positions[self._order], velocities[self._order] = q, v
+        self._plant.SetPositions(self._at, positions)
+        self._plant.SetVelocities(self._at, velocities)
+        if not self._discrete:
+            integrate_by(self._simulator, stepping)
+        self._simulator.Initialize()
+
+    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+        """Step until a time, or for a number of steps, or until it is told to stop."""
+        from pydrake.systems.framework import EventStatus
+
+        if self._discrete:
+            self._march(steps, until_s, on_step)
+            return
+        plant, at, order = self._plant, self._at, self._order
+        left = [steps]
+
+        def monitor(root: Any) -> Any:
+            if root.get_time() <= 0.0:
+                return EventStatus.DidNothing()
+            left[0] -= 1
+            q, v = plant.GetPositions(at)[order], plant.GetVelocities(at)[order]
+            if not on_step(root.get_time(), q, v) or left[0] <= 0:
+                return EventStatus.ReachedTermination(None, "the walk is over")
+            return EventStatus.DidNothing()
+
+        self._simulator.set_monitor(monitor)
+        self._simulator.AdvanceTo(until_s)
+
+    def _march(self, steps: int, until_s: float, on_step: OnStep) -> None:
+        """Discrete updates, one after the other."""
+        plant, at, order, h = self._plant, self._at, self._order, self._h
+        for count in range(1, min(steps, round(until_s / h)) + 1):
+            self._simulator.AdvanceTo((count + 0.25) * h)
+            if not on_step(count * h, plant.GetPositions(at)[order], plant.GetVelocities(at)[order]):
+                return
+
+    def carry(self, ball: int, carried: bool) -> None:
+        """Let a foot's ball collide or not, by a filter of its own."""
+        from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
+
+        if not self._feet or carried == (ball not in self._declared):
+            return
+        context = self._scene_graph.GetMyMutableContextFromRoot(self._context)
+        manager = self._scene_graph.collision_filter_manager(context)
+        if carried:
+            manager.RemoveDeclaration(self._declared.pop(ball))
+        else:
+            declaration = CollisionFilterDeclaration()
+            declaration.ExcludeBetween(GeometrySet(self._floor), GeometrySet(self._feet[ball]))
+            self._declared[ball] = manager.ApplyTransient(declaration)
+
+
+def integrate_by(simulator: Any, stepping: Stepping) -> None:
+    """Choose the integrator, with steps of one size or adapted ones."""
+    from pydrake.systems.analysis import ResetIntegratorFromFlags
+
+    name, _, adaptive = stepping.integrator.partition(" ")
+    ResetIntegratorFromFlags(simulator, name, stepping.step_s)
+    integrator = simulator.get_mutable_integrator()
+    if adaptive:
+        integrator.set_target_accuracy(stepping.tolerance)
+        integrator.set_maximum_step_size(stepping.step_s)
+        integrator.set_requested_minimum_step_size(1e-12)
+        integrator.request_initial_step_size_target(1e-5)
+    elif name in EMBEDDED:
+        integrator.set_fixed_step_mode(True)
+
+
+def set_approximation(plant: Any, model: str) -> None:
+    """Choose the discrete contact model."""
+    from pydrake.multibody.plant import DiscreteContactApproximation
+
+    plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, APPROXIMATIONS[model]))
+
+
+def assembled(plant: Any, model: PlanarModel, own: OwnContact | None) -> tuple[list[int], list[Any], Any]:
+    """Build bodies, joints and feet; where each coordinate is among Drake's, the feet's geometries and the floor's."""
+    from pydrake.geometry import HalfSpace
+    from pydrake.multibody.plant import ContactModel
+
+    plant.mutable_gravity_field().set_gravity_vector(np.array((model.gravity_along, -model.gravity_down, 0.0)))
+    bodies: list[Any] = []
+    joints: list[Any] = []
+    for link in model.links:
+        body = plant.AddRigidBody(link.name, inertia(link))
+        parent = plant.world_body() if link.parent < 0 else bodies[link.parent]
+        joints.append(joined(plant, model, link, parent, body))
+        bodies.append(body)
+    feet: list[Any] = []
+    floor = None
+    if own is not None:
+        from pydrake.math import RigidTransform
+
+        plant.set_contact_model(ContactModel.kPoint)
+        point = np.array((0.0, model.balls[0].ground_m, 0.0))
+        pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), point)
+        floor = plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "floor", material(own))
+        for number, ball in enumerate(model.balls):
+            from pydrake.geometry import Sphere
+
+            place = RigidTransform(np.array((*ball.centre_m, 0.0)))
+            sphere, surface = Sphere(ball.radius_m), material(own)
+            feet.append(plant.RegisterCollisionGeometry(bodies[ball.link], place, sphere, f"foot {number}", surface))
+    plant_order = [start for joint in joints for start in joint]
+    return plant_order, feet, floor
+
+
+def joined(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[int]:
+    """Join a link to its parent; where its coordinates will be: Drake numbers them in the order of the joints."""
+    from pydrake.math import RigidTransform
+    from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
+
+    def frame(on: Any, name: str, at: tuple[float, float]) -> Any:
+        return plant.AddFrame(FixedOffsetFrame(name, on.body_frame(), RigidTransform(np.array((*at, 0.0)))))
+
+    here = frame(body, f"{link.name} hinge", link.point_m)
+    there = frame(parent, f"{link.name} on its parent", link.parent_point_m)
+    axis = np.array((0.0, 0.0, 1.0))
+    first = plant.num_joints()
+    if link.parent >= 0 or model.freedoms == ("turn",):
+        plant.AddJoint(RevoluteJoint(link.name, there, here, axis))
+        return [first if link.parent < 0 else len(model.freedoms) + first - 1]
+    if model.freedoms == ("along", "height", "turn"):
+        plant.AddJoint(PlanarJoint(link.name, there, here))
+        return [0, 1, 2]
+    carriage = plant.AddRigidBody("carriage", SpatialInertia.Zero())
+    x, y = np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0))
+    plant.AddJoint(PrismaticJoint("along", there, carriage.body_frame(), x))
+    plant.AddJoint(PrismaticJoint("height", carriage.body_frame(), here, y))
+    return [0, 1]
+
+
+def inertia(link: Link) -> Any:
+    """Mass, centre and inertia of a link, alike about all axes."""
+    from pydrake.multibody.tree import RotationalInertia, SpatialInertia
+
+    central, (x, y) = link.inertia_kg_m2, link.centre_m
+    return SpatialInertia.MakeFromCentralInertia(
+        link.mass_kg, np.array((x, y, 0.0)), RotationalInertia(central, central, central)
+    )
+
+
+def material(own: OwnContact) -> Any:
+    """Surface of a foot and of the floor alike: half of the compliance each."""
+    from pydrake.geometry import AddContactMaterial, ProximityProperties
+    from pydrake.multibody.plant import CoulombFriction
+
+    settings = own.settings
+    properties = ProximityProperties()
+    friction = CoulombFriction(settings["friction"], settings["friction"])
+    dissipation = settings.get("hunt_crossley_dissipation")
+    stiffness = settings["point_contact_stiffness"]
+    # two springs in series
+    AddContactMaterial(
+        properties=properties,
+        dissipation=dissipation,
+        point_stiffness=2.0 * stiffness,
+        friction=friction,
+    )
+    if "relaxation_time" in settings:
+        # times of two surfaces add up
+        properties.AddProperty("material", "relaxation_time", 0.5 * settings["relaxation_time"])
+    return properties
+
+
+def apply(builder: Any, plant: Any, forces: Forces, order: list[int]) -> None:
+    """A system that computes the ground's forces from the plant's state at every evaluation."""
+    from pydrake.systems.framework import LeafSystem
+
+    n, place = len(order), np.array(order)
+
+    class Ground(LeafSystem):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.DeclareVectorInputPort("state", 2 * n)
+            self.DeclareVectorOutputPort("forces", n, self._calculate)
+
+        def _calculate(self, context: Any, output: Any) -> None:
+            state = self.get_input_port(0).Eval(context)
+            result = np.zeros(n)
+            result[place] = forces(state[:n][place], state[n:][place])
+            output.SetFromVector(result)
+
+    ground = builder.AddSystem(Ground())
+    builder.Connect(plant.get_state_output_port(), ground.get_input_port(0))
+    builder.Connect(ground.get_output_port(0), plant.get_applied_generalized_force_input_port())

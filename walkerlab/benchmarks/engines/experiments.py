@@ -1,0 +1,454 @@
+"""The three experiments: same law, own law, no contact; each engine against our own walk, run after run."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks.engines.adapter import Contact, Integrator, OwnContact, Stepping
+from walkerlab.benchmarks.engines.process import Lost, OwnProcess
+from walkerlab.benchmarks.engines.registry import Engine
+from walkerlab.benchmarks.engines.runs import (
+    SwingAnswer,
+    SwingTask,
+    TuningAnswer,
+    TuningTask,
+    WalkAnswer,
+    WalkTask,
+    pinned_model,
+)
+from walkerlab.benchmarks.engines.scenes import EngineScene
+from walkerlab.ground.friction import Coulomb, friction_coefficient
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.mechanics.assembly import Anchor, tree_about
+from walkerlab.mechanics.tree import mass_matrix
+from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import derivative
+
+Floats = NDArray[np.float64]
+
+OURS = "walkerlab"
+SAME_LAW, OWN_LAW = "same-law", "own-law"
+SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
+OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)  # s
+SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
+LARGEST_STEP_S = 0.01  # where they are
+STARTS = (0.95, 0.99)  # of the gait's velocities
+TUNING_STEP_S = 1e-5
+TOUCHES, OWN_TOUCHES = 2, 10
+INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
+SWING_S = 0.48
+CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
+PATIENCE_S = 60.0  # with a run, before its process is ended
+OUR_METHOD = "radau5"
+OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
+ENDLESS = 100_000_000  # right-hand sides
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run of one engine, or of this project beside it.
+
+    integrator  the engine's own, for the same law; its contact model, for its own law
+    start       the gait's velocities times this
+    step_s      of the engine; the mean one where steps are adapted
+    tolerance   where steps are adapted, else None
+    error       same law: largest difference of the end state from the reference (SI); own law: difference of the last
+                step's period from that of ADAMS's law (s)
+    touch_error_s  largest difference of a touch time from the reference
+    period_s    of the last step; step_length_m and slip_m likewise
+    steps       walked
+    why         how a run ended that has no outcome of its own
+    """
+
+    scene: str
+    engine: str
+    version: str
+    experiment: str
+    integrator: str
+    start: float
+    step_s: float
+    tolerance: float | None
+    error: float | None
+    touch_error_s: float | None
+    wall_s: float
+    period_s: float | None
+    step_length_m: float | None
+    slip_m: float | None
+    steps: int
+    outcome: str
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class SwingRow:
+    """A swing without ground; `order` is observed against the run with twice the step, None for the first."""
+
+    scene: str
+    engine: str
+    integrator: str
+    promised_order: int
+    step_s: float
+    tolerance: float | None
+    error: float
+    energy_drift_j: float
+    order: float | None
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class TuningRow:
+    """An engine's contact model after tuning, against what it was tuned to."""
+
+    scene: str
+    engine: str
+    contact: str
+    settings: dict[str, float]
+    quantity: str
+    unit: str
+    target: float
+    reached: float
+
+    @property
+    def residual(self) -> float:
+        """Relative difference."""
+        return self.reached / self.target - 1.0
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Our walk of a scene at tight tolerance, by two methods.
+
+    end        state at `until_s`
+    agreement  largest difference of the two methods there
+    walk       ten steps, for periods
+    """
+
+    until_s: float
+    end: Floats
+    touches_s: Floats
+    agreement: float
+    walk: ContactWalkResult
+
+
+def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
+    """Our walk; with `until_s` also the state then."""
+    settings = MethodSettings(method_named(method), rtol, 1e-2 * rtol, ENDLESS)
+    return walk_contact(
+        scene.ours, scene.ground, None, scene.stance, scene.start, settings, steps, until_s, booked=False
+    )
+
+
+def truth_of(scene: EngineScene) -> Truth | None:
+    """The reference of a scene; None if the walk ends before states can be compared."""
+    (first, first_rtol), (second, second_rtol) = REFERENCES
+    walk = walked(scene, first, first_rtol, OWN_TOUCHES)
+    if walk.touch_time_s.size <= TOUCHES:
+        return None
+    last, following = walk.touch_time_s[TOUCHES - 1 : TOUCHES + 1]
+    until = float(last + INTO_NEXT_STEP * (following - last))
+    one = walked(scene, first, first_rtol, TOUCHES + 1, until)
+    other = walked(scene, second, second_rtol, TOUCHES + 1, until)
+    end = state_at_end(one)
+    agreement = float(np.max(np.abs(end - state_at_end(other))))
+    return Truth(until, end, one.touch_time_s[:TOUCHES], agreement, walk)
+
+
+def state_at_end(result: ContactWalkResult) -> Floats:
+    """The state at the second of a walk's samples, the first being its start."""
+    assert result.samples is not None, "this walk was sampled"
+    return np.asarray(result.samples.states[1])
+
+
+def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
+    """Our own method over its ladder of tolerances, on the same walk."""
+    walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
+    for rtol in OUR_LADDER:
+        walls = []
+        for _ in range(REPEATS):
+            begun = time.perf_counter()
+            result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
+            walls.append(time.perf_counter() - begun)
+        there = result.samples is not None and len(result.samples.states) > 1
+        end = state_at_end(result) if there else None
+        touches, along = result.touch_time_s[:TOUCHES], result.touch_along_m[:TOUCHES]
+        answer = WalkAnswer(
+            result.outcome.label,
+            end,
+            touches,
+            along,
+            result.slip_m[:TOUCHES],
+            int(result.work[1]),
+            result.end_time_s,
+            median(walls),
+        )
+        mean = float(result.end_time_s) / max(1, int(result.work[1]))
+        yield same_law_row(scene, OURS, version, OUR_METHOD, mean, rtol, truth, answer)
+
+
+def same_law_rows(engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess) -> Iterator[Row]:
+    """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
+    for name, integrator in engine.adapter().INTEGRATORS.items():
+        if integrator.for_contact_only:
+            continue
+        for stepping in ladder_of(name, integrator, truth.until_s):
+            most = integrator.most_steps
+            task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, most)
+            answer = process.do(task, PATIENCE_S)
+            if isinstance(answer, Lost):
+                yield lost_row(scene, engine.name, version, SAME_LAW, stepping, name, 1.0, answer)
+                continue
+            mean = answer.time_s / max(1, answer.steps)
+            yield same_law_row(scene, engine.name, version, name, mean, stepping.tolerance, truth, answer)
+
+
+def ladder_of(name: str, integrator: Integrator, until_s: float) -> Iterator[Stepping]:
+    """The runs of one integrator, from coarse to fine; a whole number of steps leads to the end."""
+    if integrator.adapts:
+        for tolerance in TOLERANCES:
+            yield Stepping(name, LARGEST_STEP_S, tolerance)
+        return
+    for nominal in SAME_LAW_STEPS:
+        steps = math.ceil(until_s / nominal)
+        if steps <= integrator.most_steps:
+            yield Stepping(name, until_s / steps)
+
+
+def same_law_row(
+    scene: EngineScene,
+    engine: str,
+    version: str,
+    integrator: str,
+    step_s: float,
+    tolerance: float | None,
+    truth: Truth,
+    answer: WalkAnswer,
+) -> Row:
+    """A run with its errors; without an end state it has none."""
+    error = None if answer.end is None else float(np.max(np.abs(answer.end - truth.end)))
+    if error is not None and not math.isfinite(error):
+        error = None
+    enough = answer.touches_s.size >= TOUCHES
+    touch = float(np.max(np.abs(answer.touches_s[:TOUCHES] - truth.touches_s))) if enough else None
+    return Row(
+        scene.name, engine, version, SAME_LAW, integrator, 1.0, step_s, tolerance, error, touch, answer.wall_s,
+        *last_step(answer), answer.touches_s.size, answer.outcome,
+    )  # fmt: skip
+
+
+def last_step(answer: WalkAnswer) -> tuple[float | None, float | None, float | None]:
+    """Period (s), length (m) and slip (m) of the last step; of less than two steps there are none."""
+    if answer.touches_s.size < 2:
+        return None, None, None
+    period, length = np.diff(answer.touches_s)[-1], np.diff(answer.along_m)[-1]
+    return float(period), float(length), float(answer.slips_m[-1])
+
+
+def lost_row(
+    scene: EngineScene,
+    engine: str,
+    version: str,
+    experiment: str,
+    stepping: Stepping,
+    integrator: str,
+    start: float,
+    lost: Lost,
+) -> Row:
+    """A run that was lost with its process, or that the engine refused."""
+    outcome = Outcome.BUDGET_EXHAUSTED if lost.timed_out else Outcome.SOLVER_FAILED
+    return Row(
+        scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None,
+        0.0, None, None, None, 0, outcome.label, lost.why,
+    )  # fmt: skip
+
+
+def target_of(scene: EngineScene) -> Contact | None:
+    """What the walker's own contact is, linearised under its weight on one foot; None on frictionless ground."""
+    walker = scene.ours
+    law, friction = walker.normal, walker.friction
+    if not isinstance(friction, Coulomb):
+        return None
+    mass, g = walker.tree.mass, walker.gravity_down
+    depth = (mass * g / law.stiffness) ** (1.0 / law.exponent)
+    stiffness = law.exponent * mass * g / depth
+    creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.stiction_velocity)
+    ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
+    return Contact(mass, g, depth, law.exponent, ratio, friction.dynamic, CREEP_LOAD, creep)
+
+
+def bisected(function: Any, low: float, high: float) -> float:
+    """Where a rising function is zero."""
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if function(middle) > 0.0 else (middle, high)
+    return high
+
+
+def tuned(
+    engine: Engine, contact: str, scene: EngineScene, target: Contact, process: OwnProcess
+) -> tuple[OwnContact | None, list[TuningRow], Lost | None]:
+    """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
+    friction = scene.ours.friction
+    task = TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * friction.friction_velocity)
+    answer: TuningAnswer | Lost = process.do(task, PATIENCE_S)
+    if isinstance(answer, Lost):
+        return None, [], answer
+    settings = dict(answer.own.settings)
+    measured = (
+        ("penetration at rest", "m", target.penetration, answer.penetration),
+        ("damping ratio", "1", target.damping_ratio, answer.damping_ratio),
+        ("sliding friction", "1", target.friction, answer.friction),
+        ("creep velocity", "m/s", target.creep_velocity, answer.creep_velocity),
+    )
+    return answer.own, [TuningRow(scene.name, engine.name, contact, settings, *numbers) for numbers in measured], None
+
+
+def own_law_rows(
+    engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
+) -> Iterator[Row]:
+    """An engine's own contact over step sizes from the gait, then from other starts at the smallest one."""
+    adapter = engine.adapter()
+    integrator = adapter.CONTACTS[contact]
+    most = adapter.INTEGRATORS[integrator].most_steps
+    usual = 1.5 * float(truth.walk.touch_time_s[-1])
+    sizes = [h for h in OWN_LAW_STEPS if usual / h <= most]
+    for factor, h in [*((1.0, h) for h in sizes), *((factor, sizes[-1]) for factor in STARTS)]:
+        stepping = Stepping(integrator, h)
+        task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, 1.0e9, own, most)
+        answer = process.do(task, PATIENCE_S)
+        if isinstance(answer, Lost):
+            yield lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
+            continue
+        yield own_law_row(scene, engine.name, version, contact, factor, h, truth, answer)
+
+
+def own_law_row(
+    scene: EngineScene,
+    engine: str,
+    version: str,
+    contact: str,
+    start: float,
+    step_s: float,
+    truth: Truth,
+    answer: WalkAnswer,
+) -> Row:
+    """A run with how far its last step's period is from that of ADAMS's law."""
+    period, length, slip = last_step(answer)
+    walked_all = answer.outcome == Outcome.WALKED.label and start == 1.0
+    error = abs(period - truth.walk.periods_s[-1]) if period is not None and walked_all else None
+    return Row(
+        scene.name, engine, version, OWN_LAW, contact, start, step_s, None, error, None, answer.wall_s,
+        period, length, slip, answer.touches_s.size, answer.outcome,
+    )  # fmt: skip
+
+
+def adams_rows(scene: EngineScene, version: str) -> Iterator[Row]:
+    """ADAMS's law on the same starts, by our own walk."""
+    for factor in (1.0, *STARTS):
+        begun = time.perf_counter()
+        result = walked(scene.started(factor), OUR_METHOD, 1e-7, OWN_TOUCHES)
+        wall = time.perf_counter() - begun
+        answer = WalkAnswer(
+            result.outcome.label,
+            None,
+            result.touch_time_s,
+            result.touch_along_m,
+            result.slip_m,
+            0,
+            result.end_time_s,
+            wall,
+        )
+        mean = float(result.end_time_s) / max(1, int(result.work[1]))
+        yield Row(
+            scene.name, OURS, version, OWN_LAW, "impact", factor, mean, 1e-7, None, None, wall,
+            *last_step(answer), answer.touches_s.size, answer.outcome,
+        )  # fmt: skip
+
+
+def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[Lost]]:
+    """The hinged walker's swing over step sizes, by each of an engine's integrators."""
+    model, chain = pinned_model(scene)
+    n = len(chain)
+    start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
+    truth, energy = swing_truth(scene, start)
+    rows: list[SwingRow] = []
+    lost: list[Lost] = []
+    for integrator, entry in engine.adapter().INTEGRATORS.items():
+        before = None
+        for stepping in swing_ladder(integrator, entry):
+            task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps)
+            answer: SwingAnswer | Lost = process.do(task, PATIENCE_S)
+            if isinstance(answer, Lost):
+                lost.append(answer)
+                break
+            error = float(np.max(np.abs(answer.end - truth)))
+            drift = abs(energy(answer.end) - energy(start))
+            order: float | None = None if before is None or error == 0.0 or entry.adapts else math.log2(before / error)
+            rows.append(
+                SwingRow(
+                    scene.name,
+                    engine.name,
+                    integrator,
+                    entry.order,
+                    stepping.step_s,
+                    stepping.tolerance,
+                    error,
+                    drift,
+                    order,
+                    answer.wall_s,
+                )
+            )
+            before = error
+    return rows, lost
+
+
+def swing_ladder(name: str, integrator: Integrator) -> Iterator[Stepping]:
+    """The swings of one integrator, from coarse to fine."""
+    if integrator.adapts:
+        yield from (Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES)
+    else:
+        yield from (Stepping(name, h) for h in SWING_STEPS)
+
+
+def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
+    """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
+    from scipy.integrate import solve_ivp
+
+    from walkerlab.ground.pinned import Pinned
+
+    n = len(scene.chain)
+    foot = scene.assembly.feet[scene.stance]
+    tree = tree_about(scene.assembly, Anchor(foot.body, foot.centre_m))
+    system = Pinned(scene.ours, tree, scene.stance, 0.0, (0.0,) * (2 * n))
+
+    def rate(t: float, y: Floats) -> Any:
+        return derivative(system, t, tuple(y))
+
+    def energy(y: Floats) -> float:
+        angles = y[:n] + scene.ours.slope
+        s, c = np.sin(angles), np.cos(angles)
+        M = np.array(mass_matrix(tree, tuple(s), tuple(c))).reshape(n, n)
+        arm_x, arm_y = np.array(tree.arm_x), np.array(tree.arm_y)
+        forward, upward = (c * arm_x - s * arm_y).sum(), (s * arm_x + c * arm_y).sum()
+        gravity = scene.ours.gravity_down * upward - scene.ours.gravity_along * forward
+        return float(0.5 * y[n:] @ M @ y[n:] + gravity)
+
+    done = solve_ivp(rate, (0.0, until_s), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    return np.asarray(done.y[:, -1]), energy
+
+
+def least_wall(rows: Sequence[Row], error: float) -> Row | None:
+    """The quickest of the runs with at most this error."""
+    good = [row for row in rows if row.error is not None and row.error <= error]
+    return min(good, key=lambda row: row.wall_s, default=None)

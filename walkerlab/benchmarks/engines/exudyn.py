@@ -1,0 +1,218 @@
+"""Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, a ball on a triangle as contact.
+
+The plane of the walk is Exudyn's x-y plane. Its contact force is k d^e + c d', with friction that rises linearly to
+full friction over a zone of slip; so the exponent is ADAMS's own, and so is the stiffness.
+
+Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks.engines.adapter import (
+    Contact,
+    Forces,
+    Integrator,
+    Law,
+    OnStep,
+    OwnContact,
+    Simulation,
+    Stepping,
+)
+from walkerlab.benchmarks.engines.planar import PlanarModel
+
+Floats = NDArray[np.float64]
+INTEGRATORS = {
+    "ExplicitEuler": Integrator(1, 90_000),
+    "RK44": Integrator(4, 90_000),
+    "TrapezoidalIndex2": Integrator(2, 45_000),
+    "DOPRI5 adaptive": Integrator(5, 60_000, adapts=True),
+}
+CONTACTS = {"sphere-triangle": "RK44", "sphere-triangle implicit": "TrapezoidalIndex2"}
+CANNOT_EXPRESS = (
+    "damping that rises over the first 0.1 mm: it acts in full from first touch",
+    "a ground that never pulls: damping acts on a foot that leaves, too, and holds the trailing foot back",
+    "friction that rises as a cubic, or static above dynamic friction: it rises linearly to one coefficient",
+    "an endless plane: a triangle of a kilometre stands in for it",
+)
+PLANE_M = 1000.0
+NO_ROTATION = np.eye(3)
+SMALLEST_STEP_S = 1e-12
+NO_ITERATION = 1e12
+EXPLICIT = ("ExplicitEuler", "RK44")
+
+
+def tuned(model: str, target: Contact) -> OwnContact:
+    """The target's own parameters, and the zone over which friction rises."""
+    stiffness = target.exponent * target.mass * target.gravity / target.penetration
+    settings = {
+        "contact_stiffness": target.mass * target.gravity / target.penetration**target.exponent,
+        "contact_stiffness_exponent": target.exponent,
+        "contact_damping": 2.0 * target.damping_ratio * math.sqrt(stiffness * target.mass),
+        "dynamic_friction": target.friction,
+        "friction_proportional_zone": target.creep_velocity * target.friction / target.creep_load,
+    }
+    return OwnContact(model, settings)
+
+
+def simulation(model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> Simulation:
+    """The model at coordinates q with velocities v."""
+    return Run(model, stepping, q, v, law)
+
+
+class Run:
+    """A system of one tree, and its contacts."""
+
+    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
+        """Build the system in its start state."""
+        import exudyn as exu
+        from exudyn.itemInterface import NodeGenericODE2
+
+        own = law if isinstance(law, OwnContact) else None
+        self._stepping = stepping
+        self._container = exu.SystemContainer()
+        self._system = self._container.AddSystem()
+        n = model.size
+        node = self._system.AddNode(
+            NodeGenericODE2(
+                referenceCoordinates=[0.0] * n,
+                initialCoordinates=q.tolist(),
+                initialCoordinates_t=v.tolist(),
+                numberOfODE2Coordinates=n,
+            )
+        )
+        tree, places = assembled(self._system, model, node, None if isinstance(law, OwnContact) else law)
+        self._contacts = [] if own is None else list(contacts(self._system, model, tree, places, own))
+        self._system.Assemble()
+
+    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+        """Step until a time, or for a number of steps, or until it is told to stop."""
+        import exudyn as exu
+
+        data = self._system.systemData
+        left = [steps]
+
+        def seen(_system: Any, time_s: float) -> bool:
+            if time_s <= 0.0:
+                return True
+            left[0] -= 1
+            return on_step(time_s, data.GetODE2Coordinates(), data.GetODE2Coordinates_t()) and left[0] > 0
+
+        name, _, adaptive = self._stepping.integrator.partition(" ")
+        settings = exu.SimulationSettings()
+        stepping = settings.timeIntegration
+        h = self._stepping.step_s
+        stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
+        stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
+        stepping.verboseMode = 0
+        stepping.adaptiveStep = name not in EXPLICIT  # explicit ones are to step as they are told
+        # contact that closes or opens within a step is noticed at its end, as by any explicit method
+        stepping.discontinuous.ignoreMaxIterations = True
+        stepping.discontinuous.iterationTolerance = NO_ITERATION
+        settings.solution.file.write = False
+        if adaptive:
+            stepping.relativeTolerance = stepping.absoluteTolerance = self._stepping.tolerance
+            stepping.minimumStepSize, stepping.initialStepSize = SMALLEST_STEP_S, 1e-5
+        self._system.SetPostStepUserFunction(seen)
+        self._system.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, name))
+
+    def carry(self, ball: int, carried: bool) -> None:
+        """Switch a foot's contact on or off."""
+        if self._contacts:
+            self._system.SetObjectParameter(self._contacts[ball], "activeConnector", carried)
+
+
+def assembled(system: Any, model: PlanarModel, node: Any, forces: Forces | None) -> tuple[Any, list[int]]:
+    """Add the tree; its number, and where each link is among its joints."""
+    import exudyn as exu
+    from exudyn.itemInterface import ObjectKinematicTree
+
+    kinds = {"along": exu.JointType.PrismaticX, "height": exu.JointType.PrismaticY, "turn": exu.JointType.RevoluteZ}
+    joints: list[Any] = []
+    parents, offsets, centres, masses, inertias = [], [], [], [], []
+    places: list[int] = []
+    for link in model.links:
+        freedoms = model.freedoms if link.parent < 0 else ("turn",)
+        for freedom in freedoms:
+            first = not joints
+            last = freedom == freedoms[-1]
+            hangs = link.parent >= 0
+            joints.append(kinds[freedom])
+            parents.append(places[link.parent] if hangs else len(joints) - 2)
+            offset = np.subtract(link.parent_point_m, model.links[link.parent].point_m) if hangs else (0.0, 0.0)
+            at = link.parent_point_m if first else offset
+            offsets.append([*at, 0.0])
+            centres.append([*np.subtract(link.centre_m, link.point_m), 0.0] if last else [0.0, 0.0, 0.0])
+            masses.append(link.mass_kg if last else 0.0)
+            inertias.append(link.inertia_kg_m2 * NO_ROTATION if last else 0.0 * NO_ROTATION)
+        places.append(len(joints) - 1)
+
+    def ground(_system: Any, _time_s: float, _item: Any, q: Any, v: Any) -> Any:
+        assert forces is not None, "it is only called with a law"
+        return forces(np.asarray(q), np.asarray(v)).tolist()
+
+    tree = system.AddObject(
+        ObjectKinematicTree(
+            nodeNumber=node,
+            jointTypes=joints,
+            linkParents=parents,
+            jointTransformations=exu.Matrix3DList([NO_ROTATION] * len(joints)),
+            jointOffsets=exu.Vector3DList(offsets),
+            linkInertiasCOM=exu.Matrix3DList(inertias),
+            linkCOMs=exu.Vector3DList(centres),
+            linkMasses=masses,
+            gravity=[model.gravity_along, -model.gravity_down, 0.0],
+            forceUserFunction=0 if forces is None else ground,
+        )
+    )
+    return tree, places
+
+
+def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: OwnContact) -> Iterator[Any]:
+    """A ball on a large triangle for each foot; the numbers of these objects."""
+    from exudyn.itemInterface import (
+        MarkerBodyRigid,
+        MarkerKinematicTreeRigid,
+        NodeGenericData,
+        ObjectContactSphereTriangle,
+        ObjectGround,
+    )
+
+    settings = own.settings
+    floor = system.AddObject(ObjectGround())
+    for ball in model.balls:
+        link = model.links[ball.link]
+        place = [*np.subtract(ball.centre_m, link.point_m), 0.0]
+        foot = system.AddMarker(
+            MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=places[ball.link], localPosition=place)
+        )
+        ground = system.AddMarker(MarkerBodyRigid(bodyNumber=floor, localPosition=[0.0, ball.ground_m, 0.0]))
+        state = system.AddNode(NodeGenericData(initialCoordinates=[0.0] * 4, numberOfDataCoordinates=4))
+        yield system.AddObject(
+            ObjectContactSphereTriangle(
+                markerNumbers=[foot, ground],
+                nodeNumber=state,
+                sphereRadius=ball.radius_m,
+                trianglePoints=triangle(),
+                includeEdges=0,
+                dynamicFriction=settings["dynamic_friction"],
+                frictionProportionalZone=settings["friction_proportional_zone"],
+                contactStiffness=settings["contact_stiffness"],
+                contactDamping=settings["contact_damping"],
+                contactStiffnessExponent=settings["contact_stiffness_exponent"],
+            )
+        )
+
+
+def triangle() -> Any:
+    """A large triangle in the ground's plane, its normal upwards."""
+    import exudyn as exu
+
+    r = PLANE_M
+    return exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])

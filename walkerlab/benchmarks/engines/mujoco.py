@@ -1,0 +1,160 @@
+"""MuJoCo: soft convex contact in constraint space, fixed steps.
+
+Its contact is mass-normalised. With constant impedance d and a reference of stiffness K and damping B (solref -K, -B),
+a loaded contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without it; so a ball rests
+at (1 - d) g / K whatever its mass, and a foot creeps at (1 - d) a_0 / (impratio B).
+
+Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.benchmarks.engines.adapter import (
+    Contact,
+    Forces,
+    Integrator,
+    Law,
+    OnStep,
+    OwnContact,
+    Simulation,
+    Stepping,
+)
+from walkerlab.benchmarks.engines.planar import Link, PlanarModel
+
+Floats = NDArray[np.float64]
+INTEGRATORS = {"Euler": Integrator(1, 200_000), "RK4": Integrator(4, 60_000)}
+CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
+CANNOT_EXPRESS = (
+    "a force that grows with a power of the penetration, or damping that does: its contact is linear",
+    "stiffness in N/m: it is scaled by the contact's own effective mass",
+    "two coefficients of friction: static and dynamic are one",
+    "point feet: a ball of half a millimetre stands in for one",
+)
+IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
+AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
+MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
+
+
+def tuned(model: str, target: Contact) -> OwnContact:
+    """The closed forms above, solved for what the target says."""
+    stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
+    damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
+    creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
+    settings = {
+        "solref_stiffness": stiffness,
+        "solref_damping": damping,
+        "solimp_d": IMPEDANCE,
+        "impratio": creep / target.creep_velocity,
+        "friction": target.friction,
+    }
+    return OwnContact(model, settings)
+
+
+def simulation(model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> Simulation:
+    """The model at coordinates q with velocities v."""
+    return Run(model, stepping, q, v, law)
+
+
+class Run:
+    """A model and its data."""
+
+    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
+        """Compile the model and put it into its start state."""
+        import mujoco
+
+        own = law if isinstance(law, OwnContact) else None
+        mujoco.set_mjcb_passive(None)  # one for the whole process, and the last run's may still be there
+        self._advance = mujoco.mj_step
+        self._model = mujoco.MjModel.from_xml_string(described(model, own))
+        self._model.opt.timestep = stepping.step_s
+        self._model.opt.integrator = getattr(mujoco.mjtIntegrator, MODES[stepping.integrator])
+        self._data = mujoco.MjData(self._model)
+        self._data.qpos[:], self._data.qvel[:] = q, v
+        mujoco.set_mjcb_passive(None if law is None or isinstance(law, OwnContact) else applied(law))
+
+    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+        """Step until a time, or for a number of steps, or until it is told to stop."""
+        model, data, advance = self._model, self._data, self._advance
+        q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
+        for count in range(1, min(steps, round(until_s / h)) + 1):
+            advance(model, data)
+            if not on_step(count * h, q, v):
+                return
+
+    def carry(self, ball: int, carried: bool) -> None:
+        """Let a foot's ball collide or not."""
+        if self._model.ngeom:
+            self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(carried)
+
+
+def applied(forces: Forces) -> Any:
+    """The callback for passive forces, which every stage of every integrator asks."""
+
+    def passive(_model: Any, data: Any) -> None:
+        data.qfrc_passive[:] = forces(data.qpos, data.qvel)
+
+    return passive
+
+
+def described(model: PlanarModel, own: OwnContact | None) -> str:
+    """The model in MuJoCo's own language."""
+    contact = own.settings if own is not None else None
+    ratio = f'cone="elliptic" impratio="{contact["impratio"]!r}"' if contact is not None else ""
+    world = body(model, 0, contact)
+    if contact is not None:
+        world = floor(model.balls[0].ground_m) + world
+    return f"""<mujoco>
+  <compiler autolimits="false" balanceinertia="true"/>
+  <option gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {ratio} iterations="100" tolerance="1e-12"/>
+  <worldbody>{world}</worldbody>
+</mujoco>"""
+
+
+def floor(height: float) -> str:
+    """The ground."""
+    return f'<geom name="floor" type="plane" size="0 0 1" pos="0 0 {height!r}" contype="0" conaffinity="1"/>'
+
+
+def body(model: PlanarModel, place: int, contact: Any) -> str:
+    """A link with its hinge, its feet and the links that hang from it."""
+    link = model.links[place]
+    joints = (
+        "".join(joint(*AXES[freedom], link) for freedom in model.freedoms)
+        if link.parent < 0
+        else joint(*AXES["turn"], link)
+    )
+    feet = (
+        ""
+        if contact is None
+        else "".join(geom(n, ball, contact) for n, ball in enumerate(model.balls) if ball.link == place)
+    )
+    inside = "".join(body(model, child, contact) for child, other in enumerate(model.links) if other.parent == place)
+    (px, pz), (x, z), (cx, cz), i = link.parent_point_m, link.point_m, link.centre_m, link.inertia_kg_m2
+    return (
+        f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{joints}'
+        f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" '
+        f'diaginertia="{i!r} {i!r} {i!r}"/>{feet}{inside}</body>'
+    )
+
+
+def joint(kind: str, axis: str, link: Link) -> str:
+    """One freedom of a link, about its hinge."""
+    x, z = link.point_m
+    return f'<joint type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"/>'
+
+
+def geom(number: int, ball: Any, contact: Any) -> str:
+    """A foot's ball with the contact's settings."""
+    x, z = ball.centre_m
+    d = contact["solimp_d"]
+    return (
+        f'<geom name="foot {number}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} 0 {z!r}" contype="1" '
+        f'conaffinity="0" condim="3" friction="{contact["friction"]!r} 0 0" priority="1" '
+        f'solref="{-contact["solref_stiffness"]!r} {-contact["solref_damping"]!r}" solimp="{d!r} {d!r} 1 0.5 1"/>'
+    )

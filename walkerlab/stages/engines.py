@@ -1,0 +1,357 @@
+"""The walk in other engines: our law in their integrators, then their own contact, error against run time."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab import __version__
+from walkerlab.benchmarks.engines.experiments import (
+    OURS,
+    OWN_LAW,
+    OWN_TOUCHES,
+    SAME_LAW,
+    Row,
+    SwingRow,
+    Truth,
+    TuningRow,
+    adams_rows,
+    least_wall,
+    our_rows,
+    own_law_rows,
+    same_law_rows,
+    swing_rows,
+    target_of,
+    truth_of,
+    tuned,
+)
+from walkerlab.benchmarks.engines.process import OwnProcess
+from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
+from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
+from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
+from walkerlab.stages.progress import Progress
+from walkerlab.store.content import Content, Group, Variable
+
+LEVELS = (1e-3, 1e-5)
+THREE_DIGITS = 5e-4  # relative
+
+
+@dataclass
+class Findings:
+    """All that the stage found, growing row by row."""
+
+    rows: list[Row] = field(default_factory=list)
+    swings: list[SwingRow] = field(default_factory=list)
+    tuning: list[TuningRow] = field(default_factory=list)
+    truths: dict[str, Truth] = field(default_factory=dict)
+    left_out: list[dict[str, str]] = field(default_factory=list)
+
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Measure every engine that is installed on every scene; raises NoAnswer if none is."""
+    engines = installed()
+    found = Findings(left_out=[*not_installed(), *hinge_left_out(config)])
+    if not engines:
+        raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
+    rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
+    start = rigid["state"] if rigid is not None and config.start == "fixed-point" else config.start
+    length = None if rigid is None else float(rigid["step_length_m"])
+    walks = scenes(config, length, tuple(float(x) for x in start))
+    for scene in walks:
+        truth = truth_of(scene)
+        if truth is None:
+            why = "the walk under ADAMS's law ends before there is anything to compare"
+            found.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
+            continue
+        found.truths[scene.name] = truth
+        progress.start(f"engines: {scene.name}", len(engines) + 1)
+        found.rows += [*our_rows(scene, truth, __version__), *adams_rows(scene, __version__)]
+        progress.advance()
+        for engine in engines:
+            measure(engine, scene, truth, found)
+            progress.advance()
+    if not found.truths:
+        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start nearer to a gait (start: fixed-point).")
+    return content(found, rigid)
+
+
+def not_installed() -> list[dict[str, str]]:
+    """The engines that are not there, with the line that installs them."""
+    return [
+        {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
+        for engine in ENGINES.values()
+        if not engine.is_installed
+    ]
+
+
+def hinge_left_out(config: Config) -> list[dict[str, str]]:
+    """That no hinge holds the first step here, if the config has one."""
+    if config.contact is None or config.contact.stance != "pinned":
+        return []
+    return [{"what": "hinged first step", "why": "engines are measured on a walk that is free from its start"}]
+
+
+def measure(engine: Engine, scene: EngineScene, truth: Truth, found: Findings) -> None:
+    """All experiments of one engine on one scene, in a process of its own."""
+    adapter = engine.adapter()
+    version = engine.version
+    target = target_of(scene)
+    with OwnProcess() as process:
+        swings, lost = swing_rows(engine, scene, process)
+        found.swings += swings
+        found.left_out += [{"what": f"a swing in {engine.name}", "why": one.why} for one in lost]
+        found.rows += same_law_rows(engine, version, scene, truth, process)
+        if target is None:
+            found.left_out.append({"what": f"own contact of {engine.name}", "why": "the ground has no friction"})
+            return
+        for contact in adapter.CONTACTS:
+            own, rows, failed = tuned(engine, contact, scene, target, process)
+            if own is None:
+                why = failed.why if failed is not None else "it could not be tuned"
+                found.left_out.append({"what": f"contact {contact} of {engine.name}", "why": why})
+                continue
+            found.tuning += rows
+            found.rows += own_law_rows(engine, version, contact, own, scene, truth, process)
+
+
+def content(found: Findings, rigid: Mapping[str, Any] | None) -> Content:
+    """What is stored and printed."""
+    groups = {"rows": group_of(found.rows, ROW), "swings": group_of(found.swings, SWING)}
+    if found.tuning:
+        groups["tuning"] = group_of(found.tuning, TUNING)
+    return Content(groups, summary(found, rigid), timed=("ratios", "conclusions", "environment"))
+
+
+def summary(found: Findings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What the command prints."""
+    rows = found.rows
+    engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
+    return {
+        "rows": [asdict(row) for row in rows],
+        "swings": [asdict(row) for row in found.swings],
+        "tuning": [{**asdict(row), "residual": row.residual} for row in found.tuning],
+        "reference": {
+            name: {
+                "until_s": truth.until_s,
+                "agreement": truth.agreement,
+                "period_s": float(truth.walk.periods_s[-1]),
+                "step_length_m": float(truth.walk.lengths_m[-1]),
+                "steps": int(truth.walk.touch_time_s.size),
+                "outcome": truth.walk.outcome.label,
+                **({} if rigid is None else {"rigid_period_s": rigid["period_s"]}),
+                **({} if rigid is None else {"rigid_step_length_m": rigid["step_length_m"]}),
+            }
+            for name, truth in found.truths.items()
+        },
+        "versions": {engine.name: engine.version for engine in engines},
+        "cannot_express": {engine.name: list(engine.adapter().CANNOT_EXPRESS) for engine in engines},
+        "closest": {name: closest(rows, name) for name in found.truths},
+        "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in found.truths.items()},
+        "ratios": {name: ratios(rows, name) for name in found.truths},
+        "conclusions": {name: conclusions(rows, name, truth) for name, truth in found.truths.items()},
+        "environment": {
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+            "python": platform.python_version(),
+        },
+        "left_out": found.left_out,
+    }
+
+
+def of(rows: Sequence[Row], scene: str, experiment: str) -> Iterator[Row]:
+    """The engines' rows of one experiment, from the gait."""
+    for row in rows:
+        if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
+            yield row
+
+
+def ratios(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
+    """How many times longer each engine takes than this project, for each error that it reaches on the same law."""
+    ours = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
+    found: dict[str, dict[str, float]] = {}
+    for level in LEVELS:
+        own = least_wall(ours, level)
+        for engine in dict.fromkeys(row.engine for row in of(rows, scene, SAME_LAW)):
+            theirs = least_wall([row for row in of(rows, scene, SAME_LAW) if row.engine == engine], level)
+            if own is not None and theirs is not None:
+                found.setdefault(f"{level:.0e}".replace("e-0", "e-"), {})[engine] = theirs.wall_s / own.wall_s
+    return found
+
+
+def closest(rows: Sequence[Row], scene: str) -> dict[str, Any] | None:
+    """The contact whose walk at its smallest step comes closest to ADAMS's law; None if none walks to the end."""
+    finest = finest_rows(rows, scene)
+    reached = [row for row in finest if row.error is not None and row.steps == OWN_TOUCHES]
+    if not reached:
+        return None
+    best = min(reached, key=lambda row: float(row.error or 0.0))
+    return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
+
+
+def finest_rows(rows: Sequence[Row], scene: str) -> list[Row]:
+    """Each contact's walk at its smallest step."""
+    finest: dict[tuple[str, str], Row] = {}
+    for row in of(rows, scene, OWN_LAW):
+        key = (row.engine, row.integrator)
+        if key not in finest or row.step_s < finest[key].step_s:
+            finest[key] = row
+    return list(finest.values())
+
+
+def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
+    """The largest step (s) from which on an engine's last period has three correct digits, by experiment and name.
+
+    On the same law they are digits of the reference; on an engine's own, of what it gives at its smallest step.
+    """
+    found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    exact = float(np.diff(truth.touches_s)[-1])
+    for experiment in found:
+        series: dict[str, list[Row]] = {}
+        for row in of(rows, scene, experiment):
+            series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
+        for name, mine in series.items():
+            mine.sort(key=lambda row: row.step_s)
+            wanted = exact if experiment == SAME_LAW else mine[0].period_s
+            step = largest_good_step(mine, experiment, wanted)
+            if step is not None:
+                found[experiment][name] = step
+    return found
+
+
+def largest_good_step(mine: Sequence[Row], experiment: str, wanted: float | None) -> float | None:
+    """The largest step, going up from the smallest, with three correct digits; None if the smallest has not."""
+    good = None
+    if wanted is None:
+        return None
+    for row in mine:
+        if row.outcome != "walked" or row.period_s is None or abs(row.period_s / wanted - 1.0) > THREE_DIGITS:
+            break
+        good = row.step_s
+    finest_only = experiment == OWN_LAW and good == mine[0].step_s
+    return None if finest_only else good
+
+
+def conclusions(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, str]:
+    """What was found, a paragraph for each experiment."""
+    return {SAME_LAW: same_law_in_words(rows, scene, truth), OWN_LAW: own_law_in_words(rows, scene, truth)}
+
+
+def same_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
+    """What the integrators cost."""
+    sentences = []
+    shares = ratios(rows, scene)
+    names = list(dict.fromkeys(row.engine for row in of(rows, scene, SAME_LAW)))
+    for level in LEVELS:
+        label = f"{level:.0e}".replace("e-0", "e-")
+        reached = shares.get(label, {})
+        if reached:
+            told = ", ".join(f"{name} {ratio:.3g}" for name, ratio in sorted(reached.items(), key=lambda one: one[1]))
+            sentences.append(f"An error of {label} takes, as a multiple of walkerlab's time: {told}.")
+        missed = [name for name in names if name not in reached]
+        if missed:
+            sentences.append(f"No run of {' or '.join(missed)} reaches {label}.")
+    steps = three_digits(rows, scene, truth)[SAME_LAW]
+    if steps:
+        told = ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
+        sentences.append(f"Three correct digits of the step period take steps of at most: {told}.")
+    return " ".join(sentences)
+
+
+def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
+    """Which contact comes closest to ADAMS's, and what became of the others."""
+    best = closest(rows, scene)
+    period = float(truth.walk.periods_s[-1])
+    if best is None:
+        first = "No engine's own contact walks to the end."
+    else:
+        row = next(
+            row for row in finest_rows(rows, scene) if (row.engine, row.integrator) == (best["engine"], best["contact"])
+        )
+        first = (
+            f"Closest to ADAMS's law comes {row.engine}'s contact {row.integrator!r}: its step period is "
+            f"{1e3 * abs(row.error or 0.0):.3g} ms off {period:.4f} s, in {row.wall_s:.2g} s of run time at steps of "
+            f"{1e6 * row.step_s:.3g} µs."
+        )
+    others = [
+        f"{row.engine} {row.integrator} {1e3 * row.error:.3g} ms off"
+        if row.error is not None
+        else f"{row.engine} {row.integrator} {row.outcome} after {row.steps} steps"
+        for row in finest_rows(rows, scene)
+        if best is None or (row.engine, row.integrator) != (best["engine"], best["contact"])
+    ]
+    second = f" The others: {'; '.join(others)}." if others else ""
+    steps = three_digits(rows, scene, truth)[OWN_LAW]
+    told = ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
+    third = f" Their own period keeps three digits up to steps of: {told}." if steps else ""
+    return first + second + third
+
+
+ROW = {
+    "scene": ("", "scene"),
+    "engine": ("", "engine"),
+    "version": ("", "version of the engine"),
+    "experiment": ("", "experiment"),
+    "integrator": ("", "integrator, or contact model on its own law"),
+    "start": ("1", "velocities of the start over those of the gait"),
+    "step_s": ("s", "step size, the mean one where steps are adapted"),
+    "tolerance": ("1", "relative tolerance where steps are adapted"),
+    "error": ("1", "difference of the end state (SI), or of the last period (s) on its own law, from the reference"),
+    "touch_error_s": ("s", "largest difference of a touch time from the reference"),
+    "wall_s": ("s", "run time"),
+    "period_s": ("s", "period of the last step"),
+    "step_length_m": ("m", "length of the last step"),
+    "slip_m": ("m", "net slip of the last step"),
+    "steps": ("1", "steps walked"),
+    "outcome": ("", "outcome"),
+}
+SWING = {
+    "scene": ("", "scene"),
+    "engine": ("", "engine"),
+    "integrator": ("", "integrator"),
+    "promised_order": ("1", "order that the integrator promises"),
+    "step_s": ("s", "step size, the largest one where steps are adapted"),
+    "tolerance": ("1", "relative tolerance where steps are adapted"),
+    "error": ("1", "largest difference of the end state, rad and rad/s"),
+    "energy_drift_j": ("J", "change of the mechanical energy"),
+    "order": ("1", "order observed against the run with twice the step"),
+    "wall_s": ("s", "run time"),
+}
+TUNING = {
+    "scene": ("", "scene"),
+    "engine": ("", "engine"),
+    "contact": ("", "contact model"),
+    "quantity": ("", "quantity"),
+    "unit": ("", "its unit"),
+    "target": ("1", "what it was tuned to, in the unit named beside it"),
+    "reached": ("1", "what was measured, in the unit named beside it"),
+}
+
+
+def group_of(rows: Sequence[Any], columns: Mapping[str, tuple[str, str]]) -> Group:
+    """Rows as columns; a number that is absent is a gap."""
+    variables = {"row": Variable(np.arange(len(rows)), ("row",), "1", "row")}
+    for name, (units, said) in columns.items():
+        values = [getattr(row, name) for row in rows]
+        variables[name] = column(values, units, said, timing=name == "wall_s")
+    return Group(variables)
+
+
+def column(values: Sequence[Any], units: str, said: str, timing: bool) -> Variable:
+    """One column."""
+    array: NDArray[Any]
+    if units == "":
+        return Variable(np.array(values, dtype=object), ("row",), "1", said)
+    if any(value is None for value in values):
+        array = np.array([np.nan if value is None else float(value) for value in values])
+        return Variable(array, ("row",), units, said, timing=timing, missing=True)
+    return Variable(np.array(values), ("row",), units, said, timing=timing)
+
+
+assert set(ROW) <= {one.name for one in fields(Row)}, "every column is a field of a row"
