@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Held, IdealLock, Knees, stop_flags
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.terrain import Checkerboard
+from walkerlab.ground.terrain import Checkerboard, carried_in_air
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
@@ -214,7 +214,8 @@ def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, star
     ledger.at_zero[:] = 0
     ledger.at_zero[PASSING] = 1
     ledger.sides[PASSING] = 1 if swing == 1 else -1
-    ledger.carried[swing] = 0
+    above = feet[swing].height > 0.0
+    ledger.carried[swing] = above and carried_in_air(ground.terrain, bool(ledger.carried[swing]), False, True)
     ledger.left_cells[swing] = ledger.cells[swing] - 1
     ledger.foothold[swing] = feet[stance].along - ground.frame.leg_length
 
