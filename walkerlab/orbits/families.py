@@ -296,9 +296,7 @@ class Follower:
             points.append(self.point(solved, period))
             crossings += crossings_between(self.step_map.monitors, points[-2], points[-1])
             if end is None and abs(points[-1].multipliers[0]) > self.limits.growth:
-                end = BranchEnd(
-                    points[-1].value, f"a disturbance grows more than {self.limits.growth:.0e}-fold a cycle"
-                )
+                end = BranchEnd(points[-1].value, f"a disturbance grows more than {self.limits.growth:g}-fold a cycle")
             last = solved
         first = BranchEnd(points[0].value, "start")
         return Branch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
@@ -383,7 +381,7 @@ def ends_at(branch: Branch, flip: Bifurcation, period: int) -> bool:
     """Whether a branch of this period closes on this flip."""
     if branch.period != period or not branch.ends[1].reason.startswith("closes"):
         return False
-    last, before = branch.points[-1], branch.points[-2]
+    last, before = branch.points[-1], branch.points[max(0, len(branch.points) - 2)]
     return abs(branch.ends[1].value - flip.value) <= 2.0 * abs(last.value - before.value) + 1e-12
 
 
