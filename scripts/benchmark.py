@@ -30,7 +30,7 @@ from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
 from walkerlab.config.loader import load
-from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, walk_lanes
+from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
@@ -207,8 +207,8 @@ def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
     reference = reference_for(trial)
     many = 2_000
     strikes, fates = Strikes(np.zeros((many, STEPS)), np.zeros((many, STEPS, 4))), new_fates(many)
-    memory = new_lane_memory(RTOL, ATOL)
-    seconds = watch(lambda: walk_lanes(walker, memory, strikes, np.array([start] * many), fates))
+    memory, legs = new_lane_memory(RTOL, ATOL), two_legs(walker)
+    seconds = watch(lambda: walk_lanes(legs, memory, strikes, np.array([start] * many), fates))
     error = float(np.max(np.abs(strikes.after[:, -1] - reference.state)))
     alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
     script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)

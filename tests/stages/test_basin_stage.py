@@ -145,6 +145,11 @@ def test_contact_needs_a_contact_block(tmp_path):
         run(tmp_path, "contact=null", "basin.model=contact")
 
 
+def test_walkers_with_more_coordinates_are_refused(tmp_path):
+    with pytest.raises(ConfigError, match="two straight legs"):
+        run(tmp_path, state=[0.0] * 6)
+
+
 def test_a_window_upside_down_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="other side"):
         run(tmp_path, "basin.lower=[0.9,-1.0]")
