@@ -14,7 +14,7 @@ WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 LONGEST: Final = 1e3  # m
 HEAVIEST: Final = 1e6  # kg
-LIGHTEST_CONTACT: Final = 1e-6  # of the walker's mass: what a foot on compliant ground must carry along
+LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant ground must carry along
 
 Metres = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
 Point = tuple[Metres, Metres]
