@@ -66,7 +66,7 @@ def draw(axes: Axes, results: Results, name: str) -> set[str]:
 
 
 def cascade_of(results: Results) -> tuple[float, float] | None:
-    """The part of the parameter's axis with the cascades, from before the first bifurcation to where the attractor ends."""
+    """The part of the axis with bifurcations, from before the first to where the attractor ends."""
     summary = results[STAGE].summary
     found = [one["value"] for one in summary["bifurcations"]]
     if not found:
