@@ -29,7 +29,7 @@ ROOM: Final = 0.06
 
 
 def plot(results: Results) -> Figure:
-    """Both quantities over the whole span on the left, over the cascade on the right."""
+    """Both quantities over the whole span on the left, over the part with bifurcations on the right."""
     figure = blank(5.6)
     panels = figure.subplots(2, 2)
     close = cascade_of(results)
@@ -42,7 +42,7 @@ def plot(results: Results) -> Figure:
                 axes.set_xlim(*close)
             axes.set_ylim(*bounds(results, name, close if column == 1 else None))
         panels[row][0].set_ylabel(label)
-    for axes, title in zip(panels[0], ("(a) all of it", "(b) beyond the first flip"), strict=True):
+    for axes, title in zip(panels[0], ("(a) all of it", "(b) where gaits change"), strict=True):
         axes.set_title(title)
     drawn = list(branches_of(results))
     others = any(branch.period & (branch.period - 1) for branch in drawn)
@@ -66,13 +66,13 @@ def draw(axes: Axes, results: Results, name: str) -> set[str]:
 
 
 def cascade_of(results: Results) -> tuple[float, float] | None:
-    """The part of the parameter's axis with the cascades, from before the first flip to where the attractor ends."""
+    """The part of the axis with bifurcations, from before the first to where the attractor ends."""
     summary = results[STAGE].summary
-    flips = [one["value"] for one in summary["bifurcations"]]
-    if not flips:
+    found = [one["value"] for one in summary["bifurcations"]]
+    if not found:
         return None
     ends = [one["to"] for one in summary["attractors"]] or [summary["to"]]
-    least, most = min(flips), max(*ends, max(flips))
+    least, most = min(found), max(*ends, max(found))
     room = ROOM * (most - least)
     return (least - room, most + room) if room > 0.0 else None
 
