@@ -85,8 +85,13 @@ def test_a_value_is_yaml_typed_by_the_schema() -> None:
 
 def test_a_later_setting_wins() -> None:
     assert load(None, ["strides=3", "strides=4"]).config.strides == 4
-    assert load(None, ["slope_rad=0.1", "slope_deg=3"]).config.slope_rad == math.radians(3)
-    assert load(None, ["slope_deg=3", "slope_rad=0.1"]).config.slope_rad == 0.1
+    assert load(None, ["slope_deg=3", "slope_deg=4"]).config.slope_rad == math.radians(4)
+
+
+@pytest.mark.parametrize("settings", [["slope_rad=0.1", "slope_deg=3"], ["slope_deg=3", "slope_rad=0.1"]])
+def test_the_slope_set_twice_in_different_units_is_refused(settings) -> None:
+    with pytest.raises(ConfigError, match="slope"):
+        load(None, settings)
 
 
 def test_a_block_is_replaced_whole() -> None:

@@ -2,14 +2,16 @@
 
 import json
 
-from walkerlab.config.fields import leaves
+from walkerlab.config.fields import leaves, leaves_of_other_kinds
 from walkerlab.config.reference import as_json_schema, as_text, keys
 from walkerlab.config.schema import METHODS, Config
 
 
 def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
     listed = [row.key for row in keys()]
-    assert {".".join(path) for path, _ in leaves(Config)} | {"extends", "slope_deg"} == set(listed)
+    of_config = [path for path, _ in (*leaves(Config), *leaves_of_other_kinds(Config))]
+    assert {".".join(path) for path in of_config} | {"extends", "slope_deg"} == set(listed)
+    assert "walker(kneed).thigh.length_m" in listed
     assert len(listed) == len(set(listed))
 
 

@@ -108,7 +108,7 @@ def test_the_extremes_are_admitted(block: type[Block], values: dict[str, Any]) -
     [
         (CompassWalker, {"leg_length_m": 0.0}),
         (CompassWalker, {"leg_length_m": -1.0}),
-        (CompassWalker, {"foot_to_mass_m": 0.0}),
+        (CompassWalker, {"foot_to_mass_m": -0.1}),
         (CompassWalker, {"foot_to_mass_m": 1.0}),
         (CompassWalker, {"foot_to_mass_m": 1.5}),
         (CompassWalker, {"foot_to_mass_m": 1.0, "leg_inertia_kg_m2": 1.0}),

@@ -65,14 +65,20 @@ def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
 
 
 def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Path and field of every value in `block`, in the order of the schema; of a block of several kinds each kind's."""
+    """Path and field of every value in `block`, in the order of the schema; of several kinds of a block the first's."""
     for name, field in block.model_fields.items():
-        kinds: list[type[Block] | None] = [*kinds_of(field).values()] or [block_of(field)]
-        for inner in kinds:
-            if inner is None:
-                yield (*prefix, name), field
-            else:
-                yield from leaves(inner, (*prefix, name))
+        inner = block_of(field)
+        if inner is None:
+            yield (*prefix, name), field
+        else:
+            yield from leaves(inner, (*prefix, name))
+
+
+def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
+    """The same for the other kinds of blocks: `walker(kneed).thigh.length_m`."""
+    for name, field in block.model_fields.items():
+        for tag, kind in list(kinds_of(field).items())[1:]:
+            yield from leaves(kind, (f"{name}({tag})",))
 
 
 def extra(field: FieldInfo, name: str) -> str:

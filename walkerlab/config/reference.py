@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import block_of, bounds_of, extra, kind, leaves
+from walkerlab.config.fields import block_of, bounds_of, extra, kind, leaves, leaves_of_other_kinds
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
 from walkerlab.config.problems import nearest
@@ -45,6 +45,8 @@ def _keys() -> Iterator[KeyReference]:
         yield _reference(path, field)
         if path == ("slope_rad",):
             yield _reference(("slope_deg",), SlopeInDegrees.model_fields["slope_deg"])
+    for path, field in leaves_of_other_kinds(Config):
+        yield _reference(path, field)
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:

@@ -18,6 +18,7 @@ LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant
 
 Metres = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
 Point = tuple[Metres, Metres]
+LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 def length(meaning: str, source: str) -> Any:
@@ -33,6 +34,11 @@ def mass(meaning: str, source: str, least: float = 1e-12) -> Any:
 def inertia(of: str) -> Any:
     """Metadata of an inertia."""
     return key("kg m^2", f"inertia of {of} about its own centre of mass", "a point mass", ge=0.0, le=1e9)
+
+
+def point(meaning: str) -> Any:
+    """Metadata of a point in a body's frame."""
+    return key("m", meaning, "this project", bounds="two numbers, ahead and up", sequence=True)
 
 
 def refuse(kind: str, reason: str) -> PydanticCustomError:
@@ -270,20 +276,20 @@ class Kneed(Block):
 class PartBody(Block):
     """A rigid body with a frame of its own, upright as the walker stands."""
 
-    name: Annotated[str, key("", "name of the body", "this project")]
+    name: Annotated[str, key("", "name of the body", "this project", bounds="any text")]
     mass_kg: Annotated[float, key("kg", "its mass", "this project", ge=0.0, le=HEAVIEST)]
-    centre_m: Annotated[Point, key("m", "its centre of mass", "this project", sequence=True)]
+    centre_m: Annotated[Point, point("its centre of mass")]
     inertia_kg_m2: Annotated[float, inertia("the body")] = 0.0
 
 
 class PartHinge(Block):
     """A frictionless hinge between points of two bodies."""
 
-    name: Annotated[str, key("", "name of the hinge", "this project")]
-    parent: Annotated[str, key("", "one body", "this project")]
-    parent_point_m: Annotated[Point, key("m", "the hinge in its frame", "this project", sequence=True)]
-    child: Annotated[str, key("", "the other body", "this project")]
-    child_point_m: Annotated[Point, key("m", "the hinge in its frame", "this project", sequence=True)]
+    name: Annotated[str, key("", "name of the hinge", "this project", bounds="any text")]
+    parent: Annotated[str, key("", "one body", "this project", bounds="any text")]
+    parent_point_m: Annotated[Point, point("the hinge in its frame")]
+    child: Annotated[str, key("", "the other body", "this project", bounds="any text")]
+    child_point_m: Annotated[Point, point("the hinge in its frame")]
     locks: Annotated[
         bool,
         key("", "whether it is a knee, parent the thigh and child the shank", "this project", bounds="true or false"),
@@ -293,26 +299,30 @@ class PartHinge(Block):
 class PartParticle(Block):
     """A point mass fixed to a body."""
 
-    name: Annotated[str, key("", "name of the particle", "this project")]
+    name: Annotated[str, key("", "name of the particle", "this project", bounds="any text")]
     mass_kg: Annotated[float, key("kg", "its mass", "this project", ge=0.0, le=HEAVIEST)]
-    body: Annotated[str, key("", "the body it is fixed to", "this project")]
-    at_m: Annotated[Point, key("m", "where, in the body's frame", "this project", sequence=True)]
+    body: Annotated[str, key("", "the body it is fixed to", "this project", bounds="any text")]
+    at_m: Annotated[Point, point("where, in its frame")]
 
 
 class PartFoot(Block):
     """A foot: an arc about a point of a body."""
 
-    body: Annotated[str, key("", "the body it belongs to", "this project")]
-    centre_m: Annotated[Point, key("m", "centre of the arc in the body's frame", "this project", sequence=True)]
+    body: Annotated[str, key("", "the body it belongs to", "this project", bounds="any text")]
+    centre_m: Annotated[Point, point("the arc's centre in its frame")]
     radius_m: Annotated[float, key("m", "radius of the arc, 0 is a point", "this project", ge=0.0, le=LONGEST)] = 0.0
 
 
 class PartCoupling(Block):
     """A body whose angle is a weighted sum of others' angles."""
 
-    body: Annotated[str, key("", "the body that follows", "this project")]
-    of: Annotated[tuple[str, ...], key("", "the bodies that it follows", "this project", sequence=True)]
-    weights: Annotated[tuple[float, ...], key("1", "their weights", "this project", sequence=True)]
+    body: Annotated[str, key("", "the body that follows", "this project", bounds="any text")]
+    of: Annotated[
+        tuple[str, ...], key("", "the bodies that it follows", "this project", bounds="a list of names", sequence=True)
+    ]
+    weights: Annotated[
+        tuple[float, ...], key("1", "their weights", "this project", bounds="a list of numbers", sequence=True)
+    ]
 
 
 class PartsWalker(Block):
@@ -320,19 +330,41 @@ class PartsWalker(Block):
 
     type: Annotated[Literal["parts"], key("", "kind of walker", "this project")]
     leg_length_m: Annotated[float, length("hip to sole: what lengths and falls are measured by", "this project")]
-    bodies: Annotated[tuple[PartBody, ...], key("", "the bodies", "this project", sequence=True)]
-    hinges: Annotated[tuple[PartHinge, ...], key("", "the hinges, without closed loops", "this project", sequence=True)]
-    particles: Annotated[tuple[PartParticle, ...], key("", "point masses", "this project", sequence=True)] = ()
-    feet: Annotated[tuple[PartFoot, PartFoot], key("", "a foot for either leg", "this project", sequence=True)]
-    couplings: Annotated[tuple[PartCoupling, ...], key("", "what follows what", "this project", sequence=True)] = ()
-    legs: Annotated[
-        tuple[tuple[str, ...], tuple[str, ...]],
+    bodies: Annotated[
+        tuple[PartBody, ...],
+        key("", "the bodies", "this project", bounds="blocks of name, mass_kg, centre_m, inertia_kg_m2", sequence=True),
+    ]
+    hinges: Annotated[
+        tuple[PartHinge, ...],
         key(
             "",
-            "bodies of either leg from the hip down; they change roles at heel strike",
+            "the hinges, without closed loops",
             "this project",
+            bounds="blocks of name, parent, parent_point_m, child, child_point_m, locks",
             sequence=True,
         ),
+    ]
+    particles: Annotated[
+        tuple[PartParticle, ...],
+        key("", "point masses", "this project", bounds="blocks of name, mass_kg, body, at_m", sequence=True),
+    ] = ()
+    feet: Annotated[
+        tuple[PartFoot, PartFoot],
+        key(
+            "",
+            "a foot for either leg",
+            "this project",
+            bounds="blocks of two of body, centre_m, radius_m",
+            sequence=True,
+        ),
+    ]
+    couplings: Annotated[
+        tuple[PartCoupling, ...],
+        key("", "what follows what", "this project", bounds="blocks of body, of, weights", sequence=True),
+    ] = ()
+    legs: Annotated[
+        tuple[LegBodies, LegBodies],
+        key("", "bodies of either leg, hip down", "this project", bounds="two lists of names", sequence=True),
     ]
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
