@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.optimize import brentq
 
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.links import spread
@@ -241,12 +240,15 @@ class LinearStep:
 
 
 def first_root(f: Callable[[Vector], Vector], longest: float) -> float | None:
-    """The smallest root of f in (0, longest), bracketed by samples; None if f keeps its sign."""
+    """The smallest root of f in (0, longest), bracketed by samples ever closer; None if f keeps its sign."""
     # the end itself is left out: there the short gait's conditions degenerate into the long one's
     samples = longest * np.arange(1, SCAN) / SCAN
-    values = f(samples)
-    turns = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-    if turns.size == 0:
-        return None
-    low, high = samples[turns[0]], samples[turns[0] + 1]
-    return float(brentq(lambda t: float(f(np.array([t]))[0]), low, high, xtol=1e-14 * high))
+    while True:
+        values = f(samples)
+        turns = np.flatnonzero(values[:-1] * values[1:] <= 0.0)
+        if turns.size == 0:
+            return None
+        low, high = float(samples[turns[0]]), float(samples[turns[0] + 1])
+        if high - low <= 1e-14 * high:
+            return 0.5 * (low + high)
+        samples = np.linspace(low, high, SCAN)
