@@ -15,10 +15,11 @@ import argparse
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
-from walkerlab.paper.appendix_a import CORRECTED, RigidWalker
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import method_named
 
 FOLLOWED_ONLY = SearchSettings(random_starts=0)
@@ -26,9 +27,9 @@ RTOL, ATOL, BUDGET = 1e-11, 1e-13, 100_000
 RETURNS_TO = 1e-7  # rad, rad/s: the tolerance above, grown by an unstable gait's multipliers
 
 
-def random_walker(generator: np.random.Generator) -> RigidWalker:
+def random_walker(generator: np.random.Generator) -> Standing:
     """A walker of unit leg length, leg mass and gravity."""
-    return RigidWalker(
+    compass = RigidWalker(
         leg_length=1.0,
         foot_to_mass=float(generator.uniform(0.02, 0.25)),
         leg_mass=1.0,
@@ -38,9 +39,10 @@ def random_walker(generator: np.random.Generator) -> RigidWalker:
         slope=float(10.0 ** generator.uniform(-3.5, -1.3)),
         c21_sign=CORRECTED,
     )
+    return assembled(compass)
 
 
-def faults(walker: RigidWalker) -> list[str]:
+def faults(walker: Standing) -> list[str]:
     """What is wrong with the gaits found for a walker."""
     search = find_gaits(walker, settings=FOLLOWED_ONLY)
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
@@ -56,7 +58,7 @@ def faults(walker: RigidWalker) -> list[str]:
     return wrong
 
 
-def strays(walker: RigidWalker, gait: Gait) -> bool:
+def strays(walker: Standing, gait: Gait) -> bool:
     """Whether a step of SciPy's DOP853 leads away from the gait's state."""
     method = method_named("scipy-dop853").new(len(gait.state), RTOL, ATOL, BUDGET)
     step = take_walk(walker, method, gait.state, 1)

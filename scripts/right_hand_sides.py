@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import walkerlab.paper.appendix_a  # noqa: F401  (registers the right-hand side of the rigid walker)
 from walkerlab.config import loader
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.motion import OnGround, ground_wrench
 from walkerlab.ground.walker import ContactWalker, Foot, FootMotion, foot_force, foot_motion
 from walkerlab.kernels import inlined, kernel
+from walkerlab.mechanics.standing import Mode, Standing, swing_foot
 from walkerlab.mechanics.tree import mass_matrix, sines_cosines, with_centrifugal
 from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
-from walkerlab.paper.appendix_a import RigidWalker, step_length
+from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
 from walkerlab.scene.contact import contact_scene, hinged_walker
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import compass, rigid_walker
 from walkerlab.solvers.system import State, blank, derivative
 from walkerlab.solvers.vectors import load, store
 
@@ -146,6 +146,29 @@ def point_feet_derivative(system: PointFeet, t: float, y: State) -> State:
     return moved(walker, s, c, y, wrench_of_point(walker, walker.feet[1], s, c, y, wrench))
 
 
+for formula in (swing_constants, accelerations):
+    inlined(formula)
+
+
+class AppendixA(NamedTuple):
+    """The compass's equations typed by hand, for one walker only."""
+
+    walker: RigidWalker
+
+
+@blank.case(AppendixA)
+def appendix_a_blank(system: AppendixA) -> State:
+    """Two angles and their velocities."""
+    return (0.0, 0.0, 0.0, 0.0)
+
+
+@derivative.case(AppendixA)
+def appendix_a_derivative(system: AppendixA, t: float, y: State) -> State:
+    """(A.58)."""
+    alpha_1, alpha_2 = accelerations(system.walker, y[0], y[1], y[2], y[3])
+    return (y[2], y[3], alpha_1, alpha_2)
+
+
 @kernel
 def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
     """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
@@ -157,12 +180,14 @@ def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
 def systems() -> dict[str, tuple[Any, State]]:
     """Every right-hand side that is timed, and the state around which it is."""
     rigid = rigid_walker(ONE_DEGREE, "corrected")
+    heavy = rigid_walker(loader.load(None, ("slope_deg=1", "walker.leg_inertia_kg_m2=0.1")).config, "corrected")
     walker = walker_of(rigid)
     point = walker_of(rigid, "walker.foot_radius_m=0")
     both = (True, True)
     return {
-        "rigid": (rigid, ANGLES),
-        "rigid, inertia": (rigid._replace(leg_inertia=0.1), ANGLES),
+        "Appendix A": (AppendixA(compass(ONE_DEGREE, "corrected")), ANGLES),
+        "rigid": (Mode(rigid, rigid.bent), ANGLES),
+        "rigid, inertia": (Mode(heavy, heavy.bent), ANGLES),
         "contact": (OnGround(walker, both), FREE),
         "contact, friction of zero": (OnGround(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
         "contact, frictionless": (OnGround(walker._replace(friction=Frictionless()), both), FREE),
@@ -175,10 +200,10 @@ def systems() -> dict[str, tuple[Any, State]]:
     }
 
 
-def walker_of(rigid: RigidWalker, *sets: str) -> ContactWalker:
+def walker_of(rigid: Standing, *sets: str) -> ContactWalker:
     """The walker on the ground at one degree, with some keys changed."""
     config = loader.load(None, ("slope_deg=1", *sets)).config
-    return contact_scene(config, abs(step_length(rigid, -0.2044, 0.1695))).walker
+    return contact_scene(config, abs(swing_foot(rigid, ANGLES)[1])).walker
 
 
 def times_ns(repeats: int) -> dict[str, float]:

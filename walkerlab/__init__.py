@@ -8,10 +8,13 @@ from typing import Any
 __version__ = "0.1.0"
 
 __all__ = [
+    "basin",
     "compass",
     "contact",
+    "continue_gait",
     "dataset",
     "find_gait",
+    "kneed",
     "open_run",
     "run",
     "simulate",

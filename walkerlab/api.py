@@ -198,8 +198,17 @@ def compass(**keys: Any) -> Any:
     return walker("compass", **keys)
 
 
+def kneed(**keys: Any) -> Any:
+    """A walker with knees that lock; Hsu Chen's by default.
+
+    >>> kneed(hip_mass_kg=1.0).total_mass_kg
+    2.1
+    """
+    return walker("kneed", **keys)
+
+
 def contact(**keys: Any) -> Contact:
-    """The ground of the physical model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
+    """The ground of the contact model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
 
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
@@ -226,7 +235,7 @@ def find_gait(walker: Any = None, slope_deg: float = 1.0, **keys: Any) -> Result
 def simulate(
     walker: Any = None, slope_deg: float = 1.0, contact: Contact | None = None, strides: int = 5, **keys: Any
 ) -> Result:
-    """Walk, in memory: the rigid model, or with `contact` the physical one; from the gait unless `start` is given.
+    """Walk, in memory: the rigid model, or with `contact` the contact model; from the gait unless `start` is given.
 
     walker     from `compass` or `walker`; the paper's if left out
     slope_deg  positive downhill, deg
@@ -242,6 +251,35 @@ def simulate(
     more = {} if contact is None else {"contact": contact.model_dump(mode="json")}
     config = config_of_scene(walker, slope_deg, {**keys, **more, "strides": strides})
     return in_memory("simulate" if contact is None else "contact-sim", config)
+
+
+def continue_gait(
+    walker: Any = None,
+    over: str = "slope_rad",
+    span: tuple[float, float] = (1e-4, 0.1),
+    slope_deg: float = 1.0,
+    **keys: Any,
+) -> Result:
+    """Families of gaits over a number of the config, in memory: branches and bifurcations in `summary`.
+
+    walker     from `compass`, `kneed` or `walker`; the paper's if left out
+    over       the key that changes, and `span` from where to where, in its unit
+    slope_deg  positive downhill, deg, where `over` is another key
+    keys       other keys of a config, such as contact, seed
+    """
+    asked = {"over": over, "from": span[0], "to": span[1]}
+    return in_memory("continuation", config_of_scene(walker, slope_deg, {**keys, "continuation": asked}))
+
+
+def basin(walker: Any = None, slope_deg: float = 1.0, cells: tuple[int, int] = (100, 100), **keys: Any) -> Result:
+    """Which starts come to which attractor, in memory: shares in `summary`, the window's cells in `dataset`.
+
+    walker     from `compass` or `walker`; the paper's if left out
+    slope_deg  positive downhill, deg
+    cells      along either axis of the window
+    keys       other keys of a config, such as seed
+    """
+    return in_memory("basin", config_of_scene(walker, slope_deg, {**keys, "basin": {"cells": list(cells)}}))
 
 
 def dataset(group: Group) -> Any:
