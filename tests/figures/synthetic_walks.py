@@ -24,8 +24,9 @@ ORIGIN = Provenance(
 
 
 def stored(stage, groups, summary):
-    walker = {"leg_length_m": LEG_LENGTH, "foot_radius_m": 0.001}
-    identity = Identity(stage, {"walker": walker, "slope_rad": SLOPE}, {}, "c0de")
+    walker = {"type": "compass", "leg_length_m": LEG_LENGTH, "foot_radius_m": 0.001}
+    asked = {"walker": walker, "slope_rad": SLOPE, "contact": {"terrain": "after-mid-swing"}}
+    identity = Identity(stage, asked, {}, "c0de")
     return Stored(groups, summary, identity=identity, provenance=ORIGIN, complete=True, seal="5ea1")
 
 
@@ -65,6 +66,19 @@ def states(time, stance, angle, velocity):
     }
 
 
+def joints(step, stance, angle):
+    tilted = angle + SLOPE
+    from_hip = LEG_LENGTH * np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
+    hip = np.stack((step * STEP_LENGTH, 0.0 * step), axis=-1) - from_hip[np.arange(step.size), stance]
+    feet = hip[:, None] + from_hip
+    return {
+        "hip_along_m": Variable(hip[:, 0], ("time",), "m", "hip along the slope"),
+        "hip_height_m": Variable(hip[:, 1], ("time",), "m", "hip over the slope"),
+        "foot_along_m": Variable(feet[..., 0], ("time", "leg"), "m", "foot along the slope"),
+        "foot_height_m": Variable(feet[..., 1], ("time", "leg"), "m", "foot over the slope"),
+    }
+
+
 def per_step(period, count, strikes, **more):
     columns = {"period_s": np.full(count, period), "length_m": np.full(count, STEP_LENGTH), strikes: more.pop(strikes)}
     return Group({name: Variable(values, ("step",), "1", name) for name, values in {**columns, **more}.items()})
@@ -77,6 +91,7 @@ def rigid(steps=10, period=0.7, outcome="walked", completed=None):
     trajectory = {
         **states(time, 1 - step % 2, angle, velocity),
         **energies(time, 150.24),
+        **joints(step, 1 - step % 2, angle),
         "step": Variable(step, ("time",), "1", "step"),
     }
     groups = {"trajectory": Group(trajectory)}
@@ -91,17 +106,10 @@ def contact(steps=10, period=0.71, outcome="walked", pads=True):
     time, step, angle, velocity = motion(steps, period, jumps=False)
     touches = period * np.arange(1, steps + 1)
     stance = 1 - step % 2
-    tilted = angle + SLOPE
-    from_hip = LEG_LENGTH * np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
-    hip = np.stack((step * STEP_LENGTH, 0.0 * step), axis=-1) - from_hip[np.arange(time.size), stance]
-    feet = hip[:, None] + from_hip
     trajectory = {
         **states(time, stance, angle, velocity),
         **energies(time, 150.0),
-        "hip_along_m": Variable(hip[:, 0], ("time",), "m", "hip along the slope"),
-        "hip_height_m": Variable(hip[:, 1], ("time",), "m", "hip over the slope"),
-        "foot_along_m": Variable(feet[..., 0], ("time", "leg"), "m", "foot along the slope"),
-        "foot_height_m": Variable(feet[..., 1], ("time", "leg"), "m", "foot over the slope"),
+        **joints(step, stance, angle),
     }
     landings = STEP_LENGTH * np.arange(1, steps + 1)
     groups = {

@@ -173,7 +173,9 @@ def tune(summary: Summary) -> list[str]:
 
 
 def compare(summary: Summary) -> list[str]:
-    """What of the paper's numbers comes out, as printed beside corrected."""
+    """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
+    if "verdicts" not in summary:
+        return models_compared(summary)
     verdicts = summary["verdicts"]
     total = sum(verdicts.values())
     head = f"Of {total} numbers that the paper prints, " + listed(
@@ -185,6 +187,18 @@ def compare(summary: Summary) -> list[str]:
         [*(row[key] for key in about), *(number(row[key]) for key in columns), row["unit"], row["verdict"]]
         for row in summary["paper_numbers"]
     ]
+    return [f"{head}.", "", *aligned(rows)]
+
+
+def models_compared(summary: Summary) -> list[str]:
+    """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
+    steps, outcomes = summary["steps"], summary["outcomes"]
+    rows = [["last step", "period", "length", "ends as"]]
+    walks = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
+    releases = summary.get("releases", {}).items()
+    walks += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
+    rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in walks]
+    head = f"The rigid model's walk ends as {outcomes['rigid']}, the contact model's as {outcomes['contact']}"
     return [f"{head}.", "", *aligned(rows)]
 
 

@@ -13,12 +13,19 @@ from matplotlib.patches import Patch, Polygon
 from walkerlab.figures.canvas import legend_above
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Need, Results
-from walkerlab.figures.stick_diagram import Sticks, cycle_caption, draw_slope, entries, stick_diagram
+from walkerlab.figures.stick_diagram import (
+    Sticks,
+    cycle_caption,
+    draw_slope,
+    entries,
+    sole_radius,
+    stick_diagram,
+    stored_sticks,
+)
 from walkerlab.figures.style import LEGS
-from walkerlab.figures.walks import CONTACT_STAGE, NO_STATES, STATES, STEPS, STEPS_TAKEN_CONTACT, TRAJECTORY
+from walkerlab.figures.walks import CONTACT_STAGE, JOINTS, NO_STATES, STATES, STEPS, STEPS_TAKEN_CONTACT, TRAJECTORY
 from walkerlab.store.content import Group
 
-JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
 TERRAIN = "terrain"
 PAD_HEIGHT = 0.028
 """Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
@@ -27,7 +34,7 @@ PAD_NAMES = ("pad of leg 1", "pad of leg 2")
 
 
 def plot(results: Results) -> Figure:
-    """The walker on its pads, or on the plane that it may touch after mid-swing."""
+    """The walker on its pads, or on its plane."""
     sticks = sticks_of(results)
     figure, axes = stick_diagram(sticks)
     pads = results[CONTACT_STAGE].groups.get(TERRAIN)
@@ -44,11 +51,7 @@ def plot(results: Results) -> Figure:
 def sticks_of(results: Results) -> Sticks:
     """The joints' places as the walk has stored them."""
     result = results[CONTACT_STAGE]
-    trajectory, steps = result[TRAJECTORY], result[STEPS]
-    hip = np.stack([trajectory[name] for name in ("hip_along_m", "hip_height_m")], axis=-1)
-    feet = np.stack([trajectory[name] for name in ("foot_along_m", "foot_height_m")], axis=-1)
-    landings = np.concatenate(([0.0], steps["touch_along_m"]))
-    return Sticks(trajectory["time"], hip, feet, steps["touch_time_s"], landings, float(result.summary["slope_rad"]))
+    return stored_sticks(result, "touch_time_s", np.concatenate(([0.0], result[STEPS]["touch_along_m"])))
 
 
 def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> None:
@@ -71,25 +74,25 @@ def pad_look(leg: int) -> dict[str, Any]:
 def caption(results: Results) -> str:
     """The cycle's measures, and what the ground is."""
     result, sticks = results[CONTACT_STAGE], sticks_of(results)
-    radius = float(result.identity.config_slice["walker"]["foot_radius_m"])
+    asked = result.identity.config_slice
+    radius = sole_radius(asked["walker"])
     feet = f"ball feet of {1e3 * radius:.3g} mm radius" if radius else "point feet"
-    ground = (
-        f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
-        if TERRAIN in result.groups
-        else "on a plane that a swing foot can touch only once it has passed the stance foot"
-    )
+    ground = f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
+    if TERRAIN not in result.groups:
+        ground = PLANES[asked["contact"]["terrain"]]
     return (
         "One gait cycle of the contact model, to scale but for the feet's marks and the ground's depth: "
         f"{feet}, {ground}. {cycle_caption(sticks)}"
     )
 
 
+PLANES = {
+    "plane": "on a plane",
+    "after-mid-swing": "on a plane that a swing foot can touch only once it has passed the stance foot",
+}
 CONTACT_JOINTS = Need(CONTACT_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES)
 
-SEEN = (
-    "Legs as straight lines from the hip to the feet, fanned out from one foothold to the next, and the "
-    "ground under them."
-)
+SEEN = "Legs as lines from the hip to the feet, fanned out from one foothold to the next, and the ground under them."
 FIGURE = paper_figure(
     6, "Stick diagram of the contact model", (CONTACT_JOINTS, STEPS_TAKEN_CONTACT), caption, plot, SEEN
 )

@@ -42,7 +42,7 @@ def times(sticks: Sticks, steps: int, rate: int, slower: float) -> NDArray[np.fl
 
 def pictures(sticks: Sticks, at: NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
     """A picture (height, width, 3) for each time."""
-    joints = np.concatenate((sticks.hip[:, None], sticks.feet), axis=1)
+    joints = np.concatenate([sticks.leg(leg) for leg in range(len(LEGS))], axis=1)
     flat = joints.reshape(joints.shape[0], -1)
     # between two samples, straight; both sides of a heel strike are samples, so none is cut across
     places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
@@ -62,10 +62,10 @@ def pictures(sticks: Sticks, at: NDArray[np.float64]) -> Iterator[NDArray[np.uin
         legs = [axes.plot([], [], color=look.colour, linestyle=look.style, linewidth=2.2)[0] for look in LEGS]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
         clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
-        for time, (top, *feet) in zip(at, shown, strict=True):
-            for line, foot in zip(legs, feet, strict=True):
-                line.set_data(*np.stack((top, foot), axis=1))
-            hip.set_data([top[0]], [top[1]])
+        for time, places in zip(at, shown, strict=True):
+            for line, joint in zip(legs, np.split(places, len(LEGS)), strict=True):
+                line.set_data(*joint.T)
+            hip.set_data(*places[:1].T)
             clock.set_text(f"{time:.2f} s")
             canvas.draw()  # type: ignore[no-untyped-call]
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

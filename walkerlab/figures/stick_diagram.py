@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 from walkerlab.figures.canvas import blank
 from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
 from walkerlab.figures.walks import Array
+from walkerlab.store.artifact import Stored
 
 CYCLE = 2
 """Steps of a gait cycle."""
@@ -25,6 +28,11 @@ FAINT, FULL = 0.8, 2.2
 """Widths of legs between heel strikes and at them, pt."""
 HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
 """Free space around the walker, leg lengths."""
+ARC = np.linspace(-0.6, 0.6, 25)
+ARC_MIDDLE = np.zeros(1)
+"""How much of a sole's arc is drawn, rad from the leg's line."""
+SMALL_FOOT = 0.01
+"""Radius of a sole, in leg lengths, below which it is a point to the eye."""
 SHAPE = 0.68
 """Height of the axes in parts of their width, unless the walker is taller or longer."""
 
@@ -39,6 +47,9 @@ class Sticks:
     strikes  (steps,) s
     landings (1 + steps,) m along the slope: where the first stance foot stands and each step's foot comes down
     slope    rad
+    knees    (samples, leg, 2); None for straight legs
+    radius   of the soles' arcs, m; the feet are their lowest points
+    head     (samples, 2), the torso's centre of mass; None without a torso
     """
 
     time: Array
@@ -47,11 +58,31 @@ class Sticks:
     strikes: Array
     landings: Array
     slope: float
+    knees: Array | None = None
+    radius: float = 0.0
+    head: Array | None = None
 
     @property
     def leg_length(self) -> float:
         """Largest distance of a foot from the hip (m)."""
         return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
+
+    def leg(self, leg: int) -> Array:
+        """A leg's line (samples, points, 2): from the hip, over its knee if it has one, to the middle of its sole."""
+        joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
+        return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
+
+    def sole(self, leg: int) -> Array:
+        """The arc of a leg's sole (samples, points, 2)."""
+        return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
+
+    def arc(self, leg: int, above: Array, angles: Array) -> Array:
+        """Points of a sole at angles (rad) from the line through the joint above and the arc's centre."""
+        centre = self.feet[:, leg] + np.array([0.0, self.radius])
+        down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
+        ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
+        around = np.cos(angles)[:, None] * down[:, None] + np.sin(angles)[:, None] * ahead[:, None]
+        return np.asarray(centre[:, None] + self.radius * around)
 
     def in_plane(self, points: Array) -> Array:
         """Points of the slope's frame (..., 2) as horizontal and vertical position (m)."""
@@ -76,6 +107,39 @@ class Sticks:
         return np.asarray(right - left_is_nearer, dtype=np.int64)
 
 
+def stored_sticks(result: Stored, strikes: str, landings: Array) -> Sticks:
+    """The joints' places as a walk has stored them.
+
+    strikes   the name under which the times of its steps' ends are stored
+    landings  (1 + steps,) m along the slope
+    """
+    trajectory, walker = result["trajectory"], result.identity.config_slice["walker"]
+
+    def joints(name: str) -> Array:
+        return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
+
+    slope, hip, head = float(result.summary["slope_rad"]), joints("hip"), None
+    if "torso_angle" in trajectory.variables:
+        tilted = trajectory["torso_angle"] + slope
+        head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
+    return Sticks(
+        trajectory["time"],
+        hip,
+        joints("foot"),
+        result["steps"][strikes],
+        landings,
+        slope,
+        joints("knee") if "knee_along_m" in trajectory.variables else None,
+        sole_radius(walker),
+        head,
+    )
+
+
+def sole_radius(walker: Mapping[str, Any]) -> float:
+    """Radius of a walker's soles (m), from its block of the config."""
+    return float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
+
+
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     """The walker over its first gait cycle, without the ground."""
     figure, axes = framed(sticks)
@@ -93,8 +157,9 @@ def framed(sticks: Sticks) -> tuple[Figure, Axes]:
     """Axes of equal scales that fit the cycle, and a figure that fits the axes."""
     at_strikes, between = sticks.postures()
     rows = np.concatenate((at_strikes, between))
-    seen = np.concatenate((sticks.hip[rows, None], sticks.feet[rows]), axis=1)
-    points = sticks.in_plane(seen).reshape(-1, 2)
+    seen = [sticks.hip[rows, None], sticks.feet[rows]]
+    seen += [] if sticks.head is None else [sticks.head[rows, None]]
+    points = sticks.in_plane(np.concatenate(seen, axis=1)).reshape(-1, 2)
     length = sticks.leg_length
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
@@ -111,20 +176,26 @@ def framed(sticks: Sticks) -> tuple[Figure, Axes]:
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
-    """Both legs from hip to foot at some samples, the legs told apart by colour, line and foot."""
-    hip, feet = sticks.in_plane(sticks.hip[rows]), sticks.in_plane(sticks.feet[rows])
+    """Legs, soles and torso at some samples, the legs told apart by colour, line and foot."""
+    hip = sticks.in_plane(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
-        for start, end in zip(hip, feet[:, leg], strict=True):
+        for line in sticks.in_plane(sticks.leg(leg)[rows]):
             axes.plot(
-                *np.stack((start, end), axis=1),
+                *line.T,
                 color=look.colour,
                 linestyle=look.style,
                 linewidth=width,
                 marker=look.marker,
-                markevery=[1],
+                markevery=[*range(1, len(line))],
                 markersize=2.0 + width,
                 zorder=look.order + width,
             )
+        if sticks.radius > SMALL_FOOT * sticks.leg_length:
+            for sole in sticks.in_plane(sticks.sole(leg)[rows]):
+                axes.plot(*sole.T, color=look.colour, linewidth=width, zorder=look.order + width)
+    if sticks.head is not None:
+        for line in zip(hip, sticks.in_plane(sticks.head[rows]), strict=True):
+            axes.plot(*np.transpose(line), color=BLACK, linewidth=width, zorder=7)
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
 

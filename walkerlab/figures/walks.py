@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE = "simulate", "contact-sim", "compare"
 TRAJECTORY, STEPS = "trajectory", "steps"
 STATES = ("time", "angle", "velocity", "stance_leg")
+JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
 ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
 
 NO_STATES = "'states' is not among the config's outputs"

@@ -1,4 +1,4 @@
-"""Both models compared with each other and with every number that the paper prints."""
+"""Both models compared with each other and, if the walker is the paper's, with every number that it prints."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ from walkerlab.scene.rigid import compass
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
+from walkerlab.stages.compared_releases import LEFT_OUT, KneedStart, compare_releases
 from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
@@ -51,7 +52,7 @@ EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
     if not is_plain_compass(config.walker):
-        return models_compared(inputs, progress)
+        return models_compared(config, inputs, progress)
     progress.start("compare", 3)
     study = study_the_paper()
     progress.advance()
@@ -77,31 +78,42 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     )
 
 
-def models_compared(inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """The walks of both models against each other alone."""
-    progress.start("compare", 1)
+def models_compared(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """The walks of both models against each other alone, and of a walker with knees both instants of their release."""
+    progress.start("compare", 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
+    progress.advance()
+    releases = compare_releases(config, KneedStart(as_state(gait["state"]), float(contact["pitch_m"])))
     summary = {
         "steps": {
             "rigid": last_step(rigid),
             "contact": {**last_step(contact), "slip_m": float(contact["slip_per_step_m"])},
-            "gait": {"period_s": gait.get("period_s"), "length_m": gait.get("step_length_m")},
+            "gait": {
+                "period_s": gait.get("period_s"),
+                "length_m": gait.get("step_length_m"),
+                **({"knee_strike_s": gait["knee_strike_s"]} if "knee_strike_s" in gait else {}),
+            },
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
         "dissipated_J": contact["dissipated_J"],
+        **({} if releases is None else {"releases": releases}),
     }
+    left_out = [NOT_THE_PAPERS, *motion.left_out, *(() if releases is None else LEFT_OUT)]
     progress.advance()
-    return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": [NOT_THE_PAPERS, *motion.left_out]})
+    return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": left_out})
 
 
 NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's compass"}
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Period (s) and length (m) of a walk's last step; None if it took none."""
-    periods, lengths = walk["step_periods_s"], walk["step_lengths_m"]
-    return {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
+    """Period (s) and length (m) of a walk's last step and how long into it a knee locked (s); None if it took none."""
+    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strikes_s")
+    step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
+    if not strikes:
+        return step
+    return {**step, "knee_strike_s": strikes[-1] - sum(periods[:-1]) if strikes[-1] >= 0.0 else None}
 
 
 def row_summary(row: Row) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from walkerlab.report.blocks import Cell, Column, Paragraph, Section, table
 from walkerlab.report.numbers import count, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CONTACT, tone
 from walkerlab.report.results import Results
+from walkerlab.report.sections.models import CHANNELS
 
 Row = list[str | Cell]
 
@@ -98,9 +99,8 @@ def energies(summary: Mapping[str, Any]) -> list[Row]:
     rows: list[Row] = [
         ["energy balance residual", f"{residual_in_words(residual)} J", "largest, of mechanical and dissipated energy"]
     ]
-    names = {"damping": "in damping", "friction": "in friction", "edges": "at pads' edges"}
     for key, value in (summary.get("dissipated_J") or {}).items():
-        rows.append([f"energy lost {names.get(key, key)}", f"{residual_in_words(value)} J", "over the whole walk"])
+        rows.append([f"energy lost {CHANNELS.get(key, key)}", f"{residual_in_words(value)} J", "over the whole walk"])
     return rows
 
 

@@ -11,6 +11,7 @@ from walkerlab.report.numbers import count, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, finding
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.errata import errata
+from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
 from walkerlab.report.symbols import in_signs
 
@@ -35,6 +36,9 @@ def section(results: Results) -> Section:
     fared = [found for found in told if found is not None]
     if fared:
         blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
+    departs = departure(results)
+    if departs:
+        blocks.append(Paragraph(departs))
     rows = paper_numbers(results)
     if rows and results.of_the_paper:
         blocks += of_the_paper(results, rows)

@@ -1,0 +1,70 @@
+"""What the release of the trailing knee decides: two contact walks from one gait that differ in its instant alone."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from walkerlab.config.schema import Config
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.held import Knees
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, by_channel, walk_contact
+from walkerlab.scene.contact import GAIT_METHOD, ContactScene, contact_scene, start_state
+from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.system import State
+
+RELEASES = {"compression": False, "touch": True}
+"""Instants of release, as the config names them, and whether that is the leading foot's first touch."""
+STEPS = 20  # enough for what starts at a gait to come to rest at another one, or to fall
+RTOL, ATOL = 1e-8, 1e-10
+BUDGET = 2_000_000  # right-hand sides of one walk
+LEFT_OUT = (
+    {
+        "what": "ideal against compliant lock",
+        "why": "a walk has one of them; `walkerlab contact-sim --set walker.knee.lock=compliant` walks the other",
+        "saves": "compiling the contact walk a second time",
+    },
+)
+
+
+class KneedStart(NamedTuple):
+    """A gait to start from, and what lengths are measured by."""
+
+    state: State  # of the rigid model
+    pitch_m: float
+
+
+def compare_releases(config: Config, start: KneedStart) -> dict[str, Any] | None:
+    """Up to 20 steps with each instant of release; None for a walker without knees."""
+    scene = contact_scene(config, start.pitch_m, start.pitch_m)
+    if not isinstance(scene.walker.knees, Knees):
+        return None
+    return {name: told(scene, walked(scene, start.state, at_touch)) for name, at_touch in RELEASES.items()}
+
+
+def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResult:
+    """A walk from a state of the rigid model; at_touch: released at the leading foot's first touch."""
+    walker = scene.walker._replace(knees=scene.walker.knees._replace(release_at_touch=at_touch))
+    pinned = None if scene.pinned is None else scene.pinned._replace(walker=walker)
+    methods = MethodSettings(method_named(GAIT_METHOD), RTOL, ATOL, BUDGET)
+    return walk_contact(walker, scene.ground, pinned, STANCE_FOOT, start_state(scene, state), methods, STEPS, None)
+
+
+def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+    """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
+    steps = int(walk.touch_time_s.size)
+    if steps == 0:
+        return {"outcome": walk.outcome.label, "steps": 0, "of": STEPS, **NO_STEP}
+    period, strike = float(walk.periods_s[-1]), float(walk.knee_strike_s[-1])
+    lost = by_channel(scene.walker, walk.dissipated_J)
+    return {
+        "outcome": walk.outcome.label,
+        "steps": steps,
+        "of": STEPS,
+        "period_s": period,
+        "length_m": float(walk.lengths_m[-1]),
+        "knee_strike_s": strike - (float(walk.touch_time_s[-1]) - period) if strike >= 0.0 else None,
+        "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()},
+    }
+
+
+NO_STEP = {"period_s": None, "length_m": None, "knee_strike_s": None, "dissipated_J_per_step": None}
