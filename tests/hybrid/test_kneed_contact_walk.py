@@ -78,16 +78,17 @@ def test_released_at_touch_it_is_another_walker():
     assert walk.outcome in (Outcome.FELL, Outcome.BENT_KNEE) or steps[-1] < PERIOD - 0.01
 
 
-def test_a_plain_integration_locks_the_knee_and_takes_the_step_at_the_same_times():
-    scene = plain()
-    outcome, done, times, places, _, _, _, y, locks = plain_walk.walk(
-        scene, plain_walk.start(scene, ANGLES, RATES), 1, 1e-5, -1
+@pytest.mark.parametrize(("rules", "steps"), [(None, 4), (AT_TOUCH, 3)], ids=["compression", "touch"])
+def test_a_plain_integration_locks_releases_and_touches_at_the_same_times(rules, steps):
+    outcome, done, times, places, slips, _, _, y, locks = plain_walk.walk(
+        plain(rules is AT_TOUCH), plain_walk.start(plain(), ANGLES, RATES), steps, 1e-5, -1
     )
-    walk = walked(steps=1, tolerance=1e-10)
+    walk = walked(steps=steps, rules=rules, tolerance=1e-10)
     assert outcome == walk.outcome == Outcome.WALKED
-    assert done == 1
+    assert done == steps
     np.testing.assert_allclose(walk.touch_time_s, times, atol=1e-6)
     np.testing.assert_allclose(walk.touch_along_m, places, atol=1e-6)
+    np.testing.assert_allclose(walk.slip_m, slips, atol=1e-6)
     np.testing.assert_allclose(walk.knee_strike_s, locks, atol=1e-6)
     # that time apart at the fastest body's few rad/s
     np.testing.assert_allclose(walk.end_state[2:6], y[2:6], atol=5e-6)
