@@ -220,6 +220,7 @@ PIPELINE = Graph(
         "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
         reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        on_demand=True,
         follows=True,
     ),
     Stage(
