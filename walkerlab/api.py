@@ -199,7 +199,7 @@ def compass(**keys: Any) -> Any:
 
 
 def contact(**keys: Any) -> Contact:
-    """The ground of the physical model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
+    """The ground of the contact model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
 
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
