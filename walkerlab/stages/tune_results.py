@@ -210,9 +210,7 @@ def map_group(found: Findings) -> Group:
         {
             SWING: Variable(cells.swing, (SWING,), "1", "factor on the swing leg's initial angular velocity"),
             STANCE: Variable(cells.stance, (STANCE,), "1", "factor on the stance leg's initial angular velocity"),
-            "outcome": Variable(
-                cells.outcome, dims, "1", "how the contact model's walk ended, see attribute outcomes"
-            ),
+            "outcome": Variable(cells.outcome, dims, "1", "how the contact model's walk ended, see attribute outcomes"),
             "steps": Variable(cells.steps, dims, "1", "steps that the contact model walked"),
             "settled": Variable(
                 cells.settled, dims, "1", "1 if the last step is the contact gait's within two percent"
