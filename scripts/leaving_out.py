@@ -105,7 +105,7 @@ class Reduction:
 
 
 def contact(*sets: str, strides: int = 5) -> Scene:
-    """A walk of the physical model."""
+    """A walk of the contact model."""
     return Scene("contact-sim", (*GIVEN, f"strides={strides}", *sets))
 
 

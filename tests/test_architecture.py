@@ -114,7 +114,7 @@ def test_a_walk_of_the_rigid_model_never_loads_contact_code(tmp_path):
     assert "walkerlab.hybrid.rigid_walk" in loaded
     physical = (
         "walkerlab.ground",
-        "walkerlab.mechanics.tree",
+        "walkerlab.orbits.contact_gait",
         "walkerlab.hybrid.contact",
         "walkerlab.scene.contact",
     )

@@ -92,3 +92,29 @@ def test_a_bad_config_exits_3_before_anything_runs(walker, arguments):
     assert done.stderr.startswith("error: ")
     assert done.stdout == ""
     assert not list(walker.folder.iterdir())
+
+
+def completed(walker, typed):
+    """What bash is offered for the last word of a command line."""
+    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1), "_WALKERLAB_COMPLETE": "complete_bash"}
+    code = "import sys; from walkerlab.cli.main import main; sys.argv = ['walkerlab']; main()"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, cwd=walker.folder, env={**walker.environment, **asked}, capture_output=True, text=True
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("walkerlab simulate --set slope_d", ["slope_deg="]),
+        ("walkerlab simulate --set walker.thigh.le", ["walker.thigh.length_m="]),
+        ("walkerlab continuation --over walker.hip", ["walker.hip_mass_kg"]),
+        ("walkerlab simulate -c simp", ["simplest", "simple.yaml"]),
+        ("walkerlab simulate --stri", ["--strides"]),
+    ],
+)
+def test_a_shell_completes_keys_configs_and_options(walker, typed, offered):
+    (walker.folder / "simple.yaml").write_text("extends: paper\n", encoding="utf-8")
+    assert completed(walker, typed) == offered

@@ -64,7 +64,7 @@ def refuse_bad_cases(config: Config, tree: Mapping) -> None:
 
 
 def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a case of the physical model has none."""
+    """Raise ConfigError if a case of the contact model has none."""
     if case.model == "contact" and config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise refusal([Problem(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")])

@@ -141,7 +141,7 @@ class RigidSolver(SolverSettings):
 
 
 class ContactSolver(SolverSettings):
-    """How the physical model is integrated."""
+    """How the contact model is integrated."""
 
     method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "radau5"
     rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-7

@@ -22,18 +22,18 @@ METHOD, RTOL, ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
 
 @dataclass(frozen=True)
 class PaperStart:
-    """The walk of the physical model from there, and what explains it.
+    """The walk of the contact model from there, and what explains it.
 
     state           the start: the printed stance angle and velocities, both feet on the config's slope
     energy          J, of the rigid model, from the stance foot
     weight          N
     rigid_normal    N, force of the ground on the rigid model's stance foot at the start
     pull_from       s, from when on the rigid model's ground would have to pull; None if it never has to
-    airborne_from   s, from when on no foot of the physical model is carried; None if one always is
-    carried_later   N, the most that the physical model's ground carries once the rigid one's would have to pull
+    airborne_from   s, from when on no foot of the contact model is carried; None if one always is
+    carried_later   N, the most that the contact model's ground carries once the rigid one's would have to pull
     time            (samples,) s
-    normal          (samples, leg) N, normal forces of the physical model
-    mechanical      (samples,) J, kinetic and potential energy of the physical model
+    normal          (samples, leg) N, normal forces of the contact model
+    mechanical      (samples,) J, kinetic and potential energy of the contact model
     """
 
     state: State
@@ -69,7 +69,7 @@ class PaperStart:
 def paper_start(walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> PaperStart:
     """Run Table 2's ADAMS start.
 
-    walk  walks the physical model from a rigid start state, with samples
+    walk  walks the contact model from a rigid start state, with samples
     """
     _, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
     state = (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2)

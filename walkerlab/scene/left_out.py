@@ -32,7 +32,7 @@ def of_rigid_walk(config: Config) -> tuple[LeftOut, ...]:
 
 
 def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
-    """What the physical model's walk does without."""
+    """What the contact model's walk does without."""
     contact = config.contact
     found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
     if contact is not None and contact.friction == "none":

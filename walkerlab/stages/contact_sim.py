@@ -1,4 +1,4 @@
-"""The physical model: an assembled walker on compliant ground, walked from the rigid model's start state."""
+"""The contact model: an assembled walker on compliant ground, walked from the rigid model's start state."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ PIPELINE = Graph(
     Stage(
         "contact-sim",
         "walkerlab.stages.contact_sim",
-        "Walk the physical model, with contact as ADAMS has it.",
+        "Walk the contact model, its contact forces as in ADAMS.",
         reads=(*MODEL, "contact", "solver.contact"),
         inputs=gait_for_start_or_pads,
         needs_contact=True,
@@ -163,7 +163,7 @@ PIPELINE = Graph(
     Stage(
         "tune",
         "walkerlab.stages.tune",
-        "Adjust the initial velocities until the physical model walks: whether, how much, and why.",
+        "Adjust the initial velocities until the contact model walks: whether, how much, and why.",
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
@@ -220,6 +220,7 @@ PIPELINE = Graph(
         "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
         reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        on_demand=True,
         follows=True,
     ),
     Stage(

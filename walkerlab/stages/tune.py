@@ -207,7 +207,7 @@ class Stage:
         return float(rates[swing] / self.rigid_state[2]), float(rates[landed] / self.rigid_state[3])
 
     def walk(self, state: State, pinned: Pinned | None = None) -> ContactWalkResult:
-        """Walk the physical model from a rigid state, as contact-sim does, with samples."""
+        """Walk the contact model from a rigid state, as contact-sim does, with samples."""
         settings = self.config.solver.contact
         methods = MethodSettings(
             method_named(settings.method), settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP

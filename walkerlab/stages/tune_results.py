@@ -210,10 +210,8 @@ def map_group(found: Findings) -> Group:
         {
             SWING: Variable(cells.swing, (SWING,), "1", "factor on the swing leg's initial angular velocity"),
             STANCE: Variable(cells.stance, (STANCE,), "1", "factor on the stance leg's initial angular velocity"),
-            "outcome": Variable(
-                cells.outcome, dims, "1", "how the physical model's walk ended, see attribute outcomes"
-            ),
-            "steps": Variable(cells.steps, dims, "1", "steps that the physical model walked"),
+            "outcome": Variable(cells.outcome, dims, "1", "how the contact model's walk ended, see attribute outcomes"),
+            "steps": Variable(cells.steps, dims, "1", "steps that the contact model walked"),
             "settled": Variable(
                 cells.settled, dims, "1", "1 if the last step is the contact gait's within two percent"
             ),
@@ -251,7 +249,7 @@ def gait_group(gait: ContactGait) -> Group:
 
 
 def walk_group(walk: ContactWalkResult) -> Group | None:
-    """Angles and velocities of a walk of the physical model; None if nothing was sampled."""
+    """Angles and velocities of a walk of the contact model; None if nothing was sampled."""
     if walk.samples is None or walk.samples.time_s.size == 0:
         return None
     y = walk.samples.states
@@ -289,7 +287,7 @@ def touches(times: Any) -> dict[str, Variable]:
 
 
 def paper_group(found: Findings) -> Group:
-    """The paper's ADAMS start in the physical model."""
+    """The paper's ADAMS start in the contact model."""
     paper = found.paper
     samples = paper.walk.samples
     legs = {} if samples is None else legs_in_time(samples.time_s, samples.states[:, 2:4], samples.states[:, 6:8])

@@ -1,4 +1,4 @@
-"""One case of the physical model: walked, again with a tenfold tolerance and by another method, and as its twin."""
+"""One case of the contact model: walked, again with a tenfold tolerance and by another method, and as its twin."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[Cont
 
 
 def judge_contact(case: Case, config: Config) -> CaseResult:
-    """Run a case of the physical model and judge it."""
+    """Run a case of the contact model and judge it."""
     ready = prepared(config, case)
     if ready is None:
         return without_start(case)

@@ -71,7 +71,7 @@ def choices(case: Case, config: Config) -> tuple[Choice, ...]:
 
 
 def contact_choices(case: Case, config: Config) -> tuple[Choice, ...]:
-    """Every ordinary method on a case of the physical model; none if no equation without events describes it."""
+    """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
     ready = prepared(config, case)
     if ready is None or ready.scene.pinned is not None or isinstance(ready.scene.terrain, AfterMidSwing):
         return ()
