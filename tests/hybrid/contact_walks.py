@@ -23,7 +23,8 @@ def faster(factor, start=FIXED_POINT):
 
 @functools.cache
 def scene_of(*sets, step=RIGID_STEP):
-    return contact_scene(load(None, (ONE_DEGREE, *sets)).config, step)
+    own_slope = any(setting.startswith("slope_") for setting in sets)
+    return contact_scene(load(None, sets if own_slope else (ONE_DEGREE, *sets)).config, step)
 
 
 def settings(tolerance=TOLERANCE, method="radau5", budget=PLENTY):
