@@ -95,7 +95,7 @@ def tightest(trial: Trial, method: str) -> End:
     result = trial.prepare(method, tolerances[method], BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:
         why = f"{method} at {tolerances[method]:g} does not reach its end within {BUDGET // 1_000_000} million"
-        raise WalkEndsError(f"{why} right-hand sides, so that nothing tells how well that end is known")
+        raise WalkEndsError(f"{why} right-hand sides, so that nothing tells how well its end is known")
     if not result.state.size:
         raise WalkEndsError(f"the walk ends early ({result.outcome}), so that there is no end state to compare")
     return End(method, result.state)
