@@ -37,6 +37,7 @@ COLOURS: Final = {
     Outcome.BUDGET_EXHAUSTED: BLACK,
     Outcome.SOLVER_FAILED: BLACK,
     Outcome.REJECTED: PALE,
+    Outcome.BENT_KNEE: "#F0E442",
 }
 MARKS: Final = (
     ("rigid start", "o", (1.0, 1.0)),

@@ -21,13 +21,24 @@ CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 
 def of_rigid_walk(config: Config) -> tuple[LeftOut, ...]:
     """What the rigid model's walk does without."""
     return (
-        left_out(
+        of_stance(config),
+        *of_legs(config),
+        *of_outputs(config, "rigid", RIGID_NUMBERS),
+    )
+
+
+def of_stance(config: Config) -> LeftOut:
+    """What the rigid model's stance foot does without: a compass stands on a point, other walkers may roll."""
+    if config.walker.type == "compass":
+        return left_out(
             "floating base, stance contact and foot radius of the rigid walk",
             "its stance foot is a hinge, its feet are points",
             "4 of 8 equations, all contact code",
-        ),
-        *of_legs(config),
-        *of_outputs(config, "rigid", RIGID_NUMBERS),
+        )
+    return left_out(
+        "floating base and stance contact of the rigid walk",
+        "its stance foot turns on its point or rolls without slip",
+        "4 equations, all contact code",
     )
 
 

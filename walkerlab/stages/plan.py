@@ -180,7 +180,8 @@ class Planner:
         if self.graph[name].optional:
             command = f"{main} --full" if main else name
             return self.left_out.get(name, f"it was not asked for; `walkerlab {command}` makes it")
-        return self.left_out.get(name, f"no current result; `walkerlab {name}` makes one")
+        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; `walkerlab {name}` makes one"
+        return self.left_out.get(name, none_yet)
 
     def _why_left_out(self, stage: Stage) -> str | None:
         unsuited = why_unsuited(stage, self.config)

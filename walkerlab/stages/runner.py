@@ -327,7 +327,8 @@ class Run:
         unsettled = {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
         for stage in self.waiting:
             inputs = self.planner.inputs(stage)
-            pending = unsettled & set(stage.inputs(self.planner.config))
+            wanted = set(stage.inputs(self.planner.config))
+            pending = {name for name in unsettled & wanted if self._suits(name)}
             others = [name for name in pending if not self.planner.graph[name].draws]
             if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
                 continue
@@ -335,6 +336,10 @@ class Run:
             absent += [LeftOut(one.name, STILL_COMPUTED) for one in stages if one.name in pending]
             task = task_of(stage, self.planner.config, inputs, self.folder, jobs=1, key="", left_out=tuple(absent))
             self.reporter.drawn(task.run(Silent()).summary, self.folder.path)
+
+    def _suits(self, name: str) -> bool:
+        """Whether a stage means something under the config, and so will have a result."""
+        return why_unsuited(self.planner.graph[name], self.planner.config) is None
 
     def report(self, target: Stage, wall_s: float) -> StageReport:
         """How it went."""

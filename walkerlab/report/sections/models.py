@@ -155,13 +155,15 @@ def release_in_words(name: str, walk: Mapping[str, Any], gait_period: float) -> 
     """How far a walk with one instant of release gets, and how its last step differs from the gait's."""
     released = f"With the trailing knee released {RELEASED[name]},"
     if walk["period_s"] is None:
-        return f"{released} it takes no step ({walk['outcome']})."
+        return f"{released} the walker takes no step ({walk['outcome']})."
     last = f"the last in {quantity(walk['period_s'], 's')} ({percent(walk['period_s'], gait_period)})"
     end = end_of(walk, gait_period)
     if end == "ended":
-        return f"{released} it takes {walk['steps']} of {walk['of']} steps, {last}, and ends as {walk['outcome']}."
+        return (
+            f"{released} the walker takes {walk['steps']} of {walk['of']} steps, {last}, and ends as {walk['outcome']}."
+        )
     came = "keeps to the rigid gait" if end == "this gait" else "goes over to another gait"
-    return f"{released} it {came}: {walk['steps']} steps, {last}."
+    return f"{released} the walker {came}: {walk['steps']} steps, {last}."
 
 
 def percent(value: float, reference: float) -> str:
