@@ -22,7 +22,7 @@ from walkerlab.figures.style import CONTACT, RIGID
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"
-ELSEWHERE = {"tune", "continuation"}
+ELSEWHERE = {"tune", "continuation", "basin", "engines"}
 FIGURES = [figure for figure in ALL_FIGURES if ELSEWHERE.isdisjoint(need.stage for need in figure.needs)]
 PAPER_FIGURES = [figure for figure in FIGURES if figure.number is not None]
 NAMES = [figure.name for figure in FIGURES]
@@ -123,7 +123,7 @@ import hashlib, sys
 from synthetic_methods import everything
 from walkerlab.figures.registry import FIGURES
 for figure in FIGURES:
-    if any(need.stage in ("tune", "continuation") for need in figure.needs):
+    if any(need.stage in ("tune", "continuation", "basin", "engines") for need in figure.needs):
         continue
     drawing = figure.drawn(everything())
     print(figure.name, hashlib.sha256(drawing.svg + drawing.png).hexdigest())

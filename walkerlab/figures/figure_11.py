@@ -16,7 +16,7 @@ from walkerlab.figures.canvas import blank, legend_above
 from walkerlab.figures.figure_05 import TUNE_STAGE
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Need, Results
-from walkerlab.figures.style import BLACK, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
+from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import redoes_the_paper
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.store.content import Group
@@ -37,7 +37,7 @@ COLOURS: Final = {
     Outcome.BUDGET_EXHAUSTED: BLACK,
     Outcome.SOLVER_FAILED: BLACK,
     Outcome.REJECTED: PALE,
-    Outcome.BENT_KNEE: "#F0E442",
+    Outcome.BENT_KNEE: BLUE,
 }
 MARKS: Final = (
     ("rigid start", "o", (1.0, 1.0)),
