@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walkerlab.benchmarks import ladder
 from walkerlab.benchmarks.ladder import Climb, Row, Run, climb, finished, left_of, measure, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.stages import accuracy_ladder
 from walkerlab.stages.accuracy import best_methods, conclusion, rows_group, summary_of
 
 CONFIG = load(None, ("contact=null",)).config
@@ -86,27 +86,27 @@ def test_an_error_below_what_the_reference_is_known_to_is_marked():
 
 
 def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
-    monkeypatch.setattr(accuracy_ladder, "BUDGET", 500)
+    monkeypatch.setattr(ladder, "BUDGET", 500)
     one = climb(TRIAL, "radau5")
     rows = [row_of(one, run, reference) for run in one.runs]
     assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
     assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
     not_run = left_of(one)
-    assert len(rows) + len(not_run) == len(accuracy_ladder.OWN_LADDER)
+    assert len(rows) + len(not_run) == len(ladder.OWN_LADDER)
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
     whole = [run.result.rhs_evaluations for run in climb(TRIAL, "scipy-dop853").runs]
-    monkeypatch.setattr(accuracy_ladder, "SHORT", whole[2] - 1)
+    monkeypatch.setattr(ladder, "SHORT", whole[2] - 1)
     short = climb(TRIAL, "scipy-dop853")
     assert short.unfinished
     assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
     other = climb(TRIAL, "dop853")
     (end,), (made_good, same) = finished([TRIAL], [short, other], jobs)
     assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
-    assert len(left_of(made_good)) == len(accuracy_ladder.LIBRARY_LADDER) - 3
+    assert len(left_of(made_good)) == len(ladder.LIBRARY_LADDER) - 3
     assert same is other
     assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
 
@@ -130,10 +130,10 @@ class SlowAtFirst:
 
 def test_compiling_is_not_measured(reference, monkeypatch):
     trial = SlowAtFirst()
-    monkeypatch.setattr(accuracy_ladder.time, "perf_counter", lambda: trial.clock)
+    monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
     rows = [row_of(one, run, reference) for one in (climb(trial, "dop853"),) for run in one.runs]
-    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(accuracy_ladder.OWN_LADDER))
-    assert {row.repeats_of_wall_s for row in rows} == {accuracy_ladder.REPEATS}
+    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
+    assert {row.repeats_of_wall_s for row in rows} == {ladder.REPEATS}
 
 
 def made(method, error, wall_s):
