@@ -10,13 +10,13 @@ from walkerlab.benchmarks.ladder import Climb, Row, Run, climb, finished, left_o
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import compass, rigid_walker
 from walkerlab.stages.accuracy import best_methods, conclusion, rows_group, summary_of
 
 CONFIG = load(None, ("contact=null",)).config
 START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)
 FEW = ("dop853", "radau5", "scipy-dop853", USER_SCRIPT)
-TRIAL = RigidTrial(rigid_walker(CONFIG, CONFIG.equations), START, 3)
+TRIAL = RigidTrial(rigid_walker(CONFIG, CONFIG.equations), START, 3, compass(CONFIG, CONFIG.equations))
 LADDER = (1e-4, 1e-7, 1e-10)
 
 
