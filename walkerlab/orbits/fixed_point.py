@@ -21,9 +21,7 @@ from walkerlab.solvers.registry import finder_for
 
 RANDOM_START = "random start"
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
-# half the angle between the legs (rad) below which a 'gait' is standing too: at least, and over the cube root of the
-# slope, with which gaits grow
-SMALLEST_ANGLE, SMALLEST_SHARE = 1e-5, 0.02
+SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground is standing
 LOOKED_RESIDUAL = 1e-6  # of a random search that has come near a gait
 SAME = 1e-5  # relative distance of states below which two searches found one gait
 # ranges of random starting values: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance
@@ -147,8 +145,7 @@ class Search:
         status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
         if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
             return False
-        half_angle = abs(z[0] + self.walker.slope + self.walker.lean)
-        if half_angle < max(SMALLEST_ANGLE, SMALLEST_SHARE * float(np.cbrt(abs(self.walker.slope)))):
+        if self.walker.slope == 0.0 and abs(z[0] + self.walker.lean) < SMALLEST_ANGLE:
             return False
         for found in self.found:
             if np.abs(found.z - z).max() < SAME * np.abs(z).max():
