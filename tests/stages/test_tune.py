@@ -103,9 +103,9 @@ def test_the_page_says_that_no_start_walks():
     (told,) = found.items
     assert (told.about, told.tone) == ("Parameter adjustment", "bad")
     assert "None of 9 starts walked" in told.text
-    text = adjustment.section(results).blocks[0].text
-    assert text.startswith("No adjustment of the two initial velocities helps: none of 9 starts walked 10 steps.")
-    assert "The contact model has no gait of its own" in text
+    made = adjustment.section(results)
+    assert made.finding == "No adjustment of the two initial velocities helps: none of 9 starts walked 10 steps."
+    assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
 def test_pads_for_a_gait_that_is_not_there_have_no_answer():

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Output
 
 LeftOut = dict[str, str]
-RIGID_NUMBERS: Mapping[Output, int] = {"states": 4, "energies": 3, "forces": 2}
+RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 2}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 """How many numbers a sample each output takes, model by model."""
 
