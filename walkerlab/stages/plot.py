@@ -8,6 +8,7 @@ from pathlib import Path
 from walkerlab.config.schema import Config
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
+from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
@@ -43,12 +44,18 @@ def run(
             progress.advance()
         else:
             remove(figure, folder)
-            missing.append({"what": figure.called, "why": why})
+            if not waits_to_be_asked_for(figure, inputs):
+                missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # captions of measured run times are among them
     return Content(
         {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
     )
+
+
+def waits_to_be_asked_for(figure: Illustration, results: Mapping[str, Stored]) -> bool:
+    """Whether a figure shows what only its own command computes, and nobody has: that is not left out."""
+    return any(PIPELINE[name].on_demand and name not in results for name in figure.stages)
 
 
 def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
