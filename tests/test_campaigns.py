@@ -8,7 +8,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.report.page import render
+from walkerlab.report.page import Page, render
 from walkerlab.report.results import Results
 from walkerlab.report.sections.stability import section
 from walkerlab.stages.stability import summary_of
@@ -80,6 +80,6 @@ def test_texts_of_cases_do_not_become_markup():
     case = CaseResult("x", "own", "contact", MARKUP, ("walked",), "fell", 0, 0.0, 1, 0.1, (), (MARKUP,))
     summary = summary_of([case], [], [])
     stability = type("Stored", (), {"summary": summary, "groups": {}})()
-    page = render("title", [], [section(Results(None, {"stability": stability}))])
+    page = render(Page("title", (section(Results(None, {"stability": stability})),)))
     assert MARKUP not in page
     assert "&lt;script&gt;" in page

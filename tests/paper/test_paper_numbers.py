@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from walkerlab.paper.appendix_a import CORRECTED
+from walkerlab.mechanics.standing import Mode
+from walkerlab.paper.appendix_a import CORRECTED, assembled
 from walkerlab.paper.measured import (
     Characteristics,
     ContactModel,
@@ -207,10 +208,12 @@ def test_the_adams_start_falls_when_another_integration_says_so(study):
 
     hip.terminal = True
     start = adams_start_as_printed()
+    model = assembled(walker)
+    leg = Mode(model, model.bent)
     probe = np.zeros(4)
 
     def rate(t, y):
-        right_hand_side(walker, t, y, probe)
+        right_hand_side(leg, t, y, probe)
         return probe.copy()
 
     fall = solve_ivp(rate, (0.0, 1.0), start, "DOP853", events=hip, rtol=1e-11, atol=1e-12).t_events[0][0]
