@@ -75,14 +75,9 @@ def test_a_library_method_walks_the_same_way(name):
     assert walk.work.rhs_evaluations > 0
 
 
-def one_step_by_scipy(walker, start):
-    """Heel strike by SciPy's event finder: both feet on the slope, well after mid-swing."""
-
-    def feet(t, y):
-        return y[0] + y[1] + 2 * walker.slope if y[0] > y[1] + 0.05 else 1.0
-
-    feet.terminal, feet.direction = True, -1
-    solution = solve_ivp(
+def swing_by_scipy(walker, start, feet):
+    """The swing until the event function of the feet ends it, by SciPy's DOP853."""
+    return solve_ivp(
         lambda t, y: [y[2], y[3], *accelerations(walker, *y)],
         (0.0, 3.0),
         start,
@@ -93,6 +88,16 @@ def one_step_by_scipy(walker, start):
         max_step=0.02,
         dense_output=True,
     )
+
+
+def one_step_by_scipy(walker, start):
+    """Heel strike by SciPy's event finder: both feet on the slope, well after mid-swing."""
+
+    def feet(t, y):
+        return y[0] + y[1] + 2 * walker.slope if y[0] > y[1] + 0.05 else 1.0
+
+    feet.terminal, feet.direction = True, -1
+    solution = swing_by_scipy(walker, start, feet)
     return solution.t_events[0][0], solution.y_events[0][0], solution.sol
 
 
@@ -117,16 +122,7 @@ def test_mirrored_walker_walks_down_to_the_left():
 
     feet.terminal, feet.direction = True, 1
     start = [-value for value in start_of(ONE_DEGREE)]
-    mirrored = solve_ivp(
-        lambda t, y: [y[2], y[3], *accelerations(walker, *y)],
-        (0.0, 3.0),
-        start,
-        method="DOP853",
-        rtol=1e-13,
-        atol=1e-15,
-        events=feet,
-        max_step=0.02,
-    )
+    mirrored = swing_by_scipy(walker, start, feet)
     walk = walked(ONE_DEGREE, start_of(ONE_DEGREE), 1, 1e-12)
     assert mirrored.t_events[0][0] == pytest.approx(walk.heel_strikes[0], abs=1e-10)
     assert -np.array(impact(walker, *mirrored.y_events[0][0])) == pytest.approx(walk.after[0], abs=1e-10)
