@@ -38,7 +38,7 @@ from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import newton
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import compass, rigid_walker
 from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
@@ -133,7 +133,8 @@ def at_most(work: str, value: float, unit: str, bar: float, stretch: float) -> L
 def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
     """Ten rigid steps, and how exact they can be."""
     walker = rigid_walker(ONE_DEGREE, "corrected")
-    trial = RigidTrial(walker, (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START), STEPS)
+    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    trial = RigidTrial(walker, start, STEPS, compass(ONE_DEGREE, "corrected"))
     reference = reference_for(trial)
     ours = cheapest(trial, reference, "dop853", 1e-9, watch, LADDER)
     for name, peer, bar, stretch in (
