@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.sweeps.engines import ENGINES, Engine, Order, engine_named
+from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, Engine, Order, engine_named, one_thread_each
 from walkerlab.sweeps.fan_out import FanOut
 
 LOCAL = ENGINES["local"]
@@ -121,6 +121,7 @@ def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     with (
+        one_thread_each(),  # restores what Dask leaves in this process's environment
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -142,8 +143,10 @@ def test_dask_makes_a_cluster_of_its_own(toy):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     engine, address = engine_named("dask")
     assert address == ""
+    before = [os.environ.get(name) for name in ONE_THREAD]
     swept = toy.run("deadly", "seed=100:103:4", engine=engine, order=order(1))
     assert set(seeds(swept).values()) == {"answered"}
+    assert [os.environ.get(name) for name in ONE_THREAD] == before
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own

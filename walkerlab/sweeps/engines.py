@@ -121,15 +121,15 @@ def end_with_parent() -> None:
 def dask(order: Order) -> Iterator[Pool]:
     """Workers of a Dask cluster that runs at an address, or of one that is made on this machine."""
     distributed = extra("distributed", "dask")
-    with contextlib.ExitStack() as stack:
+    # Dask writes these into this process's environment whenever it starts a worker, also in place of one that died.
+    with one_thread_each(), contextlib.ExitStack() as stack:
         if order.address:
             client = stack.enter_context(distributed.Client(order.address))
         else:
             workers = order.workers or os.cpu_count() or 1
-            with one_thread_each():
-                cluster = distributed.LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
-                )
+            cluster = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+            )
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
         # A worker's death is dealt with chunk by chunk, here as in every engine.
