@@ -1,4 +1,4 @@
-"""The campaigns of scripts/, cut short: killed runs, runs at once, fuzzed configs, damaged results, random walkers."""
+"""The campaigns of scripts/, cut short: kills, runs at once, fuzzed configs, damage, random walkers, speed claims."""
 
 import importlib.util
 import sys
@@ -68,6 +68,15 @@ def test_two_runs_at_once_do_not_disturb_each_other(kill):
 
 def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
     assert script("gait_campaign").campaign(25, seed=1) == []
+
+
+def test_the_benchmark_compares_methods_that_are_exact_enough(monkeypatch):
+    benchmark = script("benchmark")
+    monkeypatch.setattr(benchmark, "LADDER", (1e-10, 1e-11, 1e-12))
+    against_numpy, against_ours, smallest = benchmark.rigid_lines(benchmark.Stopwatch(1, 0.0))
+    assert " x: dop853 " in against_numpy.measured
+    assert " x: dop853 " in against_ours.measured
+    assert smallest.verdict != benchmark.MISSED  # an error, not a time
 
 
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])
