@@ -176,8 +176,8 @@ class Limit:
         steps = walk.touch_time_s.size
         if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
-        y = walk.samples.states
-        motion = sampled_at_step_ends(Motion(walk.samples.time_s, y[:, 2:4], y[:, 6:8], walk.touch_time_s))
+        angle, velocity = motion_of_legs(walk.samples.states, walker)
+        motion = sampled_at_step_ends(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases[phases >= IMPACT_PHASE])
         _, raw = difference_in_time(motion, self.rigid.motion)
@@ -207,6 +207,13 @@ class Limit:
         begun = time.process_time()
         self.walk(walker, start, WALK_TOLERANCE, None)
         return time.process_time() - begun
+
+
+def motion_of_legs(states: NDArray[np.float64], walker: ContactWalker) -> tuple[NDArray[np.float64], ...]:
+    """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
+    n = len(walker.tree.arm_x)
+    upper = np.array([leg[0] for leg in walker.legs])
+    return states[:, 2 + upper], states[:, 4 + n + upper]
 
 
 def settings(tolerance: float) -> MethodSettings:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
@@ -167,8 +167,8 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
-        of_compass=True,
         has_cells=True,
+        does_without=of_adjustment,
     ),
     Stage(
         "compare",
