@@ -61,14 +61,29 @@ def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
 
 def of_adjustment(config: Config) -> tuple[LeftOut, ...]:
     """What the adjustment of another walker than the paper's compass does without."""
-    from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
-
-    if is_plain_compass(config.walker):
+    if of_the_compass(config):
         return ()
     return (
         left_out("the first step with a hinged stance foot", PAPERS, "compiling the hinged walker and two walks"),
         left_out("the paper's start of its ADAMS model", PAPERS, "a walk"),
     )
+
+
+def of_verification(config: Config) -> tuple[LeftOut, ...]:
+    """What the verification of another walker than the paper's compass does without."""
+    if of_the_compass(config):
+        return ()
+    return (
+        left_out("the named extreme cases", "they are the paper's compass's; this walker has its own", "96 cases"),
+        left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
+    )
+
+
+def of_the_compass(config: Config) -> bool:
+    """Whether the walker is the one of Appendix A."""
+    from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
+
+    return is_plain_compass(config.walker)
 
 
 def of_legs(config: Config) -> Iterator[LeftOut]:

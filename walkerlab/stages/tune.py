@@ -22,6 +22,7 @@ from walkerlab.orbits.scaled_starts import (
     Adjustment,
     Margin,
     ScaledStarts,
+    Search,
     Trial,
     margins,
     scaled_starts,
@@ -45,6 +46,8 @@ MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
 LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
 RIGID_METHOD, RIGID_RTOL, RIGID_ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
 AS_IT_STANDS = (1.0, 1.0)
+# walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
+COMPASS_CELLS, CELLS, COARSE = 61, 21, Search(step=0.05, largest=2.0)
 
 
 @dataclass(frozen=True)
@@ -132,8 +135,8 @@ class Stage:
     def findings(self, progress: Progress, jobs: int) -> Findings:
         """Procedure, margins, map, adjustment and the paper's own start."""
         settings = self.config.tune
-        swing = np.linspace(*settings.swing_factors, settings.cells)
-        stance = np.linspace(*settings.stance_factors, settings.cells)
+        cells = settings.cells or (COMPASS_CELLS if self.of_the_paper else CELLS)
+        swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
         hinge = hinged_walker(self.config, self.scene.walker) if self.of_the_paper else None
         hinged = None if hinge is None else self.walk(self.rigid_state, hinge)
@@ -141,11 +144,12 @@ class Stage:
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
         quick = self.starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * as_it_stands.evaluations))
-        cells = contact_map(quick, swing, stance, jobs, progress.advance)
+        walked = contact_map(quick, swing, stance, jobs, progress.advance)
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
-        adjustment, around = self.adjusted(as_it_stands, quick, cells)
-        found = margins(self.starts, around) if adjustment is not None else []
+        adjustment, around = self.adjusted(as_it_stands, quick, walked)
+        search = Search() if self.of_the_paper else COARSE
+        found = margins(self.starts, around, search) if adjustment is not None else []
         state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
         adjusted = None if state is None else self.walk(state)
         return Findings(
@@ -161,7 +165,7 @@ class Stage:
             as_it_stands,
             adjustment,
             found,
-            cells,
+            walked,
             rigid_cells,
             paper_start(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
             self.steps,

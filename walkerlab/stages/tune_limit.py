@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import CompassWalker
+from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion
@@ -39,7 +39,8 @@ from walkerlab.stages.simulate import leg_variables
 from walkerlab.store.content import Group, Variable
 
 FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
-GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL)
+COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
+OTHERS_EVERY = 2  # of the settings, for other walkers than the compass: their walks take several times as long
 # of each setting: name, unit, meaning, whether it is a run time
 COLUMNS = (
     ("period", "period_s", "s", "period of the contact gait"),
@@ -101,9 +102,11 @@ def limit_findings(
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
+        1 if is_plain_compass(config.walker) else OTHERS_EVERY,
     )
     walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
-    progress.start("tune: rigid limit", len(walked) + len(GAITS))
+    gaits = COMPASS_GAITS if is_plain_compass(config.walker) else GAITS
+    progress.start("tune: rigid limit", len(walked) + len(gaits))
 
     def start(walker: ContactWalker) -> State:
         return start_state(replace(scene, walker=walker), walk.start)
@@ -113,7 +116,7 @@ def limit_findings(
         walker = scene.walker if name == ALL else point_footed(config, scene.walker)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
-    for name in GAITS:
+    for name in gaits:
         found[name] = limit.series(name, scene.walker, gait)
         progress.advance()
     return LimitFindings(walked, limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
