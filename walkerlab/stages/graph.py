@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_compass, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
@@ -37,6 +37,11 @@ def gait_for_start_or_pads(config: Config) -> tuple[str, ...]:
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
+def scene_of_other_walkers(config: Config) -> tuple[str, ...]:
+    """What a walk starts from, for other walkers than the paper's compass: only these are judged in their own scene."""
+    return () if of_the_compass(config) else gait_for_start_or_pads(config)
+
+
 @dataclass(frozen=True)
 class Stage:
     """One stage of the pipeline.
@@ -49,7 +54,7 @@ class Stage:
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
-    of_compass     whether it is about the paper's compass, and left out for other walkers
+    reads_of_scene keys that it reads besides for another walker than the paper's compass
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
@@ -70,7 +75,6 @@ class Stage:
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
-    of_compass: bool = False
     draws: bool = False
     walks: bool = False
     has_cells: bool = False
@@ -83,6 +87,11 @@ class Stage:
     follows: bool = False
     does_without: Lacks = nothing
     reads_of_paper: tuple[str, ...] = ()
+    reads_of_scene: tuple[str, ...] = ()
+
+    def reads_under(self, config: Config) -> tuple[str, ...]:
+        """The keys that its result depends on under a config."""
+        return self.reads if not self.reads_of_scene or of_the_compass(config) else (*self.reads, *self.reads_of_scene)
 
     @property
     def optional(self) -> bool:
@@ -167,8 +176,8 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
-        of_compass=True,
         has_cells=True,
+        does_without=of_adjustment,
     ),
     Stage(
         "compare",
@@ -202,8 +211,10 @@ PIPELINE = Graph(
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
         reads_of_paper=PAPERS_WALK,
-        of_compass=True,
+        reads_of_scene=PAPERS_WALK,
+        inputs=scene_of_other_walkers,
         has_cells=True,
+        does_without=of_verification,
     ),
     Stage(
         "stability-maps",
