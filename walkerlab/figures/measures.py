@@ -94,7 +94,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> Upright:
     hip, sole = (0.0, length), (0.0, 0.0)
     if isinstance(walker, CompassWalker):
         mass, centre = (0.0, walker.foot_to_mass_m), (0.0, radius)
-        places = (Measure("foot_to_mass_m", walker.foot_to_mass_m, mass, sole),)
+        places: tuple[Measure, ...] = (Measure("foot_to_mass_m", walker.foot_to_mass_m, mass, sole),)
     else:
         mass = (walker.leg_mass_ahead_m, length - walker.leg_mass_below_hip_m)
         centre = (walker.foot_centre_ahead_m, radius)
