@@ -1,0 +1,216 @@
+"""Search the gaits of random walkers of every type, and hold each chosen gait's multipliers against ten steps walked.
+
+    python scripts/walker_campaign.py                         # 200 walkers of each type, some ten minutes
+    python scripts/walker_campaign.py --walkers 20 --types kneed --seed 3
+
+Every search has to end in a gait or in words. A chosen gait is walked from starts 1e-6 to either side of it along every
+coordinate of the step map (unit leg length and gravity): as long as theory keeps these walks within 1e-3 of the gait
+they go on, and the trace of what k steps did to the starts is the sum of the multipliers' k-th powers. Prints a table
+in Markdown, then what went wrong; exits 1 if anything did.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.rigid import standing
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.fixed_point import GaitSearch, SearchSettings, find_gaits
+from walkerlab.orbits.gait import Gait
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import on_section, section_of
+from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
+from walkerlab.solvers.registry import method_named
+
+Draw = np.random.Generator
+STEPS = 10
+ASIDE = 1e-6  # of starts from the gait, in units of leg length and gravity
+STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
+AGREES = 1e-4  # of traces, in parts of the derivative's size: curvature by the distance above, rounding by ASIDE
+RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
+LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
+SETTINGS = SearchSettings(random_starts=30)
+
+
+def straight_legs(draw: Draw) -> StraightLegs:
+    """Arc or point feet, the centre of mass off the leg's line."""
+    radius = float(draw.choice((0.0, draw.uniform(0.02, 0.4))))
+    return StraightLegs(
+        type="straight-legs",
+        leg_length_m=1.0,
+        leg_mass_kg=1.0,
+        leg_mass_below_hip_m=draw.uniform(0.2, 0.7),
+        leg_mass_ahead_m=draw.uniform(-0.02, 0.02),
+        leg_inertia_kg_m2=draw.uniform(0.0, 0.08),
+        hip_mass_kg=draw.uniform(0.0, 4.0),
+        foot_radius_m=radius,
+        foot_centre_ahead_m=draw.uniform(0.0, 0.03) if radius else 0.0,
+    )
+
+
+def kneed(draw: Draw) -> Kneed:
+    """Light shanks, knees around mid leg, either rule of the trailing knee."""
+    upper = draw.uniform(0.4, 0.6)
+    return Kneed(
+        type="kneed",
+        thigh={"length_m": upper, "mass_kg": 0.5, "mass_below_hip_m": upper * draw.uniform(0.3, 0.8),
+               "inertia_kg_m2": draw.uniform(0.0, 0.005)},
+        shank={"length_m": 1.0 - upper, "mass_kg": draw.uniform(0.02, 0.15),
+               "mass_below_knee_m": draw.uniform(0.1, 0.25), "inertia_kg_m2": draw.uniform(0.0, 0.001)},
+        hip_mass_kg=draw.uniform(0.2, 2.0),
+        foot_radius_m=draw.choice((0.0, draw.uniform(0.02, 0.25))),
+        knee={"at_heel_strike": "locked" if draw.random() < 0.8 else "free"},
+    )  # fmt: skip
+
+
+def torso(draw: Draw) -> CompassWalker:
+    """The compass with an upper body."""
+    return CompassWalker(
+        leg_mass_kg=5.0,
+        foot_to_mass_m=draw.uniform(0.3, 0.7),
+        hip_mass_kg=draw.uniform(0.0, 10.0),
+        torso={"mass_kg": draw.uniform(0.5, 10.0), "above_hip_m": draw.uniform(0.05, 0.5),
+               "inertia_kg_m2": draw.uniform(0.0, 0.5)},
+    )  # fmt: skip
+
+
+def parts(draw: Draw) -> PartsWalker:
+    """A kneed walker that no type describes: a particle on each shank, the soles' arcs off the legs' lines."""
+    upper, radius = draw.uniform(0.4, 0.6), draw.uniform(0.0, 0.2)
+    thigh = {"mass_kg": 0.5, "centre_m": [draw.uniform(-0.01, 0.01), -upper * draw.uniform(0.4, 0.8)]}
+    shank = {"mass_kg": draw.uniform(0.02, 0.1), "centre_m": [0.0, draw.uniform(-0.2, -0.1)]}
+    foot = {"centre_m": [draw.uniform(0.0, 0.02), radius + upper - 1.0], "radius_m": radius}
+    ankle = {"mass_kg": draw.uniform(0.0, 0.02), "at_m": [0.0, upper - 0.95]}
+    knee = {"parent_point_m": [0.0, -upper], "child_point_m": [0.0, 0.0], "locks": True}
+    hip = {"parent_point_m": [0.0, 0.0], "child_point_m": [0.0, 0.0]}
+    return PartsWalker(
+        type="parts",
+        leg_length_m=1.0,
+        bodies=[{"name": f"thigh {k}", **thigh} for k in (1, 2)] + [{"name": f"shank {k}", **shank} for k in (1, 2)],
+        hinges=[{"name": "hip", "parent": "thigh 2", "child": "thigh 1", **hip}]
+        + [{"name": f"knee {k}", "parent": f"thigh {k}", "child": f"shank {k}", **knee} for k in (1, 2)],
+        particles=[{"name": "hip", "mass_kg": draw.uniform(0.2, 2.0), "body": "thigh 2", "at_m": [0.0, 0.0]}]
+        + [{"name": f"ankle {k}", "body": f"shank {k}", **ankle} for k in (1, 2)],
+        feet=[{"body": f"shank {k}", **foot} for k in (1, 2)],
+        legs=[["thigh 1", "shank 1"], ["thigh 2", "shank 2"]],
+    )
+
+
+TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
+    "straight-legs": straight_legs,
+    "kneed": kneed,
+    "torso": torso,
+    "parts": parts,
+}
+
+
+@dataclass
+class Tally:
+    """How the searches of one type ended."""
+
+    ends: Counter[str] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+    slowest_s: float = 0.0
+    steps_seen: int = 0  # whose effect was held against the multipliers
+
+
+def tally(name: str, walkers: int, seed: int) -> Tally:
+    """Search the gaits of so many random walkers of a type."""
+    draw, found = np.random.default_rng(seed), Tally()
+    for index in range(walkers):
+        described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(-2.3, -1.0))
+        walker = standing(assembly_of(described, rigid=True), 9.81, slope, knee_locked_at_strike(described))
+        start = time.process_time()
+        search = find_gaits(walker, settings=SETTINGS)
+        # the first of a type compiles
+        spent = time.process_time() - start if index else 0.0
+        found.slowest_s = max(found.slowest_s, spent)
+        faults, steps = judged(walker, search)
+        found.steps_seen += steps
+        if spent > LONGEST_SEARCH_S:
+            faults.append(f"the search took {spent:.0f} s")
+        found.ends[end_of(search)] += 1
+        found.wrong += [f"{name} {index} at {slope:.4g} rad: {fault}" for fault in faults]
+    return found
+
+
+def end_of(search: GaitSearch) -> str:
+    """What a search came to."""
+    if search.gait is None:
+        return "only gaits that cannot be walked" if search.gaits else "no gait"
+    return "a stable gait" if search.gait.stable else "an unstable gait"
+
+
+def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
+    """What is wrong with what was found, and over how many steps the chosen gait's multipliers were seen."""
+    if search.gait is None:
+        return ([] if search.reason else ["no gait and no reason"]), 0
+    faults = [f"the chosen gait cannot be walked: {objection}" for objection in search.gait.objections]
+    steps = 0
+    for steps, (seen, expected, size) in enumerate(traces(walker, search.gait), 1):
+        if abs(seen - expected) > AGREES * max(1.0, size):
+            faults.append(f"{steps} steps do {seen:.6g} to starts aside, the multipliers {expected:.6g}")
+            break
+    if steps < STEPS and search.gait.stable and not faults:
+        faults.append(f"the stable gait is walked for {steps} steps only")
+    return faults, steps
+
+
+def traces(walker: Standing, gait: Gait) -> Iterator[tuple[float, float, float]]:
+    """For one step, two, ... ten: trace of the derivative seen, the multipliers' sum of powers, the derivative's size.
+
+    Ends where the starts' distance from the gait outgrows what is linear, or a walk ends.
+    """
+    unit, units = unit_walker(walker)
+    n = len(gait.state) // 2
+    z = section_of(unit, (*gait.state[:n], *(rate * units.time for rate in gait.state[n:])))
+    pairs = [(walked(unit, z + aside), walked(unit, z - aside)) for aside in ASIDE * np.eye(z.size)]
+    for k in range(min(len(walk) for pair in pairs for walk in pair)):
+        seen = np.array([(ahead[k] - behind[k]) / (2.0 * ASIDE) for ahead, behind in pairs])
+        size = float(np.linalg.norm(seen))
+        if size * ASIDE > STILL_LINEAR:
+            return
+        yield float(np.trace(seen)), sum(value ** (k + 1) for value in gait.multipliers).real, size
+
+
+def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
+    """Section coordinates after each of ten steps from z."""
+    method = method_named("dop853").new(len(walker.blank), RTOL, ATOL, BUDGET)
+    return [section_of(walker, y) for y in take_walk(walker, method, on_section(walker, z.tolist()), STEPS).after]
+
+
+ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked", "no gait")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the campaign; the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--walkers", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--types", nargs="+", choices=TYPES, default=list(TYPES))
+    options = parser.parse_args(arguments)
+    print(f"| type | {' | '.join(ENDS)} | steps held against multipliers | longest search | faults |")
+    print("|---" * (len(ENDS) + 4) + "|")
+    wrong: list[str] = []
+    for name in options.types:
+        found = tally(name, options.walkers, options.seed)
+        counts = " | ".join(str(found.ends[end]) for end in ENDS)
+        row = f"| `{name}` | {counts} | {found.steps_seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
+        print(row, flush=True)
+        wrong += found.wrong
+    print("\n".join(wrong))
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,322 @@
+"""A walker's measures to scale, named as the config names them: one leg upright, or every part in its own frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
+from walkerlab.figures.canvas import blank, settle, styled, svg_of
+from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
+
+AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
+Point = tuple[float, float]
+
+HEIGHT, SMALL = 4.6, 7.5
+"""Of the figure, in; of its letters, pt."""
+SMALL_ARC = 0.02
+"""Radius of a sole, in leg lengths, too small to show what belongs to its centre."""
+FAINT = "#C8C8C8"
+"""Colour of the other leg."""
+ARC = np.linspace(-0.6, 0.6, 41)
+BEHIND, BENT = -0.3, -0.75
+"""Angles (rad) of the other leg, and of its shank."""
+FIRST_LANE, LANE, LEFT = 0.24, 0.72, -0.62
+"""Where measures of height stand, one beside the other, and where masses are named; leg lengths ahead of the hip."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A length of the config, between two points at one height or above one another (m)."""
+
+    key: str
+    value: float
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A mass, what the config says of it, and where it is (m)."""
+
+    words: tuple[str, ...]
+    at: Point
+
+
+@dataclass(frozen=True)
+class Upright:
+    """One leg upright over its sole, which is at the origin; lengths in m.
+
+    joints  the leg's line from the hip down, without the sole
+    centre  of the sole's arc
+    """
+
+    joints: tuple[Point, ...]
+    centre: Point
+    radius: float
+    measures: tuple[Measure, ...]
+    masses: tuple[Mass, ...]
+    torso: Torso | None
+
+    @property
+    def length(self) -> float:
+        """Hip to sole."""
+        return self.joints[0][1]
+
+    @property
+    def line(self) -> tuple[Point, ...]:
+        """The joints, and where the leg's line meets its sole's arc."""
+        ahead, centre = self.centre
+        return (*self.joints, (0.0, centre - math.sqrt(max(0.0, self.radius**2 - ahead**2))))
+
+
+def said(key: str, value: float, unit: str = "") -> str:
+    """A key with its value, as a config has them."""
+    return f"{key}: {value:g} {unit}".rstrip()
+
+
+def weighing(prefix: str, mass_kg: float, inertia_kg_m2: float) -> tuple[str, ...]:
+    """The words of a mass, with its inertia if it has one."""
+    turning = (said(f"{prefix}inertia_kg_m2", inertia_kg_m2),) if inertia_kg_m2 else ()
+    return (said(f"{prefix}mass_kg", mass_kg), *turning)
+
+
+def upright(walker: CompassWalker | StraightLegs | Kneed) -> Upright:
+    """What is drawn of a walker of a type."""
+    if isinstance(walker, Kneed):
+        return upright_kneed(walker)
+    length, radius = walker.leg_length_m, walker.foot_radius_m
+    hip, sole = (0.0, length), (0.0, 0.0)
+    if isinstance(walker, CompassWalker):
+        mass, centre = (0.0, walker.foot_to_mass_m), (0.0, radius)
+        places: tuple[Measure, ...] = (Measure("foot_to_mass_m", walker.foot_to_mass_m, mass, sole),)
+    else:
+        mass = (walker.leg_mass_ahead_m, length - walker.leg_mass_below_hip_m)
+        centre = (walker.foot_centre_ahead_m, radius)
+        places = (
+            Measure("leg_mass_below_hip_m", walker.leg_mass_below_hip_m, hip, mass),
+            Measure("leg_mass_ahead_m", walker.leg_mass_ahead_m, (0.0, mass[1]), mass),
+            Measure("foot_centre_ahead_m", walker.foot_centre_ahead_m, (0.0, radius), centre),
+        )
+    return Upright(
+        (hip,),
+        centre,
+        radius,
+        (*places, Measure("leg_length_m", length, hip, sole), sole_radius(radius, centre)),
+        (
+            Mass(weighing("leg_", walker.leg_mass_kg, walker.leg_inertia_kg_m2), mass),
+            Mass(weighing("hip_", walker.hip_mass_kg, 0.0), hip),
+        ),
+        walker.torso,
+    )
+
+
+def upright_kneed(walker: Kneed) -> Upright:
+    """A leg of thigh and shank, in line."""
+    thigh, shank, radius = walker.thigh, walker.shank, walker.foot_radius_m
+    hip, knee, sole, centre = (0.0, walker.leg_length_m), (0.0, shank.length_m), (0.0, 0.0), (0.0, radius)
+    upper = (thigh.mass_ahead_m, hip[1] - thigh.mass_below_hip_m)
+    lower = (shank.mass_ahead_m, knee[1] - shank.mass_below_knee_m)
+    return Upright(
+        (hip, knee),
+        centre,
+        radius,
+        (
+            Measure("thigh.mass_below_hip_m", thigh.mass_below_hip_m, hip, upper),
+            Measure("shank.mass_below_knee_m", shank.mass_below_knee_m, knee, lower),
+            Measure("thigh.length_m", thigh.length_m, hip, knee),
+            Measure("shank.length_m", shank.length_m, knee, sole),
+            Measure("thigh.mass_ahead_m", thigh.mass_ahead_m, (0.0, upper[1]), upper),
+            Measure("shank.mass_ahead_m", shank.mass_ahead_m, (0.0, lower[1]), lower),
+            sole_radius(radius, centre),
+        ),
+        (
+            Mass(weighing("thigh.", thigh.mass_kg, thigh.inertia_kg_m2), upper),
+            Mass(weighing("shank.", shank.mass_kg, shank.inertia_kg_m2), lower),
+            Mass(weighing("hip_", walker.hip_mass_kg, 0.0), hip),
+        ),
+        walker.torso,
+    )
+
+
+def sole_radius(radius: float, centre: Point) -> Measure:
+    """The radius of the sole's arc."""
+    return Measure("foot_radius_m", radius, centre, (centre[0], 0.0))
+
+
+def with_torso(leg: Upright, torso: Torso) -> Upright:
+    """The leg's measures and masses with those of the torso above it."""
+    hip = leg.joints[0]
+    head = (hip[0], hip[1] + torso.above_hip_m)
+    measure = Measure("torso.above_hip_m", torso.above_hip_m, head, hip)
+    mass = Mass(weighing("torso.", torso.mass_kg, torso.inertia_kg_m2), head)
+    return Upright(leg.joints, leg.centre, leg.radius, (measure, *leg.measures), (mass, *leg.masses), torso)
+
+
+def drawn(walker: AnyWalker, name: str) -> bytes:
+    """The walker's measures as SVG; the same walker and name give the same bytes."""
+    title = f"The measures of a walker of type {walker.type}"
+    with styled():
+        figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
+        settle(figure)
+        return svg_of(figure, name, title)
+
+
+def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
+    """One leg upright with its measures, the other one pale behind it."""
+    leg = upright(walker)
+    if walker.torso is not None:
+        leg = with_torso(leg, walker.torso)
+    figure = blank(HEIGHT)
+    axes = bare(figure, leg)
+    ground(axes, leg.length)
+    other_leg(axes, leg)
+    draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
+    if leg.torso is not None:
+        axes.plot([0.0, 0.0], [leg.length, leg.length + leg.torso.above_hip_m], color=BLACK, linewidth=2.0)
+    draw_heights(axes, leg)
+    draw_sideways(axes, leg)
+    draw_masses(axes, leg)
+    return figure
+
+
+def bare(figure: Figure, leg: Upright) -> Axes:
+    """Axes of equal scales without ticks that fit the walker."""
+    top = leg.length + (0.0 if leg.torso is None else leg.torso.above_hip_m)
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_xlim(-1.15 * leg.length, 1.35 * leg.length)
+    axes.set_ylim(-0.16 * leg.length, top + 0.1 * leg.length)
+    return axes
+
+
+def ground(axes: Axes, length: float) -> None:
+    """The slope, and which way is ahead."""
+    left, right = axes.get_xlim()
+    axes.fill_between([left, right], -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
+    axes.plot([left, right], [0.0, 0.0], color=BLACK, linewidth=0.8)
+    y = -0.1 * length
+    axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
+    axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
+
+
+def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
+    """A leg's line from the hip over its knee down to its sole, and the sole's arc."""
+    axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
+    axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
+    across, up = np.subtract(line[-1], line[-2])
+    around = np.arctan2(across, -up) + ARC
+    axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
+
+
+def other_leg(axes: Axes, leg: Upright) -> None:
+    """The other leg, off the ground behind, its knee bent if it has one."""
+    line, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    for angle, above, below in zip(angles, leg.joints, leg.line[1:], strict=True):
+        line.append(turned(angle, above, below, line[-1]))
+    draw_leg(axes, line, turned(angles[-1], leg.joints[-1], leg.centre, line[-2]), leg.radius, FAINT)
+
+
+def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
+    """A point after a turn (rad) about an origin that has moved."""
+    (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
+    return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
+
+
+def draw_heights(axes: Axes, leg: Upright) -> None:
+    """Measures from a point to one below it, each in the first lane that has room."""
+    lanes: list[list[tuple[float, float]]] = []
+    heights = [one for one in leg.measures if one.start[1] != one.end[1] and one.value > SMALL_ARC * leg.length]
+    for measure in heights:
+        high, low = measure.start[1], measure.end[1]
+        free = (number for number, taken in enumerate(lanes) if all(high <= b or low >= a for a, b in taken))
+        number = next(free, len(lanes))
+        lanes[number:number] = [] if number < len(lanes) else [[]]
+        lanes[number].append((high, low))
+        x = (FIRST_LANE + number * LANE) * leg.length
+        for point in (measure.start, measure.end):
+            axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
+        axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
+        place = (x + 0.015 * leg.length, 0.5 * (high + low))
+        axes.text(*place, said(measure.key, measure.value), color=BLUE, fontsize=SMALL, va="center")
+
+
+def draw_sideways(axes: Axes, leg: Upright) -> None:
+    """Measures from the leg's line to a point ahead of it; those that are zero are left out."""
+    for measure in leg.measures:
+        if measure.start[1] != measure.end[1] or not measure.value:
+            continue
+        axes.annotate("", xy=measure.end, xytext=measure.start, arrowprops={"arrowstyle": "-", "color": VERMILLION})
+        place = (-0.03 * leg.length, measure.start[1] + 0.025 * leg.length)
+        axes.text(*place, said(measure.key, measure.value), color=VERMILLION, fontsize=SMALL, ha="right")
+
+
+def draw_masses(axes: Axes, leg: Upright) -> None:
+    """Masses with their words to the left; the sole's centre if there is room."""
+    for mass in leg.masses:
+        axes.plot(*mass.at, marker="o", markersize=8, color=GREEN, zorder=5)
+        place = (LEFT * leg.length, mass.at[1])
+        axes.plot([place[0], mass.at[0]], [mass.at[1]] * 2, color=GREEN, linewidth=0.5, zorder=1)
+        axes.text(*place, "\n".join(mass.words) + " ", color=GREEN, fontsize=SMALL, va="center", ha="right")
+    if leg.radius > SMALL_ARC * leg.length:
+        axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
+    elif leg.radius:
+        place = (LEFT * leg.length, 0.03 * leg.length)
+        axes.text(*place, said("foot_radius_m", leg.radius) + " ", color=BLUE, fontsize=SMALL, ha="right")
+
+
+def of_parts(walker: PartsWalker) -> Figure:
+    """Every body of the second leg, and those of neither, each in its own frame."""
+    shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
+    figure = blank(HEIGHT)
+    for place, body in enumerate(shown):
+        axes = figure.add_subplot(1, len(shown), place + 1)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_title(f"name: {body.name}\n" + "\n".join(weighing("", body.mass_kg, body.inertia_kg_m2)))
+        axes.set_xlabel("ahead (m)")
+        axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
+        axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
+        marks = list(marks_of(walker, body.name, body.centre_m))
+        axes.plot(*np.transpose([at for *_, at in marks]), color=BLACK, linewidth=2.0, zorder=1)
+        for number, (words, colour, marker, at) in enumerate(marks):
+            axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
+            aside = (12.0, 18.0 if number % 2 else -14.0)
+            axes.annotate(words, at, aside, textcoords="offset points", color=colour, fontsize=SMALL, va="center")
+        for foot in walker.feet:
+            if foot.body == body.name and foot.radius_m:
+                x, y = foot.centre_m
+                axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
+        axes.margins(x=0.6, y=0.25)
+        if place == 0:
+            axes.set_ylabel("up (m)")
+    return figure
+
+
+def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
+    """What a config says of points of a body: words, colour, marker and place (m)."""
+
+    def at(point: Point) -> str:
+        return f"[{point[0]:g}, {point[1]:g}]"
+
+    for hinge in walker.hinges:
+        locks = ", locks" if hinge.locks else ""
+        for role, other, point in (
+            ("parent", hinge.parent, hinge.parent_point_m),
+            ("child", hinge.child, hinge.child_point_m),
+        ):
+            if other == body:
+                yield f"{hinge.name}{locks}\n{role}_point_m: {at(point)}", BLUE, "o", point
+    yield f"centre_m: {at(centre)}", GREEN, "o", centre
+    for particle in walker.particles:
+        if particle.body == body:
+            words = f"particle {particle.name}\nat_m: {at(particle.at_m)}\n{said('mass_kg', particle.mass_kg)}"
+            yield words, VERMILLION, "D", particle.at_m
+    for foot in walker.feet:
+        if foot.body == body:
+            yield f"foot\ncentre_m: {at(foot.centre_m)}\n{said('radius_m', foot.radius_m)}", ORANGE, "s", foot.centre_m
