@@ -16,7 +16,7 @@ from walkerlab.orbits.gait import Gait, measured
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import Vector, seeds
-from walkerlab.orbits.step_map import Shooting, new_shooting, newton, variation_size
+from walkerlab.orbits.step_map import Shooting, new_shooting, newton, newton_from_each, variation_size
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 
@@ -143,13 +143,14 @@ class Search:
 
     def draw(self, generator: np.random.Generator) -> None:
         """Solve the step map from random starting values."""
-        d = len(self.walker.picked)
-        for _ in range(self.settings.random_starts):
-            z = generator.uniform(LEAST_START[:d], MOST_START[:d])
-            z[0] = 0.5 * z[0] - self.walker.slope - self.walker.lean
-            status, _, residual, _ = newton(self.looking, z, LOOKED_RESIDUAL)
-            if status == Outcome.WALKED and residual < LOOKED_RESIDUAL:
-                self.keep(z, RANDOM_START)
+        d, settings = len(self.walker.picked), self.settings
+        starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (settings.random_starts, d))
+        starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
+        residuals = np.zeros(len(starts))
+        plain = new_dop853(len(self.walker.blank), settings.rtol, settings.atol, settings.budget)
+        newton_from_each(self.looking, plain, starts, LOOKED_RESIDUAL, residuals)
+        for z in starts[residuals < LOOKED_RESIDUAL]:
+            self.keep(z, RANDOM_START)
 
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
