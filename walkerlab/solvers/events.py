@@ -40,9 +40,7 @@ def new_crossing_finder(degree: int, signals: int = 1) -> CrossingFinder:
     """A finder for `signals` signals on steps whose dense output has degree `degree`."""
     nodes, to_bernstein = sampling(degree)
     size = degree + 1
-    return CrossingFinder(
-        nodes, to_bernstein, np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2))
-    )
+    return CrossingFinder(nodes, to_bernstein, np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2)))
 
 
 @lru_cache
