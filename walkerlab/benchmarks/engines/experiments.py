@@ -26,7 +26,8 @@ from walkerlab.benchmarks.engines.runs import (
 )
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import Coulomb, friction_coefficient
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.ground.held import held_flags, no_stops
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, held_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
 from walkerlab.mechanics.tree import mass_matrix
@@ -430,7 +431,9 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     n = len(scene.chain)
     foot = scene.assembly.feet[scene.stance]
     tree = tree_about(scene.assembly, Anchor(foot.body, foot.centre_m))
-    system = Pinned(scene.ours, tree, scene.stance, 0.0, (0.0,) * (2 * n))
+    walker = scene.ours
+    held = held_flags(walker.held, held_at_start(walker, scene.stance, scene.start)[0])
+    system = Pinned(walker, tree, scene.stance, 0.0, (0.0,) * (2 * n), held, no_stops(walker.knees))
 
     def rate(t: float, y: Floats) -> Any:
         return derivative(system, t, tuple(y))
