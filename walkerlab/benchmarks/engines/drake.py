@@ -29,7 +29,7 @@ from walkerlab.benchmarks.engines.adapter import (
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
 INTEGRATORS = {
-    "semi_explicit_euler": Integrator(1, 45_000),
+    "semi_explicit_euler": Integrator(1, 25_000),
     "runge_kutta3": Integrator(3, 45_000),
     "runge_kutta3 adaptive": Integrator(3, 60_000, adapts=True),
     "discrete": Integrator(1, 45_000, for_contact_only=True),
@@ -38,7 +38,7 @@ EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
 CONTACTS = {
     "sap": "discrete",
     "lagged": "discrete",
-    "hunt-crossley": "runge_kutta3",
+    "hunt-crossley": "runge_kutta3 adaptive",
 }
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (

@@ -18,9 +18,9 @@ from walkerlab.benchmarks.engines.adapter import Contact, Floats, Forces, Integr
 from walkerlab.benchmarks.engines.planar import PlanarModel
 
 INTEGRATORS = {
-    "ExplicitEuler": Integrator(1, 90_000),
-    "RK44": Integrator(4, 90_000),
-    "TrapezoidalIndex2": Integrator(2, 45_000),
+    "ExplicitEuler": Integrator(1, 45_000),
+    "RK44": Integrator(4, 45_000),
+    "TrapezoidalIndex2": Integrator(2, 25_000),
     "DOPRI5 adaptive": Integrator(5, 60_000, adapts=True),
 }
 CONTACTS = {"sphere-triangle": "RK44", "sphere-triangle implicit": "TrapezoidalIndex2"}

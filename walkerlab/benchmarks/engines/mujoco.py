@@ -15,7 +15,7 @@ from typing import Any
 from walkerlab.benchmarks.engines.adapter import Contact, Floats, Forces, Integrator, OnStep, OwnContact, Simulation
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
-INTEGRATORS = {"Euler": Integrator(1, 200_000), "RK4": Integrator(4, 60_000)}
+INTEGRATORS = {"Euler": Integrator(1, 100_000), "RK4": Integrator(4, 100_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
     "a force that grows with a power of the penetration, or damping that does: its contact is linear",

@@ -38,7 +38,7 @@ class WalkAnswer:
     touches  (steps,) s; along: (steps,) m; slips: (steps,) m
     steps    of the engine
     time_s   when it was over
-    wall_s   time of its loop
+    wall_s   processor time of its loop: it has a process of its own, and others may be running
     """
 
     outcome: str
@@ -143,9 +143,9 @@ class Walk:
                 self.hand_over_ground(engine)
             return self.rules.outcome is None
 
-        begun = time.perf_counter()
+        begun = time.process_time()
         engine.run(task.most - self.steps, span, on_step)
-        self.wall_s += time.perf_counter() - begun
+        self.wall_s += time.process_time() - begun
 
     def hand_over_ground(self, engine: Simulation) -> None:
         """Tell the engine under which feet there is ground."""
@@ -179,9 +179,9 @@ class SwingTask:
         n = len(self.chain)
         q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])))[0].T
         engine = ENGINES[self.engine].adapter().Run(self.model, self.stepping, q, v, None)
-        begun = time.perf_counter()
+        begun = time.process_time()
         last = recorded(engine, self.most, self.until_s)[-1]
-        wall = time.perf_counter() - begun
+        wall = time.process_time() - begun
         end = np.concatenate((self.chain @ last[1] - self.slope, self.chain @ last[2]))
         return SwingAnswer(end, wall)
 
