@@ -42,7 +42,7 @@ SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  #
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
-EXACT_ENOUGH = 1e-6  # error on the same law beyond which nothing finer is run
+EXACT_ENOUGH = 1e-5  # error on the same law from which on nothing finer is run
 SETTLED = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
 LARGEST_STEP_S = 0.01  # where they are
 STARTS = (0.95, 0.99)  # of the gait's velocities
@@ -57,7 +57,7 @@ OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 ENDLESS = 100_000_000  # right-hand sides
 ENDLESS_S = 1e9
-USUAL_SHARE = 1.5  # of the walk under ADAMS's law: how long another may take
+LONGER = 2  # times as long as the walk under ADAMS's law another may take
 REPEATS = 3
 
 
@@ -327,10 +327,10 @@ def tuned(
 def own_law_rows(
     engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
 ) -> Iterator[Row]:
-    """An engine's own contact over step sizes from the gait, then from other starts at the smallest one."""
+    """An engine's own contact over step sizes from the gait, then from other starts at the finest but one."""
     name = engine.adapter().CONTACTS[contact]
     integrator = engine.adapter().INTEGRATORS[name]
-    most = integrator.most_steps
+    most = LONGER * integrator.most_steps
 
     def walk(stepping: Stepping, factor: float) -> Row:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
@@ -340,20 +340,20 @@ def own_law_rows(
         step = answer.time_s / max(1, answer.steps) if integrator.adapts else stepping.step_s
         return own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
 
-    before = stepping = None
-    for stepping in own_law_ladder(name, integrator, USUAL_SHARE * float(truth.walk.touch_time_s[-1])):
+    before, done = None, []
+    for stepping in own_law_ladder(name, integrator, float(truth.walk.touch_time_s[-1])):
         row = walk(stepping, 1.0)
         yield row
+        done.append(stepping)
         timed_out = row.outcome == Outcome.BUDGET_EXHAUSTED.label and row.why
         if timed_out or (before is not None and has_settled(before, row)):
             break
         before = row
-    if stepping is not None:
-        yield from (walk(stepping, factor) for factor in STARTS)
+    yield from (walk(stepping, factor) for stepping in done[-2:][:1] for factor in STARTS)
 
 
 def own_law_ladder(name: str, integrator: Integrator, usual_s: float) -> Iterator[Stepping]:
-    """The walks with one contact, from coarse to fine, of at most `usual_s`."""
+    """The walks with one contact, from coarse to fine, that usually take `usual_s`."""
     if integrator.adapts:
         yield from (Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES)
     else:

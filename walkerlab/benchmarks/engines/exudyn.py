@@ -29,6 +29,7 @@ CANNOT_EXPRESS = (
     "a ground that never pulls: damping acts on a foot that leaves, too, and holds the trailing foot back",
     "friction that rises as a cubic, or static above dynamic friction: it rises linearly to one coefficient",
     "an endless plane: a triangle of a kilometre stands in for it",
+    "a knee that locks: its explicit integrators take no constraints, so another model takes over there",
 )
 PLANE_M = 1000.0
 NO_ROTATION = np.eye(3)

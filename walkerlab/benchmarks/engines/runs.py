@@ -28,6 +28,7 @@ from walkerlab.hybrid.outcome import Outcome
 
 Floats = NDArray[np.float64]
 ROUNDING = 1e-9
+MANY = 10_000_000  # steps
 
 
 @dataclass(frozen=True)
@@ -252,11 +253,12 @@ class Bench:
         model = PlanarModel(
             (link,), UPRIGHT, (Ball(0, (0.0, 0.0), radius, ground),), along * target.gravity, target.gravity
         )
-        stepping = Stepping(self.adapter.CONTACTS[self.own.model], h)
+        name = self.adapter.CONTACTS[self.own.model]
+        stepping = Stepping(name, h, ROUNDING if self.adapter.INTEGRATORS[name].adapts else None)
         engine = self.adapter.Run(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
-        return Motion(recorded(engine, steps, steps * h))
+        return Motion(recorded(engine, MANY, steps * h))
 
     @property
     def settling_s(self) -> float:
