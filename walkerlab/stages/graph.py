@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,13 @@ def scene_of_other_walkers(config: Config) -> tuple[str, ...]:
     return () if of_the_compass(config) else gait_for_start_or_pads(config)
 
 
+def engines_installed() -> Mapping[str, str]:
+    """The engines that are installed, with their versions."""
+    from walkerlab.benchmarks.engines.registry import installed
+
+    return {engine.name: engine.version for engine in installed()}
+
+
 @dataclass(frozen=True)
 class Stage:
     """One stage of the pipeline.
@@ -50,6 +57,7 @@ class Stage:
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
     reads          keys of the config that its result depends on; it is shown no others
+    programs       the versions of other programs that its result depends on, by name
     reads_of_paper keys of the built-in paper config on which its own cases stand
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
@@ -88,6 +96,7 @@ class Stage:
     does_without: Lacks = nothing
     reads_of_paper: tuple[str, ...] = ()
     reads_of_scene: tuple[str, ...] = ()
+    programs: Callable[[], Mapping[str, str]] | None = None
 
     def reads_under(self, config: Config) -> tuple[str, ...]:
         """The keys that its result depends on under a config."""
@@ -203,7 +212,9 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         needs_contact=True,
+        has_cells=True,
         on_demand=True,
+        programs=engines_installed,
     ),
     Stage(
         "stability",

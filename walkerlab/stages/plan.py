@@ -215,9 +215,16 @@ class Planner:
 
 
 def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
-    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on."""
+    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on.
+
+    And, as `programs`, the versions of other programs that it drives.
+    """
     own = slice_of(config, stage.reads_under(config))
-    return own | {"paper": slice_of(paper_config(), stage.reads_of_paper)} if stage.reads_of_paper else own
+    if stage.reads_of_paper:
+        own["paper"] = slice_of(paper_config(), stage.reads_of_paper)
+    if stage.programs is not None:
+        own["programs"] = dict(stage.programs())
+    return own
 
 
 def input_digest(stage: Stage, result: Stored) -> str:
