@@ -12,13 +12,17 @@ from walkerlab.mechanics.standing import STANCE, kinetic_energy
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.known_problems import known_of, known_row
+from walkerlab.stages.plan import config_slice
 from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.cells import CaseCell
+from walkerlab.verification.known import Known
 from walkerlab.verification.rigid_momentum import RigidMasses
 from walkerlab.verification.scaling import Scale, scaled, to_twin
 from walkerlab.verification.scene_catalogue import ENDS, STOPS, scene_cases
 
+RIGHT = Known("ball", "time, s", 1.0, 1.5, "closed form", 1e-6, "tolerance", 0.1)
 OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
 GAIT = {"state": [-0.2889854602533978, 0.18818546025339777, -0.2889854602533978,
                   -0.05714810633751748, -1.1095873311765583, -0.05714810633751748],
@@ -133,9 +137,16 @@ def numbers_of(block):
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 
 
+def test_known_problems_are_answered_once_for_all_scenes():
+    stage = PIPELINE["known-problems"]
+    kneed, paper = config_of("kneed"), config_of("paper")
+    assert config_slice(kneed, stage) == config_slice(paper, stage) == {}
+    assert known_of(known_row(RIGHT)) == RIGHT
+
+
 def test_only_other_walkers_read_their_scene():
     stage = PIPELINE["stability"]
     assert stage.reads_under(config_of("slope-3deg")) == ("stability.cases",)
     assert {"walker", "contact", "solver"} <= set(stage.reads_under(config_of("kneed")))
-    assert stage.inputs(config_of("slope-3deg")) == ()
-    assert stage.inputs(config_of("kneed")) == ("fixedpoint",)
+    assert stage.inputs(config_of("slope-3deg")) == ("known-problems",)
+    assert stage.inputs(config_of("kneed")) == ("known-problems", "fixedpoint")
