@@ -85,7 +85,7 @@ def second_end(trial: Trial) -> End:
 
     Raises WalkEndsError if it has not.
     """
-    by_taylor = isinstance(trial, RigidTrial) and taylor_reference.is_installed()
+    by_taylor = isinstance(trial, RigidTrial) and trial.compass is not None and taylor_reference.is_installed()
     return tightest(trial, "dop853" if by_taylor else "radau5")
 
 
