@@ -3,9 +3,9 @@
     python scripts/knee_stop.py             # the built-in kneed walker
     python scripts/knee_stop.py my.yaml --steps 40
 
-Walks the contact model from the rigid gait, once with the ideal lock and then with stops of ever larger stiffness, whose
-damping grows as its root, so that the damping ratio stays. Compares the last steps' periods and how long into them the
-knee locked. Prints a table in Markdown.
+Walks the contact model from the rigid gait, once with the ideal lock and then with stops of ever larger stiffness,
+whose damping grows as its root, so that the damping ratio stays. Compares the last steps' periods and how long into
+them the knee locked. Prints a table in Markdown.
 """
 
 from __future__ import annotations

@@ -70,6 +70,14 @@ def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
     assert script("gait_campaign").campaign(25, seed=1) == []
 
 
+@pytest.mark.parametrize("name", ["straight-legs", "kneed", "torso"])
+def test_gaits_of_random_walkers_repeat_themselves_and_forget_as_their_multipliers_say(name):
+    found = script("walker_campaign").tally(name, 4, seed=1)
+    assert found.wrong == []
+    assert found.steps_seen > 0
+    assert sum(found.ends.values()) == 4
+
+
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])
 def test_a_name_cannot_lead_out_of_the_runs_folder(name):
     with pytest.raises(ConfigError):
