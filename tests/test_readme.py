@@ -30,7 +30,7 @@ def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
 
 def test_the_check_runs_the_second_command_to_the_letter():
     assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
-    assert 'part 2700 "README: test" bash -euc "$readme_test"' in CHECK
+    assert 'part 1500 "README: test" bash -euc "$readme_test"' in CHECK
 
 
 def test_the_check_names_no_place_to_install_from():
@@ -38,8 +38,10 @@ def test_the_check_names_no_place_to_install_from():
 
 
 def test_versions_agree():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["version"] == walkerlab.__version__
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert pyproject["project"]["dynamic"] == ["version"]
+    assert pyproject["tool"]["hatch"]["version"]["path"] == "walkerlab/__init__.py"
+    assert f"\nversion: {walkerlab.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"## {walkerlab.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 

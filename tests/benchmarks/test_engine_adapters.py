@@ -1,10 +1,11 @@
 """Every engine that is installed: its swing converges to ours, its contact carries what it should, our law is ours."""
 
 import importlib
+from functools import cache
 
 import numpy as np
 import pytest
-from engine_scenes import compass
+from engine_scenes import compass, kneed
 
 from walkerlab.benchmarks.engines.adapter import Stepping
 from walkerlab.benchmarks.engines.experiments import STARTS, swing_truth, target_of, walked
@@ -21,22 +22,28 @@ def engine(request):
     return entry
 
 
-def swing(engine, integrator, step_s, tolerance=None):
-    scene = compass()
-    model, chain = pinned_model(scene)
-    start = np.array((*scene.start[2:4], *scene.start[6:]))
+@cache
+def free_swing(walker):
+    scene = walker()
+    n = len(scene.chain)
+    start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
+    return scene, start, *swing_truth(scene, start, SWING_S)
+
+
+def swing(engine, integrator, step_s, tolerance=None, walker=compass):
+    scene, start, truth, energy = free_swing(walker)
     stepping = Stepping(integrator, step_s, tolerance)
-    task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, 10_000)
-    truth, energy = swing_truth(scene, start, SWING_S)
+    task = SwingTask(engine.name, stepping, *pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000)
     end = task.run().end
     return float(np.max(np.abs(end - truth))), abs(energy(end) - energy(start))
 
 
-def test_swings_converge_to_ours_with_the_order_that_is_promised(engine):
+@pytest.mark.parametrize("walker", [compass, kneed])
+def test_swings_converge_to_ours_with_the_order_that_is_promised(engine, walker):
     for name, entry in engine.adapter().INTEGRATORS.items():
         if entry.adapts:
             continue
-        coarse, fine = (swing(engine, name, h)[0] for h in (COARSE_S, 0.5 * COARSE_S))
+        coarse, fine = (swing(engine, name, h, walker=walker)[0] for h in (COARSE_S, 0.5 * COARSE_S))
         assert np.log2(coarse / fine) == pytest.approx(entry.order, abs=0.2), name
 
 
@@ -53,6 +60,35 @@ def test_a_ball_rests_where_the_law_has_it(engine):
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         depth = Bench(task, engine.adapter().tuned(contact, target)).at_rest()
         assert depth == pytest.approx(target.penetration, rel=2e-3), contact
+
+
+def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
+    """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
+    target = target_of(compass())
+    for contact in engine.adapter().CONTACTS:
+        task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
+        bench = Bench(task, engine.adapter().tuned(contact, target))
+        if contact == "sap":
+            assert bench.creep(target.penetration) < 1e-3 * target.creep_velocity
+            continue
+        assert bench.creep(target.penetration) == pytest.approx(target.creep_velocity, rel=1e-3), contact
+        if engine.name != "mujoco":
+            assert bench.friction(target.penetration) == pytest.approx(target.friction, rel=1e-2), contact
+
+
+def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
+    """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
+    scene = kneed()
+    until = 0.45
+    truth = walked(scene, "radau5", 1e-10, 1, until)
+    name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
+    stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
+    answer = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run()
+    assert answer.outcome == "walked"
+    assert truth.knee_strike_s[0] < until < truth.touch_time_s[0]
+    shank, thigh = (scene.assembly.index(body) for body in ("shank 1", "thigh 1"))
+    assert answer.end[2 + shank] == answer.end[2 + thigh]
+    assert answer.end == pytest.approx(truth.samples.states[1], abs=2e-5)
 
 
 def test_our_law_in_an_engine_is_our_walk(engine):

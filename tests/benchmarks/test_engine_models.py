@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from engine_scenes import compass
+from engine_scenes import compass, kneed
 
 from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of, walked
 from walkerlab.benchmarks.engines.follow import crossing, follower
 from walkerlab.benchmarks.engines.runs import pinned_model
+from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.hybrid.outcome import Outcome
 
@@ -34,6 +35,63 @@ def test_the_whole_mass_goes_over_with_its_centre(scene):
     # 10 kg at the hip and 5 kg half a metre below it
     assert hip_leg.centre_m == pytest.approx((0.0, -0.5 * 5.0 / 15.0))
     assert hip_leg.inertia_kg_m2 == pytest.approx(5.0 * 10.0 / 15.0 * 0.25)
+
+
+def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
+    scene = kneed()
+    stance, *swing = scene.model.links
+    assert [link.name for link in swing] == ["thigh 1", "shank 1"]
+    assert scene.knee_places == (4, -1)
+    # hip 0.5 kg, thigh 0.5 kg 0.325 m and shank 0.05 kg 0.625 m below the hip
+    centre = -(0.5 * 0.325 + 0.05 * 0.625) / 1.05
+    about_hip = 0.5 * 0.325**2 + 0.05 * 0.625**2
+    assert stance.mass_kg == pytest.approx(1.05)
+    assert stance.centre_m == pytest.approx((0.0, centre))
+    assert stance.inertia_kg_m2 == pytest.approx(about_hip - 1.05 * centre**2)
+    assert scene.model.balls[1].centre_m[1] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("held", [(0, 0, 0, 0), (0, 0, 1, 0), (0, 0, 1, 1)])
+def test_coordinates_of_a_kneed_walker_lead_to_an_engine_and_back(held):
+    scene = kneed().with_knees_locked(np.array(held, np.int8))
+    y = np.array(scene.start)
+    for knee in scene.locked:
+        shank, thigh = (scene.assembly.index(body) for body in (knee.shank, knee.thigh))
+        for first in (2, 8):
+            y[first + shank] = y[first + thigh]
+    q, v = scene.from_base(tuple(y))
+    assert len(q) == scene.model.size == 6 - len(scene.locked)
+    assert scene.about_centre(q, v) == pytest.approx(y, abs=1e-14)
+
+
+def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
+    scene = kneed()
+    result, samples = our_samples(scene, 1e-4, 2)
+    rules = follower(scene, 2, *scene.from_base(scene.start))
+    turned = []
+    for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
+        q, v = rules.scene.from_base(tuple(y))
+        rules.follow(float(time_s), q, v)
+        if rules.turn is not None:
+            turned.append((float(time_s), rules.scene.knee_places))
+            rules.watches = False
+            rules.follow(float(time_s), q, v)
+            rules.watches = True
+            rules.turn_knee(q, v)
+    # before each: the swing knee that locks, then the trailing one that is released
+    assert [places for _, places in turned] == [(4, -1), (-1, -1), (-1, 4)]
+    assert turned[0][0] == pytest.approx(result.knee_strike_s[0], abs=1e-4)
+    assert 0.0 < turned[1][0] - result.touch_time_s[0] < 2e-3
+    assert turned[2][0] == pytest.approx(result.knee_strike_s[1], abs=1e-4)
+    # the ground stops the foot, at about 2000 m/s^2 from 0.4 m/s, within the step that the cubic spans
+    assert rules.ledger.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
+
+
+def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
+    with pytest.raises(ConfigError, match="compliant stop"):
+        kneed("walker.knee={lock: compliant}")
+    with pytest.raises(ConfigError, match="torso"):
+        kneed("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}")
 
 
 def test_a_hinged_walker_hangs_from_its_stance_foot(scene):

@@ -57,6 +57,20 @@ def families(curves=True):
             "second": Variable(np.array([5.0, 10.0, 20.0]), ("point",), "1", "walker.hip_mass_kg"),
         }
         groups["rigid/curve_0"] = Group(plane, {"kind": "flip", "period": 1})
+        groups["curves"] = Group(
+            {
+                "model": Variable(np.array(["rigid"]), ("curve",), "", "model"),
+                "kind": Variable(np.array(["flip"]), ("curve",), "", "kind"),
+                "period": Variable(np.array([1]), ("curve",), "1", "period"),
+            }
+        )
+        groups["rigid/regions"] = Group(
+            {
+                "value": Variable(np.array([3.0, 4.0, 5.0]), ("first",), "deg", "slope_deg"),
+                "second": Variable(np.array([5.0, 15.0]), ("second",), "1", "walker.hip_mass_kg"),
+                "period": Variable(np.array([[1, 1], [1, 2], [0, -1]]), ("first", "second"), "1", "period"),
+            }
+        )
     summary = {
         "over": "slope_deg",
         "unit": "deg",

@@ -52,3 +52,11 @@ def test_the_captions_say_where_gaits_change():
     assert "first doubles its period at 4 deg" in figure_13.FIGURE.caption(results)
     assert "a flip at 4" in figure_14.FIGURE.caption(results)
     assert figure_16.FIGURE.caption(results).startswith("Curves of flips of the rigid model's gaits")
+
+
+def test_the_plane_is_shaded_by_what_walks_settle_on():
+    regions = families()["continuation"]["rigid/regions"]
+    kinds = {name: where.sum() for _, name, where in figure_16.region_kinds(regions)}
+    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "none goes on": 1}
+    assert "1 step in 50 %" in figure_16.FIGURE.caption(families())
+    assert len(plotted(figure_16.FIGURE).axes[0].collections) == 1

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from printed_compass import released_mass_matrix
 
 from walkerlab.ground.compliant import CompassParts, compass_assembly, contact_walker, pinned_walker
 from walkerlab.ground.friction import Frictionless
@@ -46,15 +47,7 @@ def printed_released(parts, theta_1, theta_2, w_1, w_2, g):
     L, a, m, M_H = parts.leg_length_m, parts.foot_to_mass_m, parts.leg_mass_kg, parts.hip_mass_kg
     b, K = L - a, L * m + a * m + L * M_H
     s_1, c_1, s_2, c_2 = math.sin(theta_1), math.cos(theta_1), math.sin(theta_2), math.cos(theta_2)
-    coupling = -m * L * b * math.cos(theta_2 - theta_1)
-    D = np.array(
-        [
-            [m * b**2, coupling, b * m * c_1, b * m * s_1],
-            [coupling, L**2 * M_H + L**2 * m + a**2 * m, -c_2 * K, -s_2 * K],
-            [b * m * c_1, -c_2 * K, M_H + 2 * m, 0.0],
-            [b * m * s_1, -s_2 * K, 0.0, M_H + 2 * m],
-        ]
-    )
+    D = released_mass_matrix(L, a, m, M_H, theta_1, theta_2)
     sin_12 = math.sin(theta_1 - theta_2)
     C = np.array(
         [

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import EVENTS
-from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, choice
+from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, branches, choice
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.slope_branch import Branch
@@ -122,14 +122,14 @@ def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
     search = Search(assembled(PAPER), SearchSettings())
     work = []
     branch = Branch(search.looking, seeds(search.walker)[0])
-    correct = branch._correct
+    correct = branch._corrected
 
-    def counted(s):
-        found = correct(s)
+    def counted(points, s):
+        found = correct(points, s)
         work.append(int(search.looking.method.counts[RHS]))
         return found
 
-    branch._correct = counted
+    branch._corrected = counted
     assert branch.follow(search.walker.slope).z is not None
     assert len(work) <= 8
     # one step of walking takes about 200 right-hand sides
@@ -274,3 +274,15 @@ def test_newton_stops_when_only_rounding_is_left():
     *_, residual, evaluations = newton(shooting(PAPER), np.array([0.168, -0.61, -0.86]), 0.0)
     assert residual < 1e-14
     assert evaluations <= 8
+
+
+def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
+    def starts_from_seeds(degrees):
+        search = Search(assembled(on_slope(degrees)), SearchSettings())
+        search.follow_seeds()
+        return [found.z.tolist() for found in search.found], search.lost
+
+    branches.cache_clear()
+    after_others = [starts_from_seeds(degrees) for degrees in (4.0, 0.3, 7.0, 2.0)][-1]
+    branches.cache_clear()
+    assert starts_from_seeds(2.0) == after_others

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from printed_compass import released_mass_matrix
 
 from walkerlab.paper.appendix_a import (
     CORRECTED,
@@ -39,18 +40,8 @@ def at_heel_strike(walker, half_angle):
 def printed_system(walker, theta_1, theta_2, w_1, w_2, foot_row_2):
     """(A.57) with D_e from (A.9) to (A.24) and E from (A.56); unknowns (dq_e+, F)."""
     L, a, m, M_H = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
-    b, K = L - a, L * m + a * m + L * M_H
-    s_1, c_1, s_2, c_2 = math.sin(theta_1), math.cos(theta_1), math.sin(theta_2), math.cos(theta_2)
-    coupling = -m * L * b * math.cos(theta_2 - theta_1)
-    D_e = np.array(
-        [
-            [m * b**2, coupling, b * m * c_1, b * m * s_1],
-            [coupling, L**2 * M_H + L**2 * m + a**2 * m, -c_2 * K, -s_2 * K],
-            [b * m * c_1, -c_2 * K, M_H + 2 * m, 0.0],
-            [b * m * s_1, -s_2 * K, 0.0, M_H + 2 * m],
-        ]
-    )
-    E = np.array([[L * c_1, -L * c_2, 1.0, 0.0], foot_row_2])
+    D_e = released_mass_matrix(L, a, m, M_H, theta_1, theta_2)
+    E = np.array([[L * math.cos(theta_1), -L * math.cos(theta_2), 1.0, 0.0], foot_row_2])
     system = np.block([[D_e, -E.T], [E, np.zeros((2, 2))]])
     right = np.concatenate((D_e @ [w_1, w_2, 0.0, 0.0], [0.0, 0.0]))
     return np.linalg.solve(system, right)

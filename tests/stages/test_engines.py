@@ -1,18 +1,24 @@
 """The stage that walks in other engines: what is told of rows, and of engines that are not there."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
+from walkerlab.benchmarks.engines import registry
+from walkerlab.benchmarks.engines.experiments import TOLERANCES, same_law_rows
+from walkerlab.benchmarks.engines.process import Lost
 from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.stages import engines
 from walkerlab.stages.engines import closest, column, ratios, three_digits
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.plan import config_slice
 from walkerlab.stages.progress import Silent
+from walkerlab.store.key import differences
 
 ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")
 
@@ -29,6 +35,40 @@ def test_without_any_engine_there_is_no_answer_but_the_extra(monkeypatch):
     with pytest.raises(NoAnswer) as caught:
         engines.run(load().config, {}, Silent())
     assert "walkerlab[engines]" in caught.value.advice
+
+
+def test_another_version_of_an_engine_makes_another_key(monkeypatch):
+    config = load().config
+    monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
+    monkeypatch.setattr(Engine, "version", "1.0")
+    before = config_slice(config, PIPELINE["engines"])
+    monkeypatch.setattr(Engine, "version", "1.1")
+    after = config_slice(config, PIPELINE["engines"])
+    assert list(differences("", before, after)) == ["programs.absent 1.0 -> 1.1"]
+
+
+@dataclass
+class LosesEverything:
+    lost: Lost
+    asked: int = 0
+
+    def do(self, _task, _timeout_s):
+        self.asked += 1
+        return self.lost
+
+
+@pytest.mark.parametrize(
+    ("lost", "outcome", "rungs"),
+    [(Lost("the engine's process ended with code -11"), "solver-failed", 8), (Lost("", True), "budget-exhausted", 1)],
+    ids=["crash", "time-out"],
+)
+def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):
+    (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    engine = replace(ABSENT, name="exudyn")
+    process = LosesEverything(lost)
+    rows = [one for one in same_law_rows(engine, "1.0", scene, truth(), process) if one.integrator == "DOPRI5 adaptive"]
+    assert len(rows) == min(rungs, len(TOLERANCES))
+    assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.why, None)}
 
 
 def test_every_engine_has_an_adapter_with_one_signature():

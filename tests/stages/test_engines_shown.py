@@ -12,7 +12,7 @@ from walkerlab.report.blocks import Findings, Table
 from walkerlab.report.results import Results
 from walkerlab.report.sections.engines import section
 
-ERRORS, PERIODS = FIGURES
+ERRORS, PERIODS = FIGURES[:2]
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,14 @@ def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
 def test_a_run_without_the_stage_has_neither_figure_nor_section():
     assert ERRORS.why_left_out({}, {}) is not None
     assert section(Results(load().config, {})) is None
+
+
+def test_a_scene_that_was_not_walked_has_no_figure(results):
+    assert [figure.why_left_out(results, {}) for figure in FIGURES] == [
+        None,
+        None,
+        *["engines: it did not walk the scene kneed"] * 2,
+    ]
 
 
 def test_conclusions_come_first_in_the_section(made):

@@ -8,6 +8,7 @@ import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.store import provenance
+from walkerlab.store.commit import FILE, IN_METADATA, commit_of_source
 
 
 def test_versions_are_those_of_the_libraries_that_are_imported():
@@ -55,3 +56,22 @@ def test_an_installed_package_inside_somebodys_repository_has_no_commit(tmp_path
     installed = tmp_path / "site-packages" / "walkerlab" / "__init__.py"
     monkeypatch.setattr(walkerlab, "__file__", str(installed))
     assert provenance.git_commit() is None
+
+
+def test_an_installed_package_knows_the_commit_that_it_was_built_from(tmp_path, monkeypatch):
+    package = tmp_path / "walkerlab"
+    metadata = tmp_path / "walkerlab-0.1.0.dist-info"
+    (metadata / IN_METADATA).parent.mkdir(parents=True)
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: walkerlab\nVersion: 0.1.0\n")
+    (metadata / IN_METADATA).write_text("abc123\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(walkerlab, "__file__", str(package / "__init__.py"))
+    assert provenance.git_commit() == "abc123"
+    monkeypatch.setattr(walkerlab, "__file__", str(tmp_path / "elsewhere" / "walkerlab" / "__init__.py"))
+    assert provenance.git_commit() is None
+
+
+def test_a_source_distribution_carries_the_commit_to_its_build(tmp_path):
+    assert commit_of_source(tmp_path) is None
+    (tmp_path / FILE).write_text("abc123\n")
+    assert commit_of_source(tmp_path) == "abc123"

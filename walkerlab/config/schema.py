@@ -159,15 +159,16 @@ class Tune(Block):
     """Which starts the adjustment of the two initial angular velocities looks at."""
 
     cells: Annotated[
-        int,
+        int | None,
         key(
             "1",
             "cells of the map along each of its axes, the factors on the two velocities",
             "this project",
+            default="61; 21 for other walkers than the paper's compass",
             ge=2,
             le=501,
         ),
-    ] = 61
+    ] = None
     swing_factors: Annotated[
         Factors,
         key(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -177,9 +177,23 @@ def caption_periods(scene: str, results: Results) -> str:
     return f"{scene}: {results[STAGE].summary['conclusions'][scene][OWN_LAW]}{missed}"
 
 
+@dataclass(frozen=True)
+class SceneNeed(Need):
+    """Rows of one scene."""
+
+    scene: str = ""
+
+    def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
+        """Why the need is not met, in words; None if it is."""
+        missing = super().missing_in(results, absent)
+        if missing is None and self.scene not in results[self.stage].summary["reference"]:
+            return f"{self.stage}: {self.or_else}"
+        return missing
+
+
 def figures_for(scene: str) -> tuple[Illustration, Illustration]:
     """The figures of one scene."""
-    need = Need(STAGE, GROUP, VARIABLES, f"it did not walk the scene {scene}")
+    need = SceneNeed(STAGE, GROUP, VARIABLES, f"it did not walk the scene {scene}", scene)
     return (
         Illustration(
             f"engines-errors-{scene}",
@@ -198,4 +212,4 @@ def figures_for(scene: str) -> tuple[Illustration, Illustration]:
     )
 
 
-FIGURES = figures_for("compass")
+FIGURES = (*figures_for("compass"), *figures_for("kneed"))

@@ -32,6 +32,13 @@ def walks(results: Results) -> list[Walk]:
     return [walk_from(result, "rigid_start", RIGID, "walked"), walk_from(result, "adjusted", CONTACT, outcome)]
 
 
+def links(results: Results) -> tuple[str, str]:
+    """What to call the legs: as the paper does if the walker is its compass, else by what they do first."""
+    if "paper_start" in results[TUNE_STAGE].summary:
+        return "link 1", "link 2"
+    return "the leg that swings first", "the leg that stands first"
+
+
 def plot(results: Results) -> Figure:
     """A row for each link."""
     drawn, _ = shown(walks(results))
@@ -40,7 +47,7 @@ def plot(results: Results) -> Figure:
         for walk in drawn:
             line(one, walk.time, walk["velocity"][:, leg], walk.look)
         one.set_ylabel("velocity (rad/s)")
-        one.set_title(f"({'ab'[leg]}) angular velocity of link {leg + 1}")
+        one.set_title(f"({'ab'[leg]}) angular velocity of {links(results)[leg]}")
     legend(figure, drawn)
     return figure
 
@@ -54,8 +61,9 @@ def caption(results: Results) -> str:
         if not found["needed"]
         else f"the rigid start with velocities scaled by {found['scale_dtheta1']:.4g} and {found['scale_dtheta2']:.4g}"
     )
+    legs = "links" if "paper_start" in results[TUNE_STAGE].summary else "legs"
     walked = f"and walks {found['walked_steps']} steps"
-    return f"Angular velocities of both links{extent}; the contact model begins at {start}, {walked}."
+    return f"Angular velocities of both {legs}{extent}; the contact model begins at {start}, {walked}."
 
 
 SEEN = (

@@ -54,11 +54,13 @@ def plot(results: Results) -> Figure:
     figure = blank(3.9)
     both = figure.subplots(1, 2, sharex=True, sharey=True)
     seen: set[Outcome] = set()
+    of_the_compass = "paper_start" in results[TUNE_STAGE].summary
+    swing, stance = ("link 1", "link 2") if of_the_compass else ("the swing leg", "the stance leg")
     for axes, (outcome, steps, title) in zip(both, MODELS, strict=True):
         seen |= draw_map(axes, cells, outcome, steps)
         axes.set_title(title)
-        axes.set_xlabel("factor on the velocity of link 1")
-    both[0].set_ylabel("factor on the velocity of link 2")
+        axes.set_xlabel(f"factor on the velocity of {swing}")
+    both[0].set_ylabel(f"factor on the velocity of {stance}")
     marks = [mark for axes in both for mark in draw_marks(axes, cells)]
     unique = {str(mark.get_label()): mark for mark in marks}
     patches: list[Artist] = [Patch(facecolor=COLOURS[one], edgecolor="none", label=one.label) for one in sorted(seen)]

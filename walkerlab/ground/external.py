@@ -1,7 +1,7 @@
 """The ground's forces for a program that integrates the walker itself, in that program's own coordinates.
 
-Coordinates: where a point of the base body is, along the slope and over it (m), then one angle a body, each measured
-from the body that it is hinged to (rad); the base's from the slope's normal. Forces are generalised in the same order.
+Coordinates: where a point of the base body is, along the slope and over it (m), then one angle a link, each measured
+from the link that it is hinged to (rad); the base's from the slope's normal. Forces are generalised in the same order.
 """
 
 from typing import Any
@@ -43,13 +43,13 @@ def from_arrays(levers: Any, numbers: Any, friction: Any, state: State, angles: 
 
 @inlined
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: State, n: int) -> State:
-    """The state in absolute angles; `chain` (n, n) holds a one where an angle is a sum over a joint."""
+    """The state in absolute angles; `chain` (n, links) holds a one where an angle is a sum over a joint."""
     for i in range(2):
         y = put(y, i, q[i])
         y = put(y, 2 + n + i, v[i])
     for k in range(n):
         angle, rate = -slope, 0.0
-        for j in range(n):
+        for j in range(chain.shape[1]):
             angle += chain[k, j] * q[2 + j]
             rate += chain[k, j] * v[2 + j]
         y = put(y, 2 + k, angle)
@@ -71,13 +71,13 @@ def feet_and_forces(
     feet: Any,
     forces: Any,
 ) -> None:
-    """How both feet move into feet (2, 4) and, unless that is empty, the ground's forces into forces (2 + n).
+    """How both feet move into feet (2, 4) and, unless that is empty, the ground's forces into forces (2 + links).
 
     levers ...  of `in_arrays`, of a walker whose feet's levers are from the base's point
     state       zeros, as many as the state has; angles: as many as there are bodies
-    chain       (n, n) which joints lie between the base and each body
+    chain       (n, links) which joints lie between the base and each body; bodies that move as one share theirs
     carried     (2,) whether there is ground under each foot
-    q, v        (2 + n) coordinates and velocities of the other program
+    q, v        (2 + links) coordinates and velocities of the other program
     feet        along (m), height (m), slip (m/s), velocity of the height (m/s)
     """
     n = len(angles)
@@ -92,7 +92,7 @@ def feet_and_forces(
         return
     wrench = all_wrenches(OnGround(walker, (carried[0] != 0, carried[1] != 0)), s, c, y)
     forces[0], forces[1] = wrench[0], wrench[1]
-    for j in range(n):
+    for j in range(chain.shape[1]):
         total = 0.0
         for k in range(n):
             total += chain[k, j] * wrench[2][k]

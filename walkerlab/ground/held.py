@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import Tree
-from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.tuples import Vector, factored, put, solve_factored, solve_symmetric
 from walkerlab.solvers.system import State
 
 # what a knee is doing
@@ -174,11 +174,11 @@ def divide_by_held_mass(held: Any, flags: Flags, tree: Tree, M: Vector, J: Any) 
     """Torques' derivatives, the last n rows of J, become those of angular accelerations."""
     size, column = J.shape[0], tree.arm_x
     n = len(column)
-    fewer = gathered_matrix(held, flags, M)
+    factors = factored(gathered_matrix(held, flags, M), n)
     for j in range(size):
         for k in range(n):
             column = put(column, k, J[size - n + k, j])
-        column = followed(held, flags, solve_symmetric(fewer, gathered(held, flags, column)))
+        column = followed(held, flags, solve_factored(factors, gathered(held, flags, column)))
         for k in range(n):
             J[size - n + k, j] = column[k]
 

@@ -47,15 +47,15 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
     """A measure of the force before it is kept from pulling: where it falls through zero the ground lets go.
 
-    The force divided by d^min(e, 2), which has a finite limit at the surface: (k d^e + c d') d^-min(e, 2).
+    The force divided by min(d, d_max)^min(e, 2): of finite slope at the surface, and nowhere steeper than the force.
     """
+    full = law.full_damping_penetration
     power = min(law.exponent, 2.0)
     d = max(penetration, 0.0)
+    if d >= full:
+        return (law.stiffness * d**law.exponent + law.damping * penetration_rate) / full**power
     spring = law.stiffness * (d ** (law.exponent - power) if law.exponent > power else 1.0)
-    share = d / law.full_damping_penetration
-    if share >= 1.0:
-        return spring + law.damping * penetration_rate / d**power
-    damping = law.damping * (3.0 - 2.0 * share) / law.full_damping_penetration**2
+    damping = law.damping * (3.0 - 2.0 * d / full) / full**2
     return spring + damping * penetration_rate * (d ** (2.0 - power) if power < 2.0 else 1.0)
 
 

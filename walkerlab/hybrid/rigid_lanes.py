@@ -14,7 +14,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing, rates
+from walkerlab.mechanics.standing import Mode, NoKnee, Standing, rates
 from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
@@ -56,7 +56,7 @@ def two_legs(model: Standing) -> TwoLegs | None:
     """The model as that of two straight legs; None if it has more bodies."""
     if len(model.tree.arm_x) != 2 or not isinstance(model.knee, NoKnee):
         return None
-    x, y = model.hip_x[STANCE], model.hip_y[STANCE]
+    x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
     return TwoLegs(
         model,

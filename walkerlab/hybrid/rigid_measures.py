@@ -69,7 +69,7 @@ def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedW
     set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
     contact = touches - walker.radius * (samples.state[:, STANCE] - set_down)
     centre = np.column_stack((contact, np.full_like(contact, walker.radius)))
-    hip = centre + turned(psi, walker.hip_x, walker.hip_y)
+    hip = centre + turned(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
     foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
     knees = None
     if knee_m is not None:

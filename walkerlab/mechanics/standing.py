@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 from walkerlab.kernels import inlined, woven
 from walkerlab.mechanics.links import gathered, reduced, solve_linked, spread
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, with_centrifugal
-from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.mechanics.tuples import Vector, factored, put, solve_factored
 from walkerlab.solvers.system import State, blank, derivative, jacobian
 
 SWING, STANCE = 0, 1
@@ -32,8 +33,8 @@ class Standing(NamedTuple):
     radius: float  # [R] m, of either foot; 0 is a point
     foot_x: Vector  # (n) m, levers from the stance foot's centre to the swing foot's, body by body
     foot_y: Vector
-    hip_x: Vector  # (n) m, to the hip
-    hip_y: Vector
+    hip_x: float  # m, to the hip, which belongs to the stance leg
+    hip_y: float
     knee: Any  # NoKnee or SwingKnee
     straight: Any  # links of a straight swing leg
     bent: Any  # links while its knee is free; the same for a leg without a knee
@@ -107,6 +108,8 @@ def standing_mass(model: Standing, s: Vector, c: Vector, U: Vector) -> Vector:
     """M' (n n), kg m^2."""
     n, R = len(s), model.radius
     M = mass_matrix(model.tree, s, c)
+    if R == 0.0:
+        return M
     for k in range(n):
         M = put(M, STANCE * n + k, M[STANCE * n + k] + R * U[k])
         M = put(M, k * n + STANCE, M[k * n + STANCE] + R * U[k])
@@ -119,11 +122,13 @@ def standing_torques(model: Standing, s: Vector, c: Vector, F: Vector, U: Vector
     """r (n), N m."""
     n = len(s)
     r = U
-    pulled = model.tree.mass * model.gravity_along
     for k in range(n):
         r = put(r, k, -model.gravity_along * U[k] - model.gravity_down * F[k])
-        pulled += y[n + k] * y[n + k] * F[k]
-    r = put(r, STANCE, r[STANCE] - model.radius * pulled)
+    if model.radius != 0.0:
+        pulled = model.tree.mass * model.gravity_along
+        for k in range(n):
+            pulled += y[n + k] * y[n + k] * F[k]
+        r = put(r, STANCE, r[STANCE] - model.radius * pulled)
     return with_centrifugal(model.centrifugal, s, c, y, n, r)
 
 
@@ -174,21 +179,22 @@ def rates_along(model: Standing, links: Any, y: State, columns: State, first: in
     s, c = sines_cosines(model.tree, y, 0, model.slope)
     F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
     M, r = reduced(links, standing_mass(model, s, c, U), standing_torques(model, s, c, F, U, y))
-    alpha = spread(links, solve_symmetric(M, r))
+    factors = factored(M, n)
+    alpha = spread(links, solve_factored(factors, r))
     out = columns
     for k in range(n):
         out = put(out, k, columns[n + k])
         out = put(out, n + k, alpha[k])
     for at in range(first, len(columns), 2 * n):
         change = gathered(links, torque_change(model, s, c, F, U, alpha, y, columns, at))
-        faster = spread(links, solve_symmetric(M, change))
+        faster = spread(links, solve_factored(factors, change))
         for k in range(n):
             out = put(out, at + k, columns[at + n + k])
             out = put(out, at + n + k, faster[k])
     return out
 
 
-@derivative.case(Mode)
+@derivative.case(Mode, woven=True)
 def mode_derivative(system: Mode, t: float, y: State) -> State:
     """The equations of motion as a first-order system."""
     n = len(system.model.tree.arm_x)
@@ -300,12 +306,8 @@ def swing_foot_velocity(model: Standing, y: State) -> tuple[float, float]:
 @inlined
 def hip_height(model: Standing, y: State) -> float:
     """Height of the hip over the slope (m)."""
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    _, U = projections(model.hip_x, model.hip_y, s, c)
-    height = model.radius
-    for k in range(len(s)):
-        height += U[k]
-    return height
+    s, c = sine_cosine(y[STANCE] + model.slope)
+    return model.radius + s * model.hip_x + c * model.hip_y
 
 
 @inlined

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
+from walkerlab.mechanics.tuples import Vector, put
 
 
 class Tree(NamedTuple):
@@ -52,11 +52,12 @@ def with_centrifugal(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, to
     """Torques (n) and the centrifugal terms of the angular velocities y[first], ...: the right-hand side of M alpha."""
     n = len(s)
     for k in range(n):
-        for l in range(n):
-            omega = y[first + l]
-            along = tree.cosine[k * n + l] * (s[l] * c[k] - c[l] * s[k])
-            across = tree.sine[k * n + l] * (c[l] * c[k] + s[l] * s[k])
-            torques = put(torques, k, torques[k] + omega * omega * (along - across))
+        for l in range(k):
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            of_l = tree.cosine[k * n + l] * sin_d - tree.sine[k * n + l] * cos_d
+            of_k = tree.cosine[l * n + k] * sin_d + tree.sine[l * n + k] * cos_d
+            torques = put(torques, k, torques[k] + y[first + l] * y[first + l] * of_l)
+            torques = put(torques, l, torques[l] - y[first + k] * y[first + k] * of_k)
     return torques
 
 
@@ -78,17 +79,3 @@ def tree_gradients(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, alph
             J[row, first + l] += along
             J[row, first + k] -= along
             J[row, rates + l] += 2.0 * omega * (A * sin_d - B * cos_d)
-
-
-@inlined
-def divide_by_mass(tree: Tree, M: Vector, J: Any) -> None:
-    """Solve M X = (last n rows of J) in place: torques' derivatives become those of angular accelerations."""
-    n = len(tree.arm_x)
-    size = J.shape[0]
-    for j in range(size):
-        column = tree.arm_x
-        for k in range(n):
-            column = put(column, k, J[size - n + k, j])
-        column = solve_symmetric(M, column)
-        for k in range(n):
-            J[size - n + k, j] = column[k]

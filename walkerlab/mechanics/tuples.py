@@ -30,17 +30,33 @@ def _put(vector: Any, index: Any, value: Any) -> Any:
 @inlined
 def solve_symmetric(M: Vector, b: Vector) -> Vector:
     """Solve M x = b for a symmetric positive definite M, given row by row; only its lower half is read."""
-    n = len(b)
+    return solve_factored(factored(M, len(b)), b)
+
+
+@inlined
+def factored(M: Vector, n: int) -> Vector:
+    """L D L' = M: 1/D on the diagonal, L' above it; only M's lower half is read."""
     for k in range(n):
         scale = 1.0 / M[k * n + k]
+        M = put(M, k * n + k, scale)
         for i in range(k + 1, n):
             factor = M[i * n + k] * scale
-            b = put(b, i, b[i] - factor * b[k])
+            M = put(M, k * n + i, factor)
             for j in range(k + 1, i + 1):
                 M = put(M, i * n + j, M[i * n + j] - factor * M[j * n + k])
+    return M
+
+
+@inlined
+def solve_factored(factors: Vector, b: Vector) -> Vector:
+    """Solve M x = b for a matrix that `factored` has taken apart."""
+    n = len(b)
+    for k in range(n):
+        for i in range(k + 1, n):
+            b = put(b, i, b[i] - factors[k * n + i] * b[k])
     for k in range(n - 1, -1, -1):
-        rest = b[k]
+        rest = b[k] * factors[k * n + k]
         for j in range(k + 1, n):
-            rest -= M[j * n + k] * b[j]
-        b = put(b, k, rest / M[k * n + k])
+            rest -= factors[k * n + j] * b[j]
+        b = put(b, k, rest)
     return b

@@ -102,6 +102,7 @@ def curve_through(
     second: float,
     points: int,
     advance: Callable[[], None] = lambda: None,
+    control: StepControl = CONTROL,
 ) -> BifurcationCurve | None:
     """The curve through a bifurcation that was located at a value of the second parameter; None if it is lost there.
 
@@ -113,11 +114,12 @@ def curve_through(
     x = np.append(bifurcation.point.x, second / scales[1])
     x[-2] = bifurcation.value / scales[0]
     at_second = np.append(np.zeros(x.size - 1), 1.0)
-    start = corrected(equations, x, at_second, CONTROL.tolerance)
+    start = corrected(equations, x, at_second, control.tolerance)
     if isinstance(start, Lost):
         return None
     halves = [
-        traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance) for sign in (-1.0, 1.0)
+        traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance, control)
+        for sign in (-1.0, 1.0)
     ]
     along = np.vstack((halves[0][0][::-1], halves[1][0][1:]))
     return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (halves[0][1], halves[1][1]))
@@ -125,13 +127,13 @@ def curve_through(
 
 def traced(
     equations: CriticalGaits, start: Solved[Cycle | None], spans: tuple[Span, Span], points: int,
-    advance: Callable[[], None],
+    advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
     scales = np.array(equations.scales)
-    values, last, length = [start.x[-2:] * scales], start, CONTROL.first
+    values, last, length = [start.x[-2:] * scales], start, control.first
     while len(values) < points:
-        following = stepped(equations, last, length, CONTROL)
+        following = stepped(equations, last, length, control)
         if isinstance(following, Lost):
             return np.array(values), BranchEnd(float(values[-1][1]), why_lost(following))
         solved, _, length = following

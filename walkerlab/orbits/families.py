@@ -402,6 +402,7 @@ WHY = {
     Outcome.NO_HEEL_STRIKE: "the swinging foot does not come down",
     Outcome.BUDGET_EXHAUSTED: "a step takes more right-hand sides than it may",
     Outcome.SOLVER_FAILED: "the solver's step fell to rounding",
+    Outcome.BENT_KNEE: "the foot comes down on a knee that has not locked",
 }
 
 

@@ -5,17 +5,18 @@ random starting values, the paper's way (section 3.3). All of it happens with th
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import EVENTS
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.orbits.gait import Gait, measured
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import Vector, seeds
-from walkerlab.orbits.step_map import new_shooting, newton, variation_size
+from walkerlab.orbits.step_map import Shooting, new_shooting, newton, newton_from_each, variation_size
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 
@@ -93,6 +94,19 @@ NO_DESCENT = (
 )
 
 
+def shooting(walker: Standing, rtol: float, atol: float, budget: int) -> Shooting:
+    """The walker's step map at these tolerances."""
+    method = new_dop853(variation_size(walker), rtol, atol, budget)
+    return new_shooting(walker, method, finder_for(method, EVENTS))
+
+
+@lru_cache(maxsize=16)
+def branches(walker: Standing, settings: SearchSettings) -> tuple[Branch, ...]:
+    """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
+    looking = shooting(walker, settings.rtol, settings.atol, settings.budget)
+    return tuple(Branch(looking, seed) for seed in seeds(walker))
+
+
 @dataclass
 class Found:
     """A gait with what led to it."""
@@ -111,51 +125,58 @@ class Search:
         self.settings = settings
         self.found: list[Found] = []
         self.lost: list[str] = []
-        n, budget = variation_size(self.walker), settings.budget
-        self.method = new_dop853(len(self.walker.blank), settings.solved_rtol, settings.solved_atol, budget)
-        self.finder = finder_for(self.method, EVENTS)
-        self.looking = new_shooting(self.walker, new_dop853(n, settings.rtol, settings.atol, budget), self.finder)
-        solved = new_dop853(n, settings.solved_rtol, settings.solved_atol, budget)
-        self.solving = new_shooting(self.walker, solved, self.finder)
+        rtol, atol = settings.solved_rtol, settings.solved_atol
+        self.method = new_dop853(len(self.walker.blank), rtol, atol, settings.budget)
+        self.looking = shooting(self.walker, settings.rtol, settings.atol, settings.budget)
+        self.solving = shooting(self.walker, rtol, atol, settings.budget)
 
     def follow_seeds(self) -> None:
         """Follow the gaits of the small-slope theory to the walker's slope."""
         if self.walker.slope <= 0.0:
             return
-        for seed in seeds(self.walker):
-            reached = Branch(self.looking, seed).follow(self.walker.slope)
+        for branch in branches(on_slope(self.walker, 0.0), self.settings):
+            reached, name = branch.follow(self.walker.slope), branch.seed.name
             if reached.z is None:
-                self.lost.append(f"the gait from the {seed.name} is lost at a slope of {reached.slope:.3g} rad")
-            elif not self.keep(reached.z, seed.name):
-                self.lost.append(f"the gait from the {seed.name} cannot be solved to rounding")
+                self.lost.append(f"the gait from the {name} is lost at a slope of {reached.slope:.3g} rad")
+            elif not self.keep(reached.z, name):
+                self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def draw(self, generator: np.random.Generator) -> None:
         """Solve the step map from random starting values."""
-        d = len(self.walker.picked)
-        for _ in range(self.settings.random_starts):
-            z = generator.uniform(LEAST_START[:d], MOST_START[:d])
-            z[0] = 0.5 * z[0] - self.walker.slope - self.walker.lean
-            status, _, residual, _ = newton(self.looking, z, LOOKED_RESIDUAL)
-            if status == Outcome.WALKED and residual < LOOKED_RESIDUAL:
-                self.keep(z, RANDOM_START)
+        d, settings = len(self.walker.picked), self.settings
+        starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (settings.random_starts, d))
+        starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
+        residuals = np.zeros(len(starts))
+        plain = new_dop853(len(self.walker.blank), settings.rtol, settings.atol, settings.budget)
+        newton_from_each(self.looking, plain, starts, LOOKED_RESIDUAL, residuals)
+        for z in starts[residuals < LOOKED_RESIDUAL]:
+            self.keep(z, RANDOM_START)
 
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
+        if self.known(z, by):
+            return True
         z = np.array(z)
         status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
         if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
             return False
         if self.walker.slope == 0.0 and abs(z[0] + self.walker.lean) < SMALLEST_ANGLE:
             return False
-        for found in self.found:
-            if np.abs(found.z - z).max() < SAME * np.abs(z).max():
-                found.by.append(by)
-                return True
+        if self.known(z, by):
+            return True
         gait = measured(self.walker, self.units, self.method, z, self.solving.DP)
         if gait is None or gait.residual > self.settings.residual:
             return False
         self.found.append(Found(z, gait, [by]))
         return True
+
+    def known(self, z: Vector, by: str) -> bool:
+        """Whether z is one of the gaits found, which is then noted to be found again."""
+        for found in self.found:
+            if np.abs(found.z - z).max() < SAME * np.abs(z).max():
+                found.by.append(by)
+                return True
+        return False
 
     def result(self) -> GaitSearch:
         """The gaits in order, and which one to walk."""

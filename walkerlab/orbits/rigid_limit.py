@@ -53,8 +53,8 @@ STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "dampin
 HALF_DECADES = math.sqrt(10.0)
 
 
-def series_of(name: str) -> list[Setting]:
-    """The settings of a series, from the config's contact towards the limit."""
+def series_of(name: str, every: int = 1) -> list[Setting]:
+    """The settings of a series, from the config's contact towards the limit; of these every first, second or so on."""
     steps = {ALL: 9, ALL_POINT: 9, STICTION: 15, STIFFNESS: 6, DAMPING: 6, NORMAL: 9}[name]
     ratio = 2.0 if name == STICTION else HALF_DECADES
     found = []
@@ -64,7 +64,7 @@ def series_of(name: str) -> list[Setting]:
         damping = factor if name == DAMPING else math.sqrt(factor) if name in (ALL, ALL_POINT, NORMAL) else 1.0
         stiction = 1.0 / factor if name in (ALL, ALL_POINT, STICTION) else 1.0
         found.append(Setting(name, factor, stiffness, damping, stiction))
-    return found
+    return found[::every]
 
 
 def with_contact_of(walker: ContactWalker, setting: Setting) -> ContactWalker:
@@ -126,6 +126,7 @@ class Limit:
     rigid: RigidGait
     steps: int
     sampling: float  # s
+    every: int = 1  # of the settings of a series
 
     def series(
         self, name: str, walker: ContactWalker, gait: ContactGait, start: Callable[[ContactWalker], State] | None = None
@@ -135,7 +136,7 @@ class Limit:
         start  the walk's start, if whole walks are to be compared too
         """
         found: list[Distance] = []
-        for setting in series_of(name):
+        for setting in series_of(name, self.every):
             changed = with_contact_of(walker, setting)
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
@@ -176,8 +177,8 @@ class Limit:
         steps = walk.touch_time_s.size
         if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
-        y = walk.samples.states
-        motion = sampled_at_step_ends(Motion(walk.samples.time_s, y[:, 2:4], y[:, 6:8], walk.touch_time_s))
+        angle, velocity = motion_of_legs(walk.samples.states, walker)
+        motion = sampled_at_step_ends(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases[phases >= IMPACT_PHASE])
         _, raw = difference_in_time(motion, self.rigid.motion)
@@ -207,6 +208,13 @@ class Limit:
         begun = time.process_time()
         self.walk(walker, start, WALK_TOLERANCE, None)
         return time.process_time() - begun
+
+
+def motion_of_legs(states: NDArray[np.float64], walker: ContactWalker) -> tuple[NDArray[np.float64], ...]:
+    """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
+    n = len(walker.tree.arm_x)
+    upper = np.array([leg[0] for leg in walker.legs])
+    return states[:, 2 + upper], states[:, 4 + n + upper]
 
 
 def settings(tolerance: float) -> MethodSettings:

@@ -60,9 +60,9 @@ class ScaledStarts:
 
     walker: ContactWalker
     ground: Ground
-    place: State  # (4) position and angles of the start
-    by_swing: State  # (4) velocities that the swing leg's angular velocity brings along
-    by_stance: State  # (4) and the stance leg's
+    place: State  # (2 + n) position and angles of the start
+    by_swing: State  # (2 + n) velocities that the swing leg's angular velocity brings along
+    by_stance: State  # (2 + n) and the stance leg's
     steps: int
     gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if that is not asked
     rtol: float = 1e-7
@@ -119,7 +119,8 @@ def scaled_starts(
     start_of  the free walker's start for the two angular velocities' factors; linear in them
     """
     still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
-    return ScaledStarts(walker, ground, still[:4], swing[4:], stance[4:], steps, gait)
+    half = len(still) // 2
+    return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
 
 
 @dataclass(frozen=True)
@@ -141,22 +142,34 @@ DIRECTIONS = (
 )
 
 
-def margins(starts: ScaledStarts, around: tuple[float, float] = (1.0, 1.0)) -> list[Margin]:
+class Search(NamedTuple):
+    """How margins are searched: how far apart factors are tried until one fails, and up to which factor."""
+
+    step: float = MARGIN_STEP
+    largest: float = LARGEST_FACTOR
+
+
+FINE = Search()
+
+
+def margins(starts: ScaledStarts, around: tuple[float, float] = (1.0, 1.0), search: Search = FINE) -> list[Margin]:
     """How far the velocities of a start that walks may be scaled before it fails, alone and together."""
-    return [margin(starts, around, name, (swing, stance)) for name, swing, stance in DIRECTIONS]
+    return [margin(starts, around, name, (swing, stance), search) for name, swing, stance in DIRECTIONS]
 
 
-def margin(starts: ScaledStarts, around: tuple[float, float], name: str, way: tuple[float, float]) -> Margin:
+def margin(
+    starts: ScaledStarts, around: tuple[float, float], name: str, way: tuple[float, float], search: Search = FINE
+) -> Margin:
     """Walk ever farther one way until it fails, then halve the last interval."""
 
     def trial(change: float) -> Trial:
         return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
 
     up = max(way) > 0.0
-    limit = LARGEST_FACTOR - 1.0 if up else 1.0 - SMALLEST_FACTOR
+    limit = search.largest - 1.0 if up else 1.0 - SMALLEST_FACTOR
     good, change = 0.0, 0.0
     while good < limit:
-        change = min(good + MARGIN_STEP, limit)
+        change = min(good + search.step, limit)
         failure = trial(change)
         if not failure.walks:
             return halved(trial, name, good, change, failure, 1.0 if up else -1.0)

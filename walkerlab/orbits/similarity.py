@@ -44,8 +44,8 @@ def unit_walker(walker: Standing) -> tuple[Standing, Units]:
         radius=walker.radius / length,
         foot_x=scaled(walker.foot_x, 1.0 / length),
         foot_y=scaled(walker.foot_y, 1.0 / length),
-        hip_x=scaled(walker.hip_x, 1.0 / length),
-        hip_y=scaled(walker.hip_y, 1.0 / length),
+        hip_x=walker.hip_x / length,
+        hip_y=walker.hip_y / length,
         leg_length=1.0,
         gravity=1.0,
     )

@@ -75,6 +75,7 @@ class Shooting(NamedTuple):
     system: Any  # (d, d) Newton's matrix
     pivots: Any  # (d,)
     knee_time: Any  # (1,) s
+    start: Any  # (d,) one of many
     move: Any  # (d,) Newton's
     best: Any  # (d,) the best state that Newton's method has met
     best_DP: Any  # (d, d) the derivative there
@@ -90,7 +91,7 @@ def new_shooting(walker: Standing, method: Any, finder: CrossingFinder) -> Shoot
     d = len(walker.picked)
     return Shooting(
         walker, method, finder, (0.0,) * variation_size(walker), (0.0,) * d, np.zeros(d), np.zeros((d, d)),
-        np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d), np.zeros((d, d)),
+        np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d), np.zeros(d), np.zeros((d, d)),
     )  # fmt: skip
 
 
@@ -180,6 +181,28 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
             z[i] = best[i] + scale * move[i]
     keep(best, DP, z, shooting.DP)
     return best_status, best_period, best_residual, evaluations
+
+
+@kernel
+def newton_from_each(shooting: Shooting, method: Any, starts: Any, tolerance: float, residuals: Any) -> None:
+    """`newton` from many starts; one whose first step does not end in a heel strike is given up at once.
+
+    method     for the walker's equations alone, which tell that for a fraction of the derivative's work
+    starts     (starts, d); overwritten with the best states found
+    residuals  (starts,) of these, huge for a start given up; written
+    """
+    walker, z = shooting.walker, shooting.start
+    for i in range(residuals.size):
+        residuals[i] = NO_RESIDUAL
+        for j in range(z.size):
+            z[j] = starts[i, j]
+        clear_counts(method)
+        method.clock[H_NEXT] = 0.0
+        mode, y0 = Mode(walker, walker.bent), on_section(walker, z)
+        if swing(method, mode, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time) == WALKED:
+            _, _, residuals[i], _ = newton(shooting, z, tolerance)
+            for j in range(z.size):
+                starts[i, j] = z[j]
 
 
 @inlined

@@ -12,7 +12,6 @@ import numpy as np
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.ground.compliant import (
     STANCE_FOOT,
-    CompassParts,
     KneeRules,
     centre_to,
     contact_walker,
@@ -155,18 +154,6 @@ def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State)
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
     methods = MethodSettings(method_named(GAIT_METHOD), GAIT_RTOL, GAIT_ATOL, GAIT_BUDGET)
     return find_gait_from(scene.walker, scene.ground, methods, start_state(scene, rigid_state))
-
-
-def compass_parts(walker: Any) -> CompassParts:
-    """The measures that the walker is assembled by."""
-    return CompassParts(
-        walker.leg_length_m,
-        walker.foot_to_mass_m,
-        walker.leg_mass_kg,
-        walker.hip_mass_kg,
-        walker.leg_inertia_kg_m2,
-        walker.foot_radius_m,
-    )
 
 
 def wants_own_pitch(contact: Contact) -> bool:

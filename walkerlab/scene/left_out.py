@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Output
 
 LeftOut = dict[str, str]
+PAPERS = "it is the paper's procedure with its compass"
 RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 2}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 """How many numbers a sample each output takes, model by model."""
@@ -56,6 +57,33 @@ def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
         saved = "nothing: a zero in their place takes no longer"
         found.append(left_out("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
     return (*found, *of_legs(config), *of_outputs(config, "contact", CONTACT_NUMBERS))
+
+
+def of_adjustment(config: Config) -> tuple[LeftOut, ...]:
+    """What the adjustment of another walker than the paper's compass does without."""
+    if of_the_compass(config):
+        return ()
+    return (
+        left_out("the first step with a hinged stance foot", PAPERS, "compiling the hinged walker and two walks"),
+        left_out("the paper's start of its ADAMS model", PAPERS, "a walk"),
+    )
+
+
+def of_verification(config: Config) -> tuple[LeftOut, ...]:
+    """What the verification of another walker than the paper's compass does without."""
+    if of_the_compass(config):
+        return ()
+    return (
+        left_out("the named extreme cases", "they are the paper's compass's; this walker has its own", "96 cases"),
+        left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
+    )
+
+
+def of_the_compass(config: Config) -> bool:
+    """Whether the walker is the one of Appendix A."""
+    from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
+
+    return is_plain_compass(config.walker)
 
 
 def of_legs(config: Config) -> Iterator[LeftOut]:

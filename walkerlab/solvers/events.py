@@ -11,6 +11,7 @@ crossing right behind it. Of several signals that cross in one step, the caller 
 Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012), sections 3.4 and 5.
 """
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +38,14 @@ class CrossingFinder(NamedTuple):
 
 def new_crossing_finder(degree: int, signals: int = 1) -> CrossingFinder:
     """A finder for `signals` signals on steps whose dense output has degree `degree`."""
+    nodes, to_bernstein = sampling(degree)
+    size = degree + 1
+    return CrossingFinder(nodes, to_bernstein, np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2)))
+
+
+@lru_cache
+def sampling(degree: int) -> tuple[Any, Any]:
+    """The nodes of a polynomial of this degree, and what takes its values there to Bernstein coefficients."""
     size = degree + 1
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
@@ -47,9 +56,7 @@ def new_crossing_finder(degree: int, signals: int = 1) -> CrossingFinder:
         term = polynomial.polymul(term, polynomial.polypow([1.0, -1.0], degree - i))
         basis[:, i] = binomial * polynomial.polyval(nodes, term)
     nodes[-1] = 1.0
-    return CrossingFinder(
-        nodes, np.linalg.inv(basis), np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2))
-    )
+    return nodes, np.linalg.inv(basis)
 
 
 @inlined

@@ -97,6 +97,7 @@ def models_compared(config: Config, inputs: Mapping[str, Content], progress: Pro
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
         "dissipated_J": contact["dissipated_J"],
+        "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
     }
     left_out = [NOT_THE_PAPERS, *motion.left_out, *(() if releases is None else LEFT_OUT)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Final
 
 import numpy as np
@@ -21,10 +21,12 @@ from walkerlab.orbits.attractors import (
     settled_elsewhere,
     swept,
 )
+from walkerlab.orbits.bifurcation_curves import CONTROL as CURVE_CONTROL
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve, curve_through
 from walkerlab.orbits.continuation import Floats, StepControl
 from walkerlab.orbits.families import Branch, Follower, Limits, Seed, Span
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.regions import Regions, regions_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_maps import StepMap
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
@@ -40,7 +42,13 @@ BEFORE_FLIP = 0.02  # of the span: how far before the first flip the attractor i
 CONTACT_RESIDUAL, CONTACT_SHORTEST, CONTACT_PERIODS = 1e-9, 1e-4, 4
 OTHERS_AT, OTHER_PERIODS, RETURNS = 12, (3, 5, 6), 4000  # values, steps of gaits looked for, steps walked for them
 STARTS, SCATTER, SETTLING = 40, 0.1, 400  # walks from scattered starts at each value, and how long they settle
-LONGEST_OF_CURVES, CURVE_POINTS, CONFIGS = 4, 120, 256
+CURVE_POINTS, CONFIGS = 120, 256
+LONGEST_OF_CURVES: Final = {RIGID: 4, CONTACT: 1}
+CONTROLS: Final = {
+    RIGID: CURVE_CONTROL,
+    CONTACT: StepControl(first=0.03, shortest=1e-4, longest=0.1, turn=0.95, tolerance=1e-8),
+}
+"""Of curves over two parameters; the contact model's derivatives are good to about 1e-8."""
 
 
 @dataclass(frozen=True)
@@ -86,14 +94,21 @@ NO_ATTRACTORS = Attractors()
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What was found of one model; no map if there was no gait to begin from."""
+    """What was found of one model; no map if there was no gait to begin from.
+
+    map_of   the step map over the parameter of another config
+    curves   of bifurcations, over the plane of two parameters
+    regions  of that plane, by what walks settle on
+    """
 
     model: str
     step_map: StepMap | None
     branches: tuple[Branch, ...]
+    map_of: Callable[[Config], StepMap] | None = None
     attractors: Attractors = NO_ATTRACTORS
     exponents: tuple[Lyapunov, ...] = ()
     curves: tuple[BifurcationCurve, ...] = ()
+    regions: Regions | None = None
 
 
 def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -107,7 +122,7 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     found = []
     for model in models_of(block, config, asked):
         followed = FOLLOW[model](asked, progress)
-        found.append(with_curves(followed, asked, progress) if block.second is not None else followed)
+        found.append(over_plane(followed, asked, progress))
     said = summary(found, parameter, block) | {"left_out": left_out(found, asked)}
     content = Content(groups(found, parameter, block), said)
     if not any(followed.branches for followed in found):
@@ -131,6 +146,13 @@ def left_out(found: Sequence[Followed], asked: Question) -> list[dict[str, str]]
         elif model == CONTACT and asked.periods > CONTACT_PERIODS:
             what = f"the contact model's gaits of more than {CONTACT_PERIODS} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
+    entries += [
+        (f"the {one.model} model's plane of both keys", "the second key does not touch that model")
+        for one in found
+        if asked.config.continuation.second is not None
+        and one.branches
+        and not touches(second_question(asked), one.model)
+    ]
     return [{"what": what, "why": why, "saves": ""} for what, why in entries]
 
 
@@ -145,7 +167,7 @@ def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str
         raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
     wanted = wanted_models(block)
     refuse_values(asked)
-    refuse_second(config)
+    refuse_second(asked)
     touched = tuple(model for model in wanted if touches(asked, model))
     if not touched:
         raise ConfigError(
@@ -165,18 +187,36 @@ def refuse_values(asked: Question) -> None:
             )
 
 
-def refuse_second(config: Config) -> None:
-    """Raise ConfigError if the second key is no number, or if its range leaves out the config's own value."""
-    block = config.continuation.second
+def refuse_second(asked: Question) -> None:
+    """Raise ConfigError if the second key is no number or no other one, if it changes nothing, or starts elsewhere."""
+    block = asked.config.continuation.second
     if block is None:
         return
-    second = parameter_of(block.over, config)
-    own = second.value_in(config)
-    if own not in Span(block.least, block.most):
+    second = second_question(asked)
+    key, own = second.parameter.key, second.parameter.value_in(asked.config)
+    if second.parameter.path == asked.parameter.path:
         raise ConfigError(
-            f"continuation.second: {second.key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
+            f"continuation.second: {key} is the number that gaits are followed over already", "Choose another key."
+        )
+    if own not in second.span:
+        raise ConfigError(
+            f"continuation.second: {key} is {own:g} in the config, outside {block.least:g} to {block.most:g}",
             "Curves begin at the config's own value; choose a range around it.",
         )
+    wanted = wanted_models(asked.config.continuation)
+    if not any(touches(second, model) for model in wanted):
+        raise ConfigError(
+            f"continuation.second: {key} does not touch the {' or the '.join(wanted)} model",
+            "Choose a key that the model is made of, or another model (--model).",
+        )
+
+
+def second_question(asked: Question) -> Question:
+    """The same over the second key."""
+    block = asked.config.continuation.second
+    assert block is not None, "a second key is asked for"
+    parameter = parameter_of(block.over, asked.config)
+    return replace(asked, parameter=parameter, span=Span(block.least, block.most))
 
 
 def touches(asked: Question, model: str) -> bool:
@@ -189,30 +229,35 @@ def touches(asked: Question, model: str) -> bool:
     return walker_at(asked.span.least) != walker_at(asked.span.most)
 
 
-def with_curves(followed: Followed, asked: Question, progress: Progress) -> Followed:
-    """Curves of the model's folds and flips over the plane of both parameters; of the rigid model only."""
-    block = asked.config.continuation.second
-    if block is None or followed.model != RIGID:
+def over_plane(followed: Followed, asked: Question, progress: Progress) -> Followed:
+    """What was found of a model, with curves and regions of the plane if a second key is asked for that touches it."""
+    map_of = followed.map_of
+    if map_of is None or asked.config.continuation.second is None:
         return followed
-    second = parameter_of(block.over, asked.config)
-    plane = (asked.span, Span(block.least, block.most))
+    second = second_question(asked)
+    if not touches(second, followed.model):
+        return followed
 
     @lru_cache(CONFIGS)
     def map_at(value: float) -> StepMap | None:
-        changed = second.config_at(asked.config, value)
-        return None if changed is None else rigid_map(changed, asked.parameter, asked.span.size)
+        changed = second.parameter.config_at(asked.config, value)
+        return None if changed is None else map_of(changed)
 
-    own = second.value_in(asked.config)
+    own = second.parameter.value_in(asked.config)
     progress.start(f"continuation: curves of bifurcations of the {followed.model} model")
-    found = []
-    for branch in followed.branches:
-        if branch.period > LONGEST_OF_CURVES:
-            continue
-        for one in branch.bifurcations:
-            if one.kind != "torus":
-                curve = curve_through(one, branch.period, map_at, plane, own, CURVE_POINTS, progress.advance)
-                found.append(curve)
-    return replace(followed, curves=tuple(curve for curve in found if curve is not None))
+    curves = [
+        curve_through(
+            one, branch.period, map_at, (asked.span, second.span), own, CURVE_POINTS, progress.advance,
+            CONTROLS[followed.model],
+        )
+        for branch in followed.branches if branch.period <= LONGEST_OF_CURVES[followed.model]
+        for one in branch.bifurcations if one.kind != "torus"
+    ]  # fmt: skip
+    regions = None
+    if followed.model == RIGID:
+        progress.start("continuation: regions of the plane of two parameters")
+        regions = regions_of(followed.branches, map_at, (asked.span, second.span), own, progress.advance)
+    return replace(followed, curves=tuple(curve for curve in curves if curve is not None), regions=regions)
 
 
 def follow_rigid(asked: Question, progress: Progress) -> Followed:
@@ -225,11 +270,13 @@ def rigid_branches(asked: Question, progress: Progress) -> tuple[Followed, Follo
     """Every branch of the rigid model's gaits of one step, and the cascades beyond their flips."""
     config, parameter, span = asked.config, asked.parameter, asked.span
     walker_at = rigid_walkers(config, parameter)
-    step_map = rigid_map(config, parameter, span.size)
+    map_of = partial(rigid_map, parameter=parameter, scale=span.size)
+    step_map = map_of(config)
     progress.start("continuation: branches of the rigid model")
     follower = Follower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
     seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
-    return Followed(RIGID, step_map, follower.family(seeds, asked.periods)), follower
+    branches = follower.family(seeds, asked.periods)
+    return Followed(RIGID, step_map, branches, map_of), follower
 
 
 def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
@@ -264,13 +311,16 @@ def contact_branches(asked: Question, progress: Progress) -> Followed:
         if found.gait is None:
             progress.note(f"contact model at {value:g} {asked.parameter.unit}: {found.reason}")
             continue
-        step_map = contact_map(asked.config, asked.parameter, asked.span.size, found.gait.step.length_m)
+        map_of = partial(
+            contact_map, parameter=asked.parameter, scale=asked.span.size, step_length_m=found.gait.step.length_m
+        )
+        step_map = map_of(asked.config)
         progress.start("continuation: branches of the contact model")
         control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
         follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
         seed = Seed(step_map.of_section(found.gait.z, value), value)
         branches = follower.family([seed], min(asked.periods, CONTACT_PERIODS))
-        return Followed(CONTACT, step_map, branches)
+        return Followed(CONTACT, step_map, branches, map_of)
     return Followed(CONTACT, None, ())
 
 

@@ -13,6 +13,7 @@ from walkerlab.config.continuation import Continuation, Span
 from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.families import Branch, strike_to_strike
+from walkerlab.orbits.regions import Regions
 from walkerlab.orbits.step_maps import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
 from walkerlab.store.content import Attribute, Group, Variable
@@ -41,6 +42,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "limits": [row for one in found for row in limit_rows(one)],
         "attractors": [attractor_summary(one.model, one.attractors) for one in found if one.attractors.found],
         "curves": [row for one in found for row in curve_rows(one)],
+        "regions": [row for one in found for row in region_rows(one)],
     }
 
 
@@ -149,16 +151,53 @@ def curve_group(curve: BifurcationCurve, parameter: Parameter, second: Span) -> 
     )
 
 
+def curve_overview(rows: Sequence[dict[str, Any]]) -> Group:
+    """Every curve of every model in a row."""
+    along = ("curve",)
+    return Group(
+        {
+            "model": Variable(np.array([row["model"] for row in rows]), along, "", "model"),
+            "kind": Variable(np.array([row["kind"] for row in rows]), along, "", "fold or flip"),
+            "period": Variable(np.array([row["period"] for row in rows]), along, "1", "steps of the gait"),
+        }
+    )
+
+
+def regions_group(regions: Regions, parameter: Parameter, second: Span) -> Group:
+    """What walks settle on over the plane of both parameters."""
+    periods = "steps after which walks repeat themselves; 0: never, -1: none goes on"
+    return Group(
+        {
+            "value": Variable(regions.first, ("first",), parameter.unit, parameter.key),
+            "second": Variable(regions.second, ("second",), "1", second.over),
+            "period": Variable(regions.period, ("first", "second"), "1", periods),
+        }
+    )
+
+
+def region_rows(followed: Followed) -> Iterator[dict[str, Any]]:
+    """Which share of the plane each kind of attractor has."""
+    if followed.regions is not None:
+        periods, counts = np.unique(followed.regions.period, return_counts=True)
+        for period, cells in zip(periods, counts, strict=True):
+            yield {"model": followed.model, "period": int(period), "share": float(cells / followed.regions.period.size)}
+
+
 def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation) -> dict[str, Group]:
     """One group a branch and a curve, and one for bifurcations, exponents and attractor of each model."""
     branches = [branch_summary(one.model, branch) for one in found for branch in one.branches]
     stored: dict[str, Group] = {"branches": overview(branches, parameter)} if branches else {}
+    curves = [row for one in found for row in curve_rows(one)]
+    if curves:
+        stored["curves"] = curve_overview(curves)
     for one in found:
         if one.step_map is None:
             continue
         if block.second is not None:
             for number, curve in enumerate(one.curves):
                 stored[f"{one.model}/curve_{number}"] = curve_group(curve, parameter, block.second)
+            if one.regions is not None:
+                stored[f"{one.model}/regions"] = regions_group(one.regions, parameter, block.second)
         for number, branch in enumerate(one.branches):
             marks = [*birth_of(branch, one.branches), *marks_on(branch)]
             stored[f"{one.model}/branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, parameter)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab import __version__
 from walkerlab.benchmarks.engines.experiments import (
+    EXACT_ENOUGH,
     OURS,
     OWN_LAW,
     OWN_TOUCHES,
@@ -22,6 +25,7 @@ from walkerlab.benchmarks.engines.experiments import (
     Truth,
     TuningRow,
     adams_rows,
+    has_settled,
     least_wall,
     our_rows,
     own_law_rows,
@@ -53,9 +57,16 @@ class Findings:
     truths: dict[str, Truth] = field(default_factory=dict)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
+    def add(self, other: Findings) -> None:
+        """Take in what was found elsewhere."""
+        self.rows += other.rows
+        self.swings += other.swings
+        self.tuning += other.tuning
+        self.left_out += other.left_out
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Measure every engine that is installed on every scene; raises NoAnswer if none is."""
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
     engines = installed()
     found = Findings(left_out=[*not_installed(), *hinge_left_out(config)])
     if not engines:
@@ -74,9 +85,10 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
         progress.start(f"engines: {scene.name}", len(engines) + 1)
         found.rows += [*our_rows(scene, truth, __version__), *adams_rows(scene, __version__)]
         progress.advance()
-        for engine in engines:
-            measure(engine, scene, truth, found)
-            progress.advance()
+        with ThreadPoolExecutor(max(1, jobs)) as pool:
+            for measured in pool.map(partial(measure, scene=scene, truth=truth), engines):
+                found.add(measured)
+                progress.advance()
     if not found.truths:
         raise NoAnswer("engines: no scene walks under ADAMS's law", "Start nearer to a gait (start: fixed-point).")
     return content(found, rigid)
@@ -98,20 +110,18 @@ def hinge_left_out(config: Config) -> list[dict[str, str]]:
     return [{"what": "hinged first step", "why": "engines are measured on a walk that is free from its start"}]
 
 
-def measure(engine: Engine, scene: EngineScene, truth: Truth, found: Findings) -> None:
+def measure(engine: Engine, scene: EngineScene, truth: Truth) -> Findings:
     """All experiments of one engine on one scene, in a process of its own."""
-    adapter = engine.adapter()
-    version = engine.version
-    target = target_of(scene)
+    found = Findings()
+    version, target = engine.version, target_of(scene)
     with OwnProcess() as process:
-        swings, lost = swing_rows(engine, scene, process)
-        found.swings += swings
+        found.swings, lost = swing_rows(engine, scene, process)
         found.left_out += [{"what": f"a swing in {engine.name}", "why": one.why} for one in lost]
         found.rows += same_law_rows(engine, version, scene, truth, process)
         if target is None:
             found.left_out.append({"what": f"own contact of {engine.name}", "why": "the ground has no friction"})
-            return
-        for contact in adapter.CONTACTS:
+            return found
+        for contact in engine.adapter().CONTACTS:
             own, rows, failed = tuned(engine, contact, scene, target, process)
             if own is None:
                 why = failed.why if failed is not None else "it could not be tuned"
@@ -119,6 +129,7 @@ def measure(engine: Engine, scene: EngineScene, truth: Truth, found: Findings) -
                 continue
             found.tuning += rows
             found.rows += own_law_rows(engine, version, contact, own, scene, truth, process)
+    return found
 
 
 def content(found: Findings, rigid: Mapping[str, Any] | None) -> Content:
@@ -154,6 +165,11 @@ def summary(found: Findings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
         "cannot_express": {engine.name: list(engine.adapter().CANNOT_EXPRESS) for engine in engines},
         "closest": {name: closest(rows, name) for name in found.truths},
         "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in found.truths.items()},
+        "convergence": {name: convergence(rows, name) for name in found.truths},
+        "integrators": {
+            engine.name: {name: asdict(one) for name, one in engine.adapter().INTEGRATORS.items()} for engine in engines
+        },
+        "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
         "ratios": {name: ratios(rows, name) for name in found.truths},
         "conclusions": {name: conclusions(rows, name, truth) for name, truth in found.truths.items()},
         "environment": {
@@ -195,30 +211,29 @@ def closest(rows: Sequence[Row], scene: str) -> dict[str, Any] | None:
     return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
 
 
+def series_of(rows: Sequence[Row], scene: str, experiment: str) -> dict[str, list[Row]]:
+    """The rows of each integrator or contact, from coarse to fine, by its engine's name and its own."""
+    series: dict[str, list[Row]] = {}
+    for row in of(rows, scene, experiment):
+        series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
+    return series
+
+
 def finest_rows(rows: Sequence[Row], scene: str) -> list[Row]:
-    """Each contact's walk at its smallest step."""
-    finest: dict[tuple[str, str], Row] = {}
-    for row in of(rows, scene, OWN_LAW):
-        key = (row.engine, row.integrator)
-        if key not in finest or row.step_s < finest[key].step_s:
-            finest[key] = row
-    return list(finest.values())
+    """Each contact's finest walk."""
+    return [mine[-1] for mine in series_of(rows, scene, OWN_LAW).values()]
 
 
 def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
     """The largest step (s) from which on an engine's last period has three correct digits, by experiment and name.
 
-    On the same law they are digits of the reference; on an engine's own, of what it gives at its smallest step.
+    On the same law they are digits of the reference; on an engine's own, of what it gives at its finest.
     """
     found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in found:
-        series: dict[str, list[Row]] = {}
-        for row in of(rows, scene, experiment):
-            series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
-        for name, mine in series.items():
-            mine.sort(key=lambda row: row.step_s)
-            wanted = exact if experiment == SAME_LAW else mine[0].period_s
+        for name, mine in series_of(rows, scene, experiment).items():
+            wanted = exact if experiment == SAME_LAW else mine[-1].period_s
             step = largest_good_step(mine, experiment, wanted)
             if step is not None:
                 found[experiment][name] = step
@@ -226,16 +241,33 @@ def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dic
 
 
 def largest_good_step(mine: Sequence[Row], experiment: str, wanted: float | None) -> float | None:
-    """The largest step, going up from the smallest, with three correct digits; None if the smallest has not."""
+    """The largest step, going up from the finest, with three correct digits; None if the finest has not."""
     good = None
     if wanted is None:
         return None
-    for row in mine:
+    for row in reversed(mine):
         if row.outcome != "walked" or row.period_s is None or abs(row.period_s / wanted - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
-    finest_only = experiment == OWN_LAW and good == mine[0].step_s
+    finest_only = experiment == OWN_LAW and good == mine[-1].step_s
     return None if finest_only else good
+
+
+def convergence(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
+    """What the last refinement does, by experiment and name.
+
+    On the same law, what it divides the error by; on an engine's own, what it changes the period by (s).
+    """
+    found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    for experiment, by_name in found.items():
+        for name, mine in series_of(rows, scene, experiment).items():
+            if len(mine) < 2 or not mine[-2].error or not mine[-1].error:
+                continue
+            fine, coarse = mine[-1], mine[-2]
+            divided = float(coarse.error or 0.0) / float(fine.error or 1.0)
+            changed = abs(float(fine.period_s or 0.0) - float(coarse.period_s or 0.0))
+            by_name[name] = divided if experiment == SAME_LAW else changed
+    return found
 
 
 def conclusions(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, str]:
@@ -257,40 +289,61 @@ def same_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
         missed = [name for name in names if name not in reached]
         if missed:
             sentences.append(f"No run of {' or '.join(missed)} reaches {label}.")
-    steps = three_digits(rows, scene, truth)[SAME_LAW]
-    if steps:
-        told = ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
+    told = steps_in_words(three_digits(rows, scene, truth)[SAME_LAW])
+    if told:
         sentences.append(f"Three correct digits of the step period take steps of at most: {told}.")
+    fixed = [name for name, mine in series_of(rows, scene, SAME_LAW).items() if mine[-1].tolerance is None]
+    falling = {name: by for name, by in convergence(rows, scene)[SAME_LAW].items() if name in fixed}
+    if falling:
+        told = ", ".join(f"{name} {by:.2g}" for name, by in falling.items())
+        sentences.append(
+            f"Fixed steps end where a run would take more of them than it is given; the last halving divides the error "
+            f"by: {told}. Adapted ones end at an error below {EXACT_ENOUGH:.0e}.".replace("e-0", "e-")
+        )
     return " ".join(sentences)
 
 
+def steps_in_words(steps: Mapping[str, float]) -> str:
+    """Step sizes by name, the largest first."""
+    return ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
+
+
 def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
-    """Which contact comes closest to ADAMS's, and what became of the others."""
+    """Which contact comes closest to ADAMS's, what became of the others, and how far this hangs on the step."""
     best = closest(rows, scene)
     period = float(truth.walk.periods_s[-1])
+    sentences = []
     if best is None:
-        first = "No engine's own contact walks to the end."
-    else:
-        row = next(
-            row for row in finest_rows(rows, scene) if (row.engine, row.integrator) == (best["engine"], best["contact"])
-        )
-        first = (
-            f"Closest to ADAMS's law comes {row.engine}'s contact {row.integrator!r}: its step period is "
-            f"{1e3 * abs(row.error or 0.0):.3g} ms off {period:.4f} s, in {row.wall_s:.2g} s of run time at steps of "
-            f"{1e6 * row.step_s:.3g} µs."
-        )
-    others = [
-        f"{row.engine} {row.integrator} {1e3 * row.error:.3g} ms off"
-        if row.error is not None
-        else f"{row.engine} {row.integrator} {row.outcome} after {row.steps} steps"
-        for row in finest_rows(rows, scene)
-        if best is None or (row.engine, row.integrator) != (best["engine"], best["contact"])
-    ]
-    second = f" The others: {'; '.join(others)}." if others else ""
-    steps = three_digits(rows, scene, truth)[OWN_LAW]
-    told = ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
-    third = f" Their own period keeps three digits up to steps of: {told}." if steps else ""
-    return first + second + third
+        sentences.append("No engine's own contact walks to the end.")
+    finest = finest_rows(rows, scene)
+    others = []
+    for row in finest:
+        if best is not None and (row.engine, row.integrator) == (best["engine"], best["contact"]):
+            sentences.append(
+                f"Closest to ADAMS's law comes {row.engine}'s contact {row.integrator!r}: its step period is "
+                f"{1e3 * abs(row.error or 0.0):.3g} ms off {period:.4f} s, in {row.wall_s:.2g} s of run time at steps "
+                f"of {1e6 * row.step_s:.3g} µs."
+            )
+        elif row.error is not None:
+            others.append(f"{row.engine} {row.integrator} {1e3 * row.error:.3g} ms off")
+        else:
+            others.append(f"{row.engine} {row.integrator} {row.outcome} after {row.steps} steps")
+    if others:
+        sentences.append(f"The others: {'; '.join(others)}.")
+    series = series_of(rows, scene, OWN_LAW)
+    changes = convergence(rows, scene)[OWN_LAW]
+    settled = {name for name in changes if has_settled(*series[name][-2:])}
+    for said, names in (
+        ("What they are off is the model's where the last refinement changes the period by next to nothing", settled),
+        ("At the finest steps that a run is given the last halving still changes it", changes.keys() - settled),
+    ):
+        told = ", ".join(f"{name} {1e3 * change:.2g} ms" for name, change in changes.items() if name in names)
+        if told:
+            sentences.append(f"{said}: {told}.")
+    told = steps_in_words(three_digits(rows, scene, truth)[OWN_LAW])
+    if told:
+        sentences.append(f"Their own period keeps three digits up to steps of: {told}.")
+    return " ".join(sentences)
 
 
 ROW = {

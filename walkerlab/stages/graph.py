@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_compass, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
@@ -37,6 +37,18 @@ def gait_for_start_or_pads(config: Config) -> tuple[str, ...]:
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
+def scene_of_other_walkers(config: Config) -> tuple[str, ...]:
+    """What a walk starts from, for other walkers than the paper's compass: only these are judged in their own scene."""
+    return () if of_the_compass(config) else gait_for_start_or_pads(config)
+
+
+def engines_installed() -> Mapping[str, str]:
+    """The engines that are installed, with their versions."""
+    from walkerlab.benchmarks.engines.registry import installed
+
+    return {engine.name: engine.version for engine in installed()}
+
+
 @dataclass(frozen=True)
 class Stage:
     """One stage of the pipeline.
@@ -45,11 +57,12 @@ class Stage:
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
     reads          keys of the config that its result depends on; it is shown no others
+    programs       the versions of other programs that its result depends on, by name
     reads_of_paper keys of the built-in paper config on which its own cases stand
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
-    of_compass     whether it is about the paper's compass, and left out for other walkers
+    reads_of_scene keys that it reads besides for another walker than the paper's compass
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
@@ -70,7 +83,6 @@ class Stage:
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
-    of_compass: bool = False
     draws: bool = False
     walks: bool = False
     has_cells: bool = False
@@ -83,6 +95,12 @@ class Stage:
     follows: bool = False
     does_without: Lacks = nothing
     reads_of_paper: tuple[str, ...] = ()
+    reads_of_scene: tuple[str, ...] = ()
+    programs: Callable[[], Mapping[str, str]] | None = None
+
+    def reads_under(self, config: Config) -> tuple[str, ...]:
+        """The keys that its result depends on under a config."""
+        return self.reads if not self.reads_of_scene or of_the_compass(config) else (*self.reads, *self.reads_of_scene)
 
     @property
     def optional(self) -> bool:
@@ -167,8 +185,8 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
         inputs=results_of("fixedpoint"),
         needs_contact=True,
-        of_compass=True,
         has_cells=True,
+        does_without=of_adjustment,
     ),
     Stage(
         "compare",
@@ -194,7 +212,9 @@ PIPELINE = Graph(
         reads=("walker", "gravity", "slope", "equations", "start", "contact"),
         inputs=gait_for_start_or_pads,
         needs_contact=True,
+        has_cells=True,
         on_demand=True,
+        programs=engines_installed,
     ),
     Stage(
         "stability",
@@ -202,8 +222,10 @@ PIPELINE = Graph(
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
         reads_of_paper=PAPERS_WALK,
-        of_compass=True,
+        reads_of_scene=PAPERS_WALK,
+        inputs=scene_of_other_walkers,
         has_cells=True,
+        does_without=of_verification,
     ),
     Stage(
         "stability-maps",

@@ -70,7 +70,7 @@ class Keys:
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}
-            part = slice_of(config, stage.reads)
+            part = slice_of(config, stage.reads_under(config))
             keys[stage.name] = Identity(stage.name, part, given, self.code_digest(stage)).key
         return keys
 
@@ -128,7 +128,7 @@ class InMemory:
         if stage.keeps_parts:
             extra["parts"] = PartsInMemory()
         try:
-            return Answer(run(only(config, stage.reads), inputs, progress, **extra))
+            return Answer(run(only(config, stage.reads_under(config)), inputs, progress, **extra))
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             return Answer(partial, error)

@@ -9,7 +9,6 @@ from typing import Any, Literal
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_plain_compass
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
@@ -36,14 +35,11 @@ STILL_COMPUTED = "still being computed"
 """Why a drawing made early has to do without a result."""
 
 
-ANOTHER_WALKER = "it is about the paper's compass, and this is another walker"
-
-
 def why_unsuited(stage: Stage, config: Config) -> str | None:
     """Why a stage means nothing under a config; None if it does."""
     if stage.needs_contact and config.contact is None:
         return NO_CONTACT
-    return ANOTHER_WALKER if stage.of_compass and not is_plain_compass(config.walker) else None
+    return None
 
 
 def left_out(stage: str, why: str) -> LeftOut:
@@ -219,9 +215,16 @@ class Planner:
 
 
 def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
-    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on."""
-    own = slice_of(config, stage.reads)
-    return own | {"paper": slice_of(paper_config(), stage.reads_of_paper)} if stage.reads_of_paper else own
+    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on.
+
+    And, as `programs`, the versions of other programs that it drives.
+    """
+    own = slice_of(config, stage.reads_under(config))
+    if stage.reads_of_paper:
+        own["paper"] = slice_of(paper_config(), stage.reads_of_paper)
+    if stage.programs is not None:
+        own["programs"] = dict(stage.programs())
+    return own
 
 
 def input_digest(stage: Stage, result: Stored) -> str:

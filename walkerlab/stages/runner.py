@@ -16,7 +16,6 @@ from walkerlab.stages.ahead import Ahead
 from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
-    ANOTHER_WALKER,
     STILL_COMPUTED,
     LeftOut,
     Planner,
@@ -148,10 +147,6 @@ def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[St
 def refuse_unsuited(stage: Stage, config: Config) -> None:
     """Raise ConfigError if a stage is asked for that the config leaves out."""
     unsuited = why_unsuited(stage, config)
-    if unsuited == ANOTHER_WALKER:
-        raise ConfigError(
-            f"{stage.name} is left out: {unsuited}.", "`walkerlab compare` and `report` serve every walker."
-        )
     if unsuited is not None:
         raise ConfigError(
             f"{stage.name} needs a contact block, and the config has none.",

@@ -8,23 +8,38 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
+from walkerlab.config.walkers import is_plain_compass
+from walkerlab.scene.contact import pads_pitch
+from walkerlab.scene.left_out import of_verification
+from walkerlab.stages.contact_sim import own_pitch, rigid_start
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.verification.catalogue import judged
 from walkerlab.verification.cells import cells_of, run_cells
 from walkerlab.verification.known import Known
 from walkerlab.verification.ordinary import CAP, FINE, Choice
+from walkerlab.verification.scene_catalogue import scene_cases
 from walkerlab.verification.verdict import CaseResult
 
+OF_THE_SCENE = ("walker", "gravity_m_s2", "slope_rad", "equations", "contact", "solver", "seed")
+"""Keys that a scene's own cases keep where they change nothing else."""
 
-def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+
+def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Judge the catalogue and the config's own cases, answer the known problems, and try ordinary methods.
+
+    The paper's compass has a catalogue of named cases; of any other walker it is the scene's own extremes.
 
     jobs  processes
 
     Raises ConfigError if a case has the name of another.
     """
-    cells = cells_of(judged(config.stability.cases))
+    if is_plain_compass(config.walker):
+        cells = cells_of(judged(config.stability.cases))
+    else:
+        own = scene_cases(spelled_out(config, inputs))
+        judged(config.stability.cases, [case for case, _ in own])
+        cells = cells_of(config.stability.cases, own)
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
     known: list[Known] = []
@@ -35,7 +50,19 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, jobs
         ordinary += [item for item in found if isinstance(item, Choice)]
         progress.advance()
     summary = summary_of(cases, known, ordinary)
+    summary["left_out"] = list(of_verification(config))
     return Content({"cases": cases_group(cases), "known": known_group(known)}, summary | verdict(cases, known))
+
+
+def spelled_out(config: Config, inputs: Mapping[str, Content]) -> Config:
+    """The scene with the start, and the pitch of pads, in numbers, so that its cases share them."""
+    step, start = rigid_start(config, inputs)
+    scene = Config().model_copy(update={key: getattr(config, key) for key in OF_THE_SCENE} | {"start": start})
+    contact = config.contact
+    if contact is None or contact.terrain != "checkerboard":
+        return scene
+    pitch = pads_pitch(contact, step, own_pitch(config, step, start))
+    return scene.model_copy(update={"contact": contact.model_copy(update={"pad_pitch": pitch})})
 
 
 def verdict(cases: Sequence[CaseResult], known: Sequence[Known]) -> dict[str, Any]:

@@ -91,7 +91,7 @@ def task_of(
         stage.name,
         stage.module,
         config,
-        stage.reads,
+        stage.reads_under(config),
         inputs,
         folder,
         jobs if stage.has_cells else None,

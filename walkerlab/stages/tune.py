@@ -1,4 +1,4 @@
-"""The paper's parameter adjustment as a method: is it needed, how large is it, and what lies behind it."""
+"""The paper's parameter adjustment as a method for any walker: is it needed, how large is it, what lies behind it."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
+from walkerlab.config.walkers import is_plain_compass
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk, with_scaled_rates
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import (
     Adjustment,
     Margin,
     ScaledStarts,
+    Search,
     Trial,
     margins,
     scaled_starts,
@@ -28,7 +31,8 @@ from walkerlab.orbits.scaled_starts import (
 from walkerlab.orbits.start_map import StartMap, contact_map, rigid_map
 from walkerlab.paper.adams_start import PaperStart, forces_of, paper_start
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.left_out import of_adjustment
+from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
@@ -42,20 +46,23 @@ MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
 LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
 RIGID_METHOD, RIGID_RTOL, RIGID_ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
 AS_IT_STANDS = (1.0, 1.0)
+# walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
+COMPASS_CELLS, CELLS, COARSE = 61, 21, Search(step=0.05, largest=2.0)
 
 
 @dataclass(frozen=True)
 class Procedure:
     """The paper's procedure, step by step.
 
-    hinged    the walk whose first step has a revolute joint at its stance foot, from the rigid state
+    hinged    the paper's walk whose first step has a revolute joint at its stance foot, from the rigid state; None for
+              another walker than its compass
     released  the walk without it
     adjusted  the walk from the adjusted start; the released one if no adjustment is needed; None if there is none
     """
 
     rigid_state: State
     rigid: RecordedWalk
-    hinged: ContactWalkResult
+    hinged: ContactWalkResult | None
     released: ContactWalkResult
     adjusted: ContactWalkResult | None
 
@@ -72,8 +79,10 @@ class Findings:
     margins: list[Margin]
     contact_map: StartMap
     rigid_map: StartMap
-    paper: PaperStart
+    paper: PaperStart | None  # None for another walker than the paper's compass
     steps: int  # asked for
+    names: tuple[str, ...]  # of the rigid start's numbers
+    adjusted_state: State | None
     gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
 
@@ -84,7 +93,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
     gait = contact_gait(config, rigid_step, near)
     scene = free_scene(config, rigid_step, gait)
     found = Stage(config, scene, rigid_state, gait).findings(progress, jobs)
-    stored, said = groups(found), summary(found)
+    stored, said = groups(found), summary(found) | {"left_out": list(of_adjustment(config))}
     limit = rigid_limit(config, found, inputs, progress)
     if limit is not None:
         stored |= limit_groups(limit)
@@ -120,25 +129,29 @@ class Stage:
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.steps = 2 * config.strides
         self.rigid: Standing = rigid_walker(config, config.equations)
+        self.of_the_paper = is_plain_compass(config.walker)
         self.starts = self.scaled()
 
     def findings(self, progress: Progress, jobs: int) -> Findings:
         """Procedure, margins, map, adjustment and the paper's own start."""
         settings = self.config.tune
-        swing = np.linspace(*settings.swing_factors, settings.cells)
-        stance = np.linspace(*settings.stance_factors, settings.cells)
+        cells = settings.cells or (COMPASS_CELLS if self.of_the_paper else CELLS)
+        swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        hinged = self.walk(self.rigid_state, hinged_walker(self.config, self.scene.walker))
+        hinge = hinged_walker(self.config, self.scene.walker) if self.of_the_paper else None
+        hinged = None if hinge is None else self.walk(self.rigid_state, hinge)
         released = self.walk(self.rigid_state)
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
         quick = self.starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * as_it_stands.evaluations))
-        cells = contact_map(quick, swing, stance, jobs, progress.advance)
+        walked = contact_map(quick, swing, stance, jobs, progress.advance)
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
-        adjustment, around = self.adjusted(as_it_stands, quick, cells)
-        found = margins(self.starts, around) if adjustment is not None else []
-        adjusted = None if adjustment is None else self.walk(self.scaled_state(adjustment.swing, adjustment.stance))
+        adjustment, around = self.adjusted(as_it_stands, quick, walked)
+        search = Search() if self.of_the_paper else COARSE
+        found = margins(self.starts, around, search) if adjustment is not None else []
+        state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
+        adjusted = None if state is None else self.walk(state)
         return Findings(
             self.scene,
             self.gait,
@@ -152,10 +165,12 @@ class Stage:
             as_it_stands,
             adjustment,
             found,
-            cells,
+            walked,
             rigid_cells,
-            paper_start(self.rigid, self.walk, self.scene.walker),
+            paper_start(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
             self.steps,
+            coordinates(self.config),
+            state,
             None if adjusted is None else self.factors_at_the_end(adjusted),
         )
 
@@ -201,10 +216,12 @@ class Stage:
         lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
         if not lifted.size or walk.samples is None:
             return None
-        rates = walk.samples.states[lifted[0], 6:8]
-        if self.rigid_state[2] == 0.0 or self.rigid_state[3] == 0.0:
+        n = len(self.rigid_state) // 2
+        first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
+        if 0.0 in first:
             return None
-        return float(rates[swing] / self.rigid_state[2]), float(rates[landed] / self.rigid_state[3])
+        rates = motion_of_legs(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
+        return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
     def walk(self, state: State, pinned: Pinned | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples."""

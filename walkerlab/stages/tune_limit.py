@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.schema import Config
-from walkerlab.ground.compliant import compass_assembly, contact_walker
+from walkerlab.config.walkers import CompassWalker, is_plain_compass
+from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion
 from walkerlab.hybrid.recorded_walk import RecordedWalk
@@ -29,7 +30,8 @@ from walkerlab.orbits.rigid_limit import (
     observed_orders,
 )
 from walkerlab.paper.printed import ANGLE_ERROR
-from walkerlab.scene.contact import ContactScene, compass_parts, start_state
+from walkerlab.scene.contact import ContactScene, start_state
+from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
 from walkerlab.stages.progress import Progress
@@ -37,7 +39,8 @@ from walkerlab.stages.simulate import leg_variables
 from walkerlab.store.content import Group, Variable
 
 FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
-WALKED, GAITS = (ALL, ALL_POINT), (STICTION, STIFFNESS, DAMPING, NORMAL)
+COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
+OTHERS_EVERY = 2  # of the settings, for other walkers than the compass: their walks take several times as long
 # of each setting: name, unit, meaning, whether it is a run time
 COLUMNS = (
     ("period", "period_s", "s", "period of the contact gait"),
@@ -65,8 +68,12 @@ WALK_COLUMNS = (
 
 @dataclass(frozen=True)
 class LimitFindings:
-    """Distances by series, and the limit without creep."""
+    """Distances by series, and the limit without creep.
 
+    walked  the series of which whole walks are compared too
+    """
+
+    walked: tuple[str, ...]
     rigid_period: float
     contact_period: float
     series: dict[str, list[Distance]]
@@ -95,36 +102,37 @@ def limit_findings(
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
+        1 if is_plain_compass(config.walker) else OTHERS_EVERY,
     )
-    progress.start("tune: rigid limit", len(WALKED) + len(GAITS))
+    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
+    gaits = COMPASS_GAITS if is_plain_compass(config.walker) else GAITS
+    progress.start("tune: rigid limit", len(walked) + len(gaits))
 
     def start(walker: ContactWalker) -> State:
         return start_state(replace(scene, walker=walker), walk.start)
 
     found: dict[str, list[Distance]] = {}
-    for name in WALKED:
+    for name in walked:
         walker = scene.walker if name == ALL else point_footed(config, scene.walker)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
-    for name in GAITS:
+    for name in gaits:
         found[name] = limit.series(name, scene.walker, gait)
         progress.advance()
-    return LimitFindings(limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
+    return LimitFindings(walked, limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
 
 
 def point_footed(config: Config, walker: ContactWalker) -> ContactWalker:
     """The same walker on the same ground, with points for feet as the rigid model has them."""
-    parts = compass_parts(config.walker.model_copy(update={"foot_radius_m": 0.0}))
-    return contact_walker(
-        compass_assembly(parts), walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad
-    )
+    parts = assembly_of(config.walker, rigid=True)
+    return contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad)
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
     """Orders of convergence, what 1e-4 takes, and what each cause amounts to."""
     return {
         "orders": {name: orders(distances) for name, distances in found.series.items()},
-        "reaches": {name: reached(found.series[name]) for name in WALKED},
+        "reaches": {name: reached(found.series[name]) for name in found.walked},
         "causes": causes(found),
     }
 
@@ -164,25 +172,30 @@ def setting(one: Distance) -> dict[str, Any]:
 def causes(found: LimitFindings) -> dict[str, Any]:
     """Parts of the difference in period, each from switching one thing off while the others stay."""
     total = found.contact_period - found.rigid_period
+    farthest = found.series[found.walked[-1]]
     parts: dict[str, float] = {}
     if found.without_creep is not None:
         parts["creep_s"] = found.contact_period - found.without_creep.period
     if found.series[NORMAL]:
         parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL][-1].period
-    if found.series[ALL_POINT]:
+    if found.series.get(ALL_POINT):
         parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT][0].period
     return {
         "total_s": total,
         **parts,
         "together_s": total - sum(parts.values()),
         "creep_uncertainty_s": None if found.without_creep is None else found.without_creep.uncertainty,
-        "left_with_all_off_s": found.series[ALL_POINT][-1].period_error if found.series[ALL_POINT] else None,
+        "left_with_all_off_s": farthest[-1].period_error if farthest else None,
     }
 
 
 def limit_groups(found: LimitFindings) -> dict[str, Group]:
     """One group a series."""
-    return {f"limit/{group_name(name)}": series_group(name, rows) for name, rows in found.series.items() if rows}
+    return {
+        f"limit/{group_name(name)}": series_group(rows, name in found.walked)
+        for name, rows in found.series.items()
+        if rows
+    }
 
 
 def group_name(series: str) -> str:
@@ -190,11 +203,11 @@ def group_name(series: str) -> str:
     return series.replace(", ", "-").replace(" ", "-")
 
 
-def series_group(name: str, rows: list[Distance]) -> Group:
-    """A series' settings and distances."""
+def series_group(rows: list[Distance], walked: bool) -> Group:
+    """A series' settings and distances, and those of whole walks if any were compared."""
     dims = ("setting",)
     whole = [one for one in rows if one.angle is not None]
-    rows = whole if name in WALKED and whole else rows
+    rows = whole if walked and whole else rows
     factors = (
         ("stiffness", "stiffness_factor", "on the stiffness"),
         ("damping", "damping_factor", "on the damping"),
@@ -204,7 +217,7 @@ def series_group(name: str, rows: list[Distance]) -> Group:
     for attribute, column, text in factors:
         values = np.array([getattr(one.setting, attribute) for one in rows])
         variables[column] = Variable(values, dims, "1", f"factor {text}")
-    columns = COLUMNS + (WALK_COLUMNS if name in WALKED and whole else ())
+    columns = COLUMNS + (WALK_COLUMNS if walked and whole else ())
     for attribute, column, unit, text in columns:
         values = np.array([getattr(one, attribute) for one in rows])
         variables[column] = Variable(values, dims, unit, text, timing=attribute == "wall_s")

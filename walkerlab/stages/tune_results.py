@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.hybrid.contact_run import CHANNELS, OF_STRAIGHT_LEGS, ContactWalkResult
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk
-from walkerlab.orbits.contact_section import ContactGait
+from walkerlab.orbits.contact_section import ContactGait, angled_bodies, turning_bodies
+from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import Adjustment, Margin
 from walkerlab.orbits.start_map import StartMap
-from walkerlab.paper.printed import COORDINATES, TABLE_2
+from walkerlab.paper.adams_start import PaperStart
+from walkerlab.paper.printed import TABLE_2, StartRow
+from walkerlab.scene.contact import ContactScene
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.store.content import Group, Variable
 
@@ -23,14 +28,6 @@ if TYPE_CHECKING:
 TIME, LEG = "time", "leg"
 WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 SWING, STANCE = "swing_factor", "stance_factor"
-SECTION_COORDINATES = (
-    "height of the centre of mass over the slope (m)",
-    "angle of the stance leg (rad)",
-    "velocity of the centre of mass along the slope (m/s)",
-    "velocity of the centre of mass normal to the slope (m/s)",
-    "angular velocity of the swing leg (rad/s)",
-    "angular velocity of the stance leg (rad/s)",
-)
 
 
 def summary(found: Findings) -> dict[str, Any]:
@@ -40,20 +37,9 @@ def summary(found: Findings) -> dict[str, Any]:
         "table2": table_2(found),
         "gait": gait_summary(found),
         "adjustment": adjustment_summary(found),
-        "paper_start": {
-            "outcome": found.paper.walk.outcome.label,
-            "reason": found.paper.reason,
-            "steps": int(found.paper.walk.touch_time_s.size),
-            "state": list(found.paper.state),
-            "energy_J": found.paper.energy,
-            "weight_N": found.paper.weight,
-            "normal_force_N": found.paper.rigid_normal,
-            "pull_from_s": found.paper.pull_from,
-            "airborne_from_s": found.paper.airborne_from,
-            "end_time_s": found.paper.walk.end_time_s,
-        },
+        **({} if found.paper is None else {"paper_start": papers_start(found.paper)}),
         "procedure": {
-            "hinged": walk_summary(procedure.hinged),
+            **({} if procedure.hinged is None else {"hinged": walk_summary(procedure.hinged)}),
             "released": walk_summary(procedure.released),
             "adjusted": None if procedure.adjusted is None else walk_summary(procedure.adjusted),
         },
@@ -63,28 +49,52 @@ def summary(found: Findings) -> dict[str, Any]:
     }
 
 
+def papers_start(start: PaperStart) -> dict[str, Any]:
+    """What becomes of the paper's own start."""
+    return {
+        "outcome": start.walk.outcome.label,
+        "reason": start.reason,
+        "steps": int(start.walk.touch_time_s.size),
+        "state": list(start.state),
+        "energy_J": start.energy,
+        "weight_N": start.weight,
+        "normal_force_N": start.rigid_normal,
+        "pull_from_s": start.pull_from,
+        "airborne_from_s": start.airborne_from,
+        "end_time_s": start.walk.end_time_s,
+    }
+
+
 def table_2(found: Findings) -> dict[str, dict[str, Any]]:
-    """The paper's two starts and ours, with percentages on either base."""
-    rigid = found.procedure.rigid_state
-    change = found.adjustment
-    factors = (1.0, 1.0, 1.0, 1.0) if change is None else (1.0, 1.0, change.swing, change.stance)
+    """The start before and after the adjustment, of the paper's compass beside the paper's two, each on either base."""
+    n = len(found.names) // 2
+    papers = [printed_start(row) for row in TABLE_2] if found.paper is not None else [{}] * (2 * n)
+    adjusted = found.adjusted_state or (None,) * (2 * n)
     rows = {}
-    for name, printed, value, factor in zip(COORDINATES, TABLE_2, rigid, factors, strict=True):
-        matlab, adams = printed.matlab.value, printed.adams.value
-        ours = value * factor
+    for k, (name, printed, value, ours) in enumerate(
+        zip(found.names, papers, found.procedure.rigid_state, adjusted, strict=True)
+    ):
         rows[name] = {
-            "unit": printed.matlab.unit,
-            "paper_matlab": matlab,
-            "paper_adams": adams,
-            "paper_percent": printed.percent.value,
-            "paper_percent_of_matlab": percent(adams, matlab, matlab),
-            "paper_percent_of_adams": percent(adams, matlab, adams),
+            "unit": "rad" if k < n else "rad/s",
+            **printed,
             "ours_rigid": value,
-            "ours_adjusted": None if change is None else ours,
-            "ours_percent_of_rigid": None if change is None else percent(ours, value, value),
-            "ours_percent_of_adjusted": None if change is None else percent(ours, value, ours),
+            "ours_adjusted": ours,
+            "ours_percent_of_rigid": None if ours is None else percent(ours, value, value),
+            "ours_percent_of_adjusted": None if ours is None else percent(ours, value, ours),
         }
     return rows
+
+
+def printed_start(row: StartRow) -> dict[str, Any]:
+    """A row of the paper's Table 2, with percentages on either base."""
+    matlab, adams = row.matlab.value, row.adams.value
+    return {
+        "paper_matlab": matlab,
+        "paper_adams": adams,
+        "paper_percent": row.percent.value,
+        "paper_percent_of_matlab": percent(adams, matlab, matlab),
+        "paper_percent_of_adams": percent(adams, matlab, adams),
+    }
 
 
 def percent(value: float, other: float, base: float) -> float | None:
@@ -102,7 +112,7 @@ def gait_summary(found: Findings) -> dict[str, Any]:
     return {
         **said,
         "state": gait.z.tolist(),
-        "state_is": list(SECTION_COORDINATES),
+        "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(found.scene)],
         "section": "the swing foot passes the stance foot: no foot is touching or lifting there",
         "period_s": step.period_s,
         "step_length_m": step.length_m,
@@ -111,10 +121,31 @@ def gait_summary(found: Findings) -> dict[str, Any]:
         "stable": gait.stable,
         "slip_m": step.slip_m,
         "residual": gait.residual,
-        "lost_J": dict(zip(CHANNELS[:OF_STRAIGHT_LEGS], step.books_J[:OF_STRAIGHT_LEGS].tolist(), strict=True)),
+        "lost_J": by_channel(found.scene.walker, step.books_J),
         "height_lost_J": step.height_lost_J,
         "balance_J": float(step.books_J.sum() - step.height_lost_J),
     }
+
+
+def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
+    """What the numbers of a gait on its section are, and their units."""
+    walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
+
+    def of(quantity: str, bodies: tuple[int, ...]) -> list[str]:
+        return [f"{quantity} of the {role_of(walker, body)} {names[body].rstrip(' 0123456789')}" for body in bodies]
+
+    return [
+        ("height of the centre of mass over the slope", "m"),
+        *((text, "rad") for text in of("angle", angled_bodies(walker, STANCE_FOOT))),
+        ("velocity of the centre of mass along the slope", "m/s"),
+        ("velocity of the centre of mass normal to the slope", "m/s"),
+        *((text, "rad/s") for text in of("angular velocity", turning_bodies(walker, STANCE_FOOT))),
+    ]
+
+
+def role_of(walker: ContactWalker, body: int) -> str:
+    """Whether a body of a leg swings or stands."""
+    return "stance" if body in walker.legs[STANCE_FOOT] else "swing"
 
 
 def adjustment_summary(found: Findings) -> dict[str, Any]:
@@ -183,13 +214,12 @@ def groups(found: Findings) -> dict[str, Group]:
     stored: dict[str, Group | None] = {
         "map": map_group(found),
         "margins": margins_group(found.margins) if found.margins else None,
-        "gait": gait_group(found.gait.gait) if found.gait.gait is not None else None,
+        "gait": gait_group(found.gait.gait, found.scene) if found.gait.gait is not None else None,
         "rigid_start": rigid_group(procedure.rigid),
-        "released": walk_group(procedure.released),
-        "hinged": walk_group(procedure.hinged),
-        "adjusted": None if procedure.adjusted is None else walk_group(procedure.adjusted),
-        "paper_start": paper_group(found),
+        "paper_start": None if found.paper is None else paper_group(found.paper, found.scene.walker),
     }
+    walks = {"released": procedure.released, "hinged": procedure.hinged, "adjusted": procedure.adjusted}
+    stored |= {name: walk_group(walk, found.scene.walker) for name, walk in walks.items() if walk is not None}
     return {name: group for name, group in stored.items() if group is not None}
 
 
@@ -233,27 +263,30 @@ def margins_group(margins: list[Margin]) -> Group:
     )
 
 
-def gait_group(gait: ContactGait) -> Group:
+def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
     """The contact gait on its section."""
     pairs = ("coordinate", "along")
+    coordinates = section_coordinates(scene)
+    names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
+    units = ", ".join(unit for _, unit in coordinates)
     return Group(
         {
-            "coordinate": Variable(np.array(SECTION_COORDINATES, dtype=object), ("coordinate",), "", "coordinate"),
-            "state": Variable(gait.z, ("coordinate",), "m, rad, m/s, m/s, rad/s, rad/s", "gait on the section"),
+            "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
+            "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
             "derivative": Variable(gait.step.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
-            "multiplier": Variable(np.arange(6), ("multiplier",), "1", "number"),
+            "multiplier": Variable(np.arange(gait.z.size), ("multiplier",), "1", "number"),
             "multiplier_real": Variable(gait.multipliers.real.copy(), ("multiplier",), "1", "real part"),
             "multiplier_imag": Variable(gait.multipliers.imag.copy(), ("multiplier",), "1", "imaginary part"),
         }
     )
 
 
-def walk_group(walk: ContactWalkResult) -> Group | None:
+def walk_group(walk: ContactWalkResult, walker: ContactWalker) -> Group | None:
     """Angles and velocities of a walk of the contact model; None if nothing was sampled."""
     if walk.samples is None or walk.samples.time_s.size == 0:
         return None
-    y = walk.samples.states
-    return Group({**legs_in_time(walk.samples.time_s, y[:, 2:4], y[:, 6:8]), **touches(walk.touch_time_s)})
+    angle, velocity = motion_of_legs(walk.samples.states, walker)
+    return Group({**legs_in_time(walk.samples.time_s, angle, velocity), **touches(walk.touch_time_s)})
 
 
 def rigid_group(walk: RecordedWalk) -> Group | None:
@@ -286,11 +319,10 @@ def touches(times: Any) -> dict[str, Variable]:
     }
 
 
-def paper_group(found: Findings) -> Group:
+def paper_group(paper: PaperStart, walker: ContactWalker) -> Group:
     """The paper's ADAMS start in the contact model."""
-    paper = found.paper
     samples = paper.walk.samples
-    legs = {} if samples is None else legs_in_time(samples.time_s, samples.states[:, 2:4], samples.states[:, 6:8])
+    legs = {} if samples is None else legs_in_time(samples.time_s, *motion_of_legs(samples.states, walker))
     return Group(
         {
             **legs,

@@ -7,7 +7,6 @@ import importlib.metadata
 import io
 import platform
 import shlex
-import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,6 +16,7 @@ from ruamel.yaml import YAML
 
 import walkerlab
 from walkerlab.config.schema import Config
+from walkerlab.store.commit import commit_of_checkout, commit_of_installation
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
 """The libraries whose versions are recorded: those that numbers and figures may depend on."""
@@ -32,7 +32,7 @@ class Provenance:
     started_utc, ended_utc   ISO 8601
     platform       operating system, processor, Python
     package_version, library_versions
-    git_commit     of the source tree the package runs from, '-dirty' if it was changed; None if it is not in one
+    git_commit     of the source tree that the package runs from or was built from, '-dirty' if it was changed, if known
     input_digests  digest of each input's content, by stage
     """
 
@@ -103,23 +103,6 @@ def library_versions() -> dict[str, str]:
 
 
 def git_commit() -> str | None:
-    """The commit of the source tree that the package is run from, or None for an installed package or without git."""
-    root = Path(walkerlab.__file__).parent.parent
-    # Only the package's own repository: an environment inside somebody's checkout says nothing about this code.
-    if not (root / ".git").exists():
-        return None
-    commit = git(root, "rev-parse", "HEAD")
-    if commit is None:
-        return None
-    return f"{commit}-dirty" if git(root, "status", "--porcelain", "--", "walkerlab") else commit
-
-
-def git(root: Path, *arguments: str) -> str | None:
-    """What a git command prints, or None if it cannot be had."""
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=10, check=True
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return done.stdout.strip()
+    """The commit of the source tree that the package is run from, or was built from; None if nobody knows."""
+    package = Path(walkerlab.__file__).parent
+    return commit_of_checkout(package.parent) or commit_of_installation(package)

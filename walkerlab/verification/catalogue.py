@@ -31,9 +31,9 @@ def shipped() -> tuple[Case, ...]:
     return without_doubles(listed)
 
 
-def judged(own: Sequence[Case]) -> tuple[Case, ...]:
-    """The cases that come with the package and those of a config; ConfigError if two have one name."""
-    catalogue = shipped()
+def judged(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
+    """The cases of a catalogue, the package's unless told, and those of a config; ConfigError if two have one name."""
+    catalogue = shipped() if catalogue is None else catalogue
     taken = {case.name for case in catalogue} & {case.name for case in own}
     if taken:
         raise ConfigError(f"The catalogue has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)

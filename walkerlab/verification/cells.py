@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.contact_case import judge_contact
@@ -17,13 +18,17 @@ from walkerlab.verification.verdict import CaseResult
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to be judged, and tried with ordinary methods."""
+    """A case to be judged, and tried with ordinary methods.
+
+    config  of a scene's own case; None for a few lines over the paper's config
+    """
 
     case: Case
+    config: Config | None = None
 
     def run(self) -> tuple[CaseResult | Known | Choice, ...]:
         """The verdict, then the ordinary methods."""
-        config = config_of(self.case)
+        config = self.config or config_of(self.case)
         judge = judge_rigid if self.case.model == "rigid" else judge_contact
         return (judge(self.case, config), *choices(self.case, config))
 
@@ -43,9 +48,10 @@ Cell = CaseCell | KnownCell
 Found = tuple[CaseResult | Known | Choice, ...]
 
 
-def cells_of(cases: Sequence[Case]) -> list[Cell]:
-    """Everything there is to run: known problems first, since they are the longest."""
-    return [*(KnownCell(index) for index in range(len(PROBLEMS))), *(CaseCell(case) for case in cases)]
+def cells_of(cases: Sequence[Case], own: Sequence[tuple[Case, Config]] = ()) -> list[Cell]:
+    """Everything there is to run: known problems first, since they are the longest; then a scene's own cases."""
+    known = (KnownCell(index) for index in range(len(PROBLEMS)))
+    return [*known, *(CaseCell(*case) for case in own), *(CaseCell(case) for case in cases)]
 
 
 def run_cells(cells: Sequence[Cell], jobs: int) -> Iterator[Found]:

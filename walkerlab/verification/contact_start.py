@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.mechanics.standing import swing_foot
+from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.gait import Gait
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State
 
 HEIGHT = 1  # index into the state of the free walker
-RATES = 4  # where the velocities of the state begin
+
+
+@cache
+def gait_of(walker: Standing, seed: int) -> Gait | None:
+    """The gait that a search finds, once: most cases of a catalogue are one walker on other ground."""
+    return find_gaits(walker, seed).gait
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
     """The scene and start of a case; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
-        gait = find_gaits(walker, config.seed).gait
+        gait = gait_of(walker, config.seed)
         if gait is None:
             return None
         rigid_state, length = tuple(float(x) for x in gait.state), float(gait.step_length)
@@ -46,7 +53,8 @@ def prepared(config: Config, case: Case) -> Prepared | None:
     lowered = case.lowered_m
     y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
     mass, gravity, leg = scene.walker.tree.mass, config.gravity_m_s2, config.walker.leg_length_m
-    speed = float(np.max(np.abs([y[4], y[5], *(leg * rate for rate in y[6:])])))
+    rates = len(y) // 2  # where the velocities begin
+    speed = float(np.max(np.abs([*y[rates : rates + 2], *(leg * rate for rate in y[rates + 2 :])])))
     law = scene.walker.normal
     stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
     return Prepared(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)

@@ -92,7 +92,8 @@ def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
     """Momentum against impulse over the first steps of a case."""
     short = case.model_copy(update={"steps": min(case.steps, STEPS)})
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
-    speed = max(leg / pendulum_time(config), *np.abs(ready.start[4:6]), leg * float(np.max(np.abs(ready.start[6:]))))
+    rates = np.abs(ready.start[len(ready.start) // 2 :])
+    speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
     scale = mass * np.array([speed, speed, speed * leg])
     walk = looked_at(ready, config, short, np.zeros(0))
     grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.paper.appendix_a import RigidWalker
-from walkerlab.scene.rigid import compass, rigid_walker
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import compass_or_none, rigid_walker
 from walkerlab.solvers.registry import Method, method_named
 from walkerlab.solvers.system import State
 from walkerlab.verification.contact_case import TENFOLD, outcome_differs, without_start
+from walkerlab.verification.contact_start import gait_of
+from walkerlab.verification.rigid_momentum import RigidMasses
 from walkerlab.verification.scaling import pendulum_time, scaled, to_twin
 from walkerlab.verification.second_method import Second, promised, second_walk
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, finite
 
-Array = NDArray[np.float64]
 ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
 
 
@@ -32,7 +31,8 @@ class Prepared:
     """A walker and the state that it starts from."""
 
     walker: Standing
-    compass: RigidWalker  # what its momenta and energies are summed up from
+    masses: RigidMasses  # what its momenta and energies are summed up from
+    compass: RigidWalker | None  # the walker of Appendix A, if it is that
     start: State
     energy: float  # J, m g L and the kinetic energy of the start
 
@@ -41,16 +41,17 @@ def prepared(config: Config) -> Prepared | None:
     """Walker and start of a config; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
-        gait = find_gaits(walker, config.seed).gait
+        gait = gait_of(walker, config.seed)
         if gait is None:
             return None
         start: State = as_state(gait.state)
     else:
         start = config.start
     mass = walker.tree.mass
-    speed = walker.leg_length * max(abs(start[2]), abs(start[3]))
+    speed = walker.leg_length * max(abs(rate) for rate in start[len(start) // 2 :])
     energy = mass * (walker.gravity * walker.leg_length + 0.5 * speed**2)
-    return Prepared(walker, compass(config, config.equations), start, energy)
+    masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
+    return Prepared(walker, masses, compass_or_none(config, config.equations), start, energy)
 
 
 def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> RecordedWalk:
@@ -136,81 +137,15 @@ def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding
         Finding(BUDGET_USED, walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if walk.steps:
-        walker, before, after = ready.walker, walk.before, walk.after
-        ahead = before[:, 0] + before[:, 1] + 2.0 * walker.slope
+        masses, before, after = ready.masses, walk.before, walk.after
+        off = masses.feet_off_the_slope(before) / ready.walker.leg_length
+        won = masses.energy_won(before, after) / ready.energy
         found += [
-            Finding(
-                "distance of the feet from the slope at heel strike", float(np.max(np.abs(ahead))), ROUNDING, "rad"
-            ),
-            Finding("momentum changed by a heel strike", momentum_change(ready.compass, before, after), ROUNDING),
-            Finding("energy won at a heel strike", energy_won(ready, before, after), ROUNDING),
+            Finding("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
+            Finding("momentum changed by a heel strike", masses.momentum_change(before, after), ROUNDING),
+            Finding("energy won at a heel strike", finite(won), ROUNDING),
         ]
     return found
-
-
-def momentum_change(walker: RigidWalker, before: Array, after: Array) -> float:
-    """Largest change of the two angular momenta that a heel strike keeps, as a share of their size.
-
-    The whole walker's about the new foothold, and the new swing leg's about the hip; both from positions and
-    velocities of the masses, not from the impact's matrices.
-    """
-    change, size = 0.0, 1e-300
-    for old, new in zip(before, after, strict=True):
-        # legs in the order (comes down, lifts); after the strike the roles have changed
-        first, second = momenta(walker, (old[0], old[1], old[2], old[3]), stands=1)
-        third, fourth = momenta(walker, (new[1], new[0], new[3], new[2]), stands=0)
-        change = max(change, abs(third - first), abs(fourth - second))
-        size = max(size, abs(first), abs(second), abs(third), abs(fourth))
-    return finite(change / size)
-
-
-def momenta(walker: RigidWalker, legs: tuple[float, float, float, float], stands: int) -> tuple[float, float]:
-    """Angular momentum of the walker about the foot of leg 0, and of leg 1 about the hip (kg m^2/s).
-
-    legs    angles and angular velocities of leg 0, which comes down, and leg 1, which lifts
-    stands  the leg whose foot is at rest
-    """
-    length, a = walker.leg_length, walker.foot_to_mass
-    angles, rates = np.array(legs[:2]), np.array(legs[2:])
-    upward = np.array([-np.sin(angles), np.cos(angles)])  # of each leg, from foot to hip
-    turned = np.array([-upward[1], upward[0]])
-    hip_velocity = length * rates[stands] * turned[:, stands]
-    about_foot, about_hip = 0.0, 0.0
-    masses: list[tuple[float, Any, Any]] = [(walker.hip_mass, np.zeros(2), hip_velocity)]
-    for leg in range(2):
-        arm = -(length - a) * upward[:, leg]
-        velocity = hip_velocity - (length - a) * rates[leg] * turned[:, leg]
-        masses.append((walker.leg_mass, arm, velocity))
-        about_foot += walker.leg_inertia * rates[leg]
-        if leg == 1:
-            spin = walker.leg_inertia * rates[leg]
-            about_hip = walker.leg_mass * float(arm[0] * velocity[1] - arm[1] * velocity[0]) + spin
-    foot = -length * upward[:, 0]
-    for mass, position, velocity in masses:
-        arm = position - foot
-        about_foot += mass * float(arm[0] * velocity[1] - arm[1] * velocity[0])
-    return float(about_foot), float(about_hip)
-
-
-def energy_won(ready: Prepared, before: Array, after: Array) -> float:
-    """Largest gain of kinetic energy at a heel strike, as a share of the energy."""
-    gain = 0.0
-    for old, new in zip(before, after, strict=True):
-        gain = max(gain, kinetic(ready.compass, new) - kinetic(ready.compass, old))
-    return finite(gain / ready.energy)
-
-
-def kinetic(walker: RigidWalker, state: Array) -> float:
-    """Kinetic energy (J) from the velocities of the masses; leg 1 of the state stands."""
-    length, a = walker.leg_length, walker.foot_to_mass
-    angles, rates = state[:2], state[2:]
-    turned = np.array([-np.cos(angles), -np.sin(angles)])
-    hip = length * rates[1] * turned[:, 1]
-    total = 0.5 * walker.hip_mass * float(hip @ hip)
-    for leg in range(2):
-        velocity = hip - (length - a) * rates[leg] * turned[:, leg]
-        total += 0.5 * walker.leg_mass * float(velocity @ velocity) + 0.5 * walker.leg_inertia * float(rates[leg] ** 2)
-    return total
 
 
 def time_difference(

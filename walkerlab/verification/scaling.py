@@ -51,17 +51,29 @@ def to_twin(config: Config) -> Scale:
 
 
 def scaled_block(block: B, by: Scale) -> B:
-    """A block of measures scaled, each by the unit that its key ends in."""
-    units = {"_kg_m2": by.mass * by.length**2, "_kg": by.mass, "_m": by.length}
+    """A block of measures scaled, each by the unit that its key ends in; knees' stops are turned by torques."""
+    torque = by.force * by.length
+    units = {
+        "_kg_m2": by.mass * by.length**2,
+        "_kg": by.mass,
+        "_m": by.length,
+        "stop_stiffness": torque,
+        "stop_damping": torque * by.time,
+    }
     changed: dict[str, Any] = {}
     for name in type(block).model_fields:
-        value = getattr(block, name)
-        unit = next((unit for ending, unit in units.items() if name.endswith(ending)), None)
-        if isinstance(value, Block):
-            changed[name] = scaled_block(value, by)
-        elif isinstance(value, float) and unit is not None:
-            changed[name] = value * unit
+        unit = next((unit for ending, unit in units.items() if name.endswith(ending)), 1.0)
+        changed[name] = scaled_value(getattr(block, name), unit, by)
     return block.model_copy(update=changed)
+
+
+def scaled_value(value: Any, unit: float, by: Scale) -> Any:
+    """A key's value, blocks and lists of measures with all that is in them."""
+    if isinstance(value, Block):
+        return scaled_block(value, by)
+    if isinstance(value, tuple):
+        return tuple(scaled_value(each, unit, by) for each in value)
+    return value * unit if isinstance(value, float) and unit != 1.0 else value
 
 
 def scaled(config: Config, by: Scale) -> Config:
@@ -69,8 +81,8 @@ def scaled(config: Config, by: Scale) -> Config:
     walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {"walker": walker, "gravity_m_s2": config.gravity_m_s2 * by.gravity}
     if not isinstance(config.start, str):
-        theta_1, theta_2, omega_1, omega_2 = config.start
-        changes["start"] = (theta_1, theta_2, omega_1 / by.time, omega_2 / by.time)
+        n = len(config.start) // 2
+        changes["start"] = (*config.start[:n], *(rate / by.time for rate in config.start[n:]))
     if config.contact is not None:
         changes["contact"] = scaled_contact(config.contact, by)
     return config.model_copy(update=changes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -86,12 +87,25 @@ class Stepping:
     tolerance: float | None = None
 
 
-class Simulation(Protocol):
+class Simulation(ABC):
     """A model in its start state."""
 
+    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
+        """The model at coordinates q (of the root's freedoms, then of the hinges; m, rad) with velocities v."""
+        self.stepping = stepping
+        self.own = law if isinstance(law, OwnContact) else None
+        self.forces = None if isinstance(law, OwnContact) else law
+        self.build(model, q, v)
+
+    @abstractmethod
+    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
+        """Build the model in the engine, with its own contact or under the forces of our law."""
+
+    @abstractmethod
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""
 
+    @abstractmethod
     def carry(self, ball: int, carried: bool) -> None:
         """Put ground under a foot or take it away; means nothing without the engine's own contact."""
 
@@ -102,14 +116,13 @@ class Adapter(Protocol):
     INTEGRATORS     by name
     CONTACTS        its contact models, each with the integrator that it runs with
     CANNOT_EXPRESS  what it cannot, in words
+    Run             a model in it
     """
 
     INTEGRATORS: Mapping[str, Integrator]
     CONTACTS: Mapping[str, str]
     CANNOT_EXPRESS: tuple[str, ...]
+    Run: type[Simulation]
 
     def tuned(self, model: str, target: Contact) -> OwnContact:
         """The settings by which a contact model does what the target says, as far as it can."""
-
-    def simulation(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> Simulation:
-        """The model at coordinates q (of the root's freedoms, then of the hinges; m, rad) with velocities v."""

@@ -26,7 +26,8 @@ from walkerlab.benchmarks.engines.runs import (
 )
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import Coulomb, friction_coefficient
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.ground.held import held_flags, no_stops
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, held_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
 from walkerlab.mechanics.tree import mass_matrix
@@ -38,9 +39,11 @@ Floats = NDArray[np.float64]
 OURS = "walkerlab"
 SAME_LAW, OWN_LAW = "same-law", "own-law"
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
-OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)  # s
+OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
+EXACT_ENOUGH = 1e-5  # error on the same law from which on nothing finer is run
+SETTLED = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
 LARGEST_STEP_S = 0.01  # where they are
 STARTS = (0.95, 0.99)  # of the gait's velocities
 TUNING_STEP_S = 1e-5
@@ -48,11 +51,13 @@ TOUCHES, OWN_TOUCHES = 2, 10
 INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
 SWING_S = 0.48
 CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
-PATIENCE_S = 60.0  # with a run, before its process is ended
+PATIENCE_S = 120.0  # with a run, before its process is ended
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 ENDLESS = 100_000_000  # right-hand sides
+ENDLESS_S = 1e9
+LONGER = 2  # times as long as the walk under ADAMS's law another may take
 REPEATS = 3
 
 
@@ -62,11 +67,12 @@ class Row:
 
     integrator  the engine's own, for the same law; its contact model, for its own law
     start       the gait's velocities times this
-    step_s      of the engine; the mean one where steps are adapted
+    step_s      of the engine; the mean one where steps are adapted and the run came to an end
     tolerance   where steps are adapted, else None
     error       same law: largest difference of the end state from the reference (SI); own law: difference of the last
                 step's period from that of ADAMS's law (s)
     touch_error_s  largest difference of a touch time from the reference
+    wall_s      of its loop; an engine has a process of its own, whose processor time it is
     period_s    of the last step; step_length_m and slip_m likewise
     steps       walked
     why         how a run ended that has no outcome of its own
@@ -177,9 +183,9 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
     for rtol in OUR_LADDER:
         walls = []
         for _ in range(REPEATS):
-            begun = time.perf_counter()
+            begun = time.process_time()
             result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
-            walls.append(time.perf_counter() - begun)
+            walls.append(time.process_time() - begun)
         there = result.samples is not None and len(result.samples.states) > 1
         end = state_at_end(result) if there else None
         touches, along = result.touch_time_s[:TOUCHES], result.touch_along_m[:TOUCHES]
@@ -203,14 +209,18 @@ def same_law_rows(engine: Engine, version: str, scene: EngineScene, truth: Truth
         if integrator.for_contact_only:
             continue
         for stepping in ladder_of(name, integrator, truth.until_s):
-            most = integrator.most_steps
-            task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, most)
+            task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
             if isinstance(answer, Lost):
                 yield lost_row(scene, engine.name, version, SAME_LAW, stepping, name, 1.0, answer)
+                if answer.timed_out:
+                    break
                 continue
             mean = answer.time_s / max(1, answer.steps)
-            yield same_law_row(scene, engine.name, version, name, mean, stepping.tolerance, truth, answer)
+            row = same_law_row(scene, engine.name, version, name, mean, stepping.tolerance, truth, answer)
+            yield row
+            if row.error is not None and row.error < EXACT_ENOUGH:
+                break
 
 
 def ladder_of(name: str, integrator: Integrator, until_s: float) -> Iterator[Stepping]:
@@ -317,20 +327,44 @@ def tuned(
 def own_law_rows(
     engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
 ) -> Iterator[Row]:
-    """An engine's own contact over step sizes from the gait, then from other starts at the smallest one."""
-    adapter = engine.adapter()
-    integrator = adapter.CONTACTS[contact]
-    most = adapter.INTEGRATORS[integrator].most_steps
-    usual = 1.5 * float(truth.walk.touch_time_s[-1])
-    sizes = [h for h in OWN_LAW_STEPS if usual / h <= most]
-    for factor, h in [*((1.0, h) for h in sizes), *((factor, sizes[-1]) for factor in STARTS)]:
-        stepping = Stepping(integrator, h)
-        task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, 1.0e9, own, most)
+    """An engine's own contact over step sizes from the gait, then from other starts at the finest but one."""
+    name = engine.adapter().CONTACTS[contact]
+    integrator = engine.adapter().INTEGRATORS[name]
+    most = LONGER * integrator.most_steps
+
+    def walk(stepping: Stepping, factor: float) -> Row:
+        task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
         if isinstance(answer, Lost):
-            yield lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
-            continue
-        yield own_law_row(scene, engine.name, version, contact, factor, h, truth, answer)
+            return lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
+        step = answer.time_s / max(1, answer.steps) if integrator.adapts else stepping.step_s
+        return own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
+
+    before, done = None, []
+    for stepping in own_law_ladder(name, integrator, float(truth.walk.touch_time_s[-1])):
+        row = walk(stepping, 1.0)
+        yield row
+        done.append(stepping)
+        timed_out = row.outcome == Outcome.BUDGET_EXHAUSTED.label and row.why
+        if timed_out or (before is not None and has_settled(before, row)):
+            break
+        before = row
+    yield from (walk(stepping, factor) for stepping in done[-2:][:1] for factor in STARTS)
+
+
+def own_law_ladder(name: str, integrator: Integrator, usual_s: float) -> Iterator[Stepping]:
+    """The walks with one contact, from coarse to fine, that usually take `usual_s`."""
+    if integrator.adapts:
+        yield from (Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES)
+    else:
+        yield from (Stepping(name, h) for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps)
+
+
+def has_settled(coarse: Row, fine: Row) -> bool:
+    """Whether two walks to the end have one period."""
+    if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
+        return False
+    return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED
 
 
 def own_law_row(
@@ -340,6 +374,7 @@ def own_law_row(
     contact: str,
     start: float,
     step_s: float,
+    tolerance: float | None,
     truth: Truth,
     answer: WalkAnswer,
 ) -> Row:
@@ -348,7 +383,7 @@ def own_law_row(
     walked_all = answer.outcome == Outcome.WALKED.label and start == 1.0
     error = abs(period - truth.walk.periods_s[-1]) if period is not None and walked_all else None
     return Row(
-        scene.name, engine, version, OWN_LAW, contact, start, step_s, None, error, None, answer.wall_s,
+        scene.name, engine, version, OWN_LAW, contact, start, step_s, tolerance, error, None, answer.wall_s,
         period, length, slip, answer.touches_s.size, answer.outcome,
     )  # fmt: skip
 
@@ -356,9 +391,9 @@ def own_law_row(
 def adams_rows(scene: EngineScene, version: str) -> Iterator[Row]:
     """ADAMS's law on the same starts, by our own walk."""
     for factor in (1.0, *STARTS):
-        begun = time.perf_counter()
+        begun = time.process_time()
         result = walked(scene.started(factor), OUR_METHOD, 1e-7, OWN_TOUCHES)
-        wall = time.perf_counter() - begun
+        wall = time.process_time() - begun
         answer = WalkAnswer(
             result.outcome.label,
             None,
@@ -430,7 +465,9 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     n = len(scene.chain)
     foot = scene.assembly.feet[scene.stance]
     tree = tree_about(scene.assembly, Anchor(foot.body, foot.centre_m))
-    system = Pinned(scene.ours, tree, scene.stance, 0.0, (0.0,) * (2 * n))
+    walker = scene.ours
+    held = held_flags(walker.held, held_at_start(walker, scene.stance, scene.start)[0])
+    system = Pinned(walker, tree, scene.stance, 0.0, (0.0,) * (2 * n), held, no_stops(walker.knees))
 
     def rate(t: float, y: Floats) -> Any:
         return derivative(system, t, tuple(y))

@@ -6,6 +6,7 @@ its values and velocities, so that a touch is located to the fourth order in the
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +16,33 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces, in_arrays
-from walkerlab.ground.terrain import carried_in_cell, cell_at, has_pads
+from walkerlab.ground.held import BENT, FLEXED, RELEASED, held_flags, stop_flags
+from walkerlab.ground.motion import OnGround
+from walkerlab.ground.terrain import carried_in_cell, cell_at, cell_edges, has_pads
 from walkerlab.ground.walker import FootMotion
-from walkerlab.hybrid.contact_events import FALLEN_HIP, HEIGHT, PASSING, PER_FOOT, farthest_slide, material_along
-from walkerlab.hybrid.contact_rules import GOES_ON, LAST_TOUCH, STANCE, STEPS, Ledger, lift, pass_by, touch
+from walkerlab.hybrid.contact_events import (
+    CLIMB,
+    EXTENSION,
+    FALLEN_HIP,
+    HEIGHT,
+    PASSING,
+    PER_FOOT,
+    farthest_slide,
+    material_along,
+)
+from walkerlab.hybrid.contact_knee import locked
+from walkerlab.hybrid.contact_rules import (
+    GOES_ON,
+    LAST_TOUCH,
+    STANCE,
+    STEPS,
+    Ledger,
+    knee_stops,
+    lift,
+    pass_by,
+    release,
+    touch,
+)
 from walkerlab.hybrid.contact_run import new_ledger
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
@@ -26,7 +50,7 @@ from walkerlab.hybrid.outcome import Outcome
 Floats = NDArray[np.float64]
 Feet = list[list[float]]
 HALVINGS = 60
-FAR_AWAY = 1e4  # m or rad: where only a run that has lost its numbers gets to
+FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get to
 
 
 @dataclass
@@ -35,24 +59,37 @@ class Follower:
 
     ledger   what the walk remembers
     feet     of the last state: along (m), height (m), slip (m/s) and velocity of the height (m/s), twice
+    bends    of the last state: each knee's extension (rad) and its rate (rad/s), in the places of a foot's height
+    edges    between which a foot is over the same pad or gap (m), twice
     outcome  how it ended; None while it goes on
+    turn     a knee that locks or is released in the step that was just seen, which then counts for nothing
+    watches  whether knees are watched
     """
 
     scene: EngineScene
     look: FeetAndForces
     ledger: Ledger
     feet: Feet
-    on_pads: bool
+    bends: Feet
+    edges: list[tuple[float, float]]
     time_s: float = 0.0
     grounded_s: float = 0.0
     outcome: Outcome | None = None
+    turn: Turn | None = None
+    watches: bool = True
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Take in the state at the end of a step; whether the ground under a foot may have changed."""
-        if not (np.isfinite(q).all() and np.abs(q).max() < FAR_AWAY):
+        before, now = self.feet, self.look.feet(q, v)
+        if not all(-FAR_AWAY < place < FAR_AWAY for foot in now for place in foot[:2]):
             self._end(int(Outcome.SOLVER_FAILED))
             return False
-        before, now = self.feet, self.look.feet(q, v)
+        if self.bends:
+            if self.watches:
+                self.turn = self._turning(time_s - self.time_s, now, q, v)
+            if self.turn is not None and self.watches:
+                return False
+            self.bends = bends_of(self.scene, q, v)
         happened = self._happened(before, now)
         if happened:
             self._let_happen(time_s, before, now, q, v)
@@ -64,20 +101,14 @@ class Follower:
         """Whether a foot has crossed the ground or a pad's edge, or passed the other."""
         (x0, h0, _, _), (x1, h1, _, _) = before
         (y0, k0, _, _), (y1, k1, _, _) = now
-        if (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0):
-            return True
-        if (x0 < x1) != (y0 < y1):
-            return True
-        if not self.on_pads:
-            return False
-        terrain, cells = self.scene.ground.terrain, self.ledger.cells
-        return bool(cell_at(terrain, 0, y0) != cells[0] or cell_at(terrain, 1, y1) != cells[1])
+        (left0, right0), (left1, right1) = self.edges
+        crossed = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0)
+        return crossed or (x0 < x1) != (y0 < y1) or not (left0 <= y0 < right0 and left1 <= y1 < right1)
 
     def _let_happen(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
         """Let everything happen that lies between two states."""
         ledger, terrain, walker = self.ledger, self.scene.ground.terrain, self.scene.ours
-        if self.on_pads:
-            self._cross_edges(now)
+        self._cross_edges(now)
         if (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
             ledger.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
             for foot in range(2):
@@ -97,15 +128,51 @@ class Follower:
         if ledger.feet[STEPS] == ledger.touch_time.size:
             self._end(int(Outcome.WALKED))
 
+    def _turning(self, h: float, now: Feet, q: Floats, v: Floats) -> Turn | None:
+        """The first knee to lock or to be released within a step of h (s), if there is one."""
+        ledger, found = self.ledger, []
+        stance = ledger.feet[STANCE]
+        if ledger.releasing[0] and now[stance][3] >= 0.0:
+            sinking = max(0.0, -self.feet[stance][3])
+            share = sinking / (sinking + now[stance][3]) if sinking > 0.0 else 0.0
+            found.append(Turn(share, int(stance) * PER_FOOT + CLIMB))
+        for knee, (old, bend) in enumerate(zip(self.bends, bends_of(self.scene, q, v), strict=True)):
+            if ledger.knee[knee] == RELEASED and bend[1] < -FLEXED:
+                ledger.knee[knee] = BENT
+            elif ledger.knee[knee] == BENT and bend[1] >= 0.0:
+                found.append(Turn(crossing(old, bend, h), EXTENSION + knee))
+        return min(found, default=None)
+
+    def turn_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Let the knee lock or be released in this state; coordinates and velocities of the walker from there on."""
+        assert self.turn is not None, "a knee turns"
+        knees, signal, ledger, y = self.scene.ours.knees, self.turn.signal, self.ledger, self.scene.about_centre(q, v)
+        state = tuple(y.tolist())
+        if signal >= EXTENSION:
+            knee_stops(knees, ledger, signal, self.time_s)
+            walker, carried = self.scene.ours, (bool(ledger.carried[0]), bool(ledger.carried[1]))
+            held = held_flags(walker.held, ledger.held)
+            state, _ = locked(OnGround(walker, carried, held, stop_flags(knees, ledger.knee)), state)
+        else:
+            release(knees, ledger, 1 - int(ledger.feet[STANCE]))
+        self.turn, self.scene = None, self.scene.with_knees_locked(ledger.held)
+        self.look = FeetAndForces(self.scene, ledger.carried)
+        q, v = self.scene.from_base(state)
+        self.feet, self.bends = self.look.feet(q, v), bends_of(self.scene, q, v)
+        return q, v
+
     def _cross_edges(self, now: Feet) -> None:
         """The pads and gaps that the feet are over now."""
         terrain, ledger = self.scene.ground.terrain, self.ledger
+        if not has_pads(terrain):
+            return
         for foot in range(2):
             cell = cell_at(terrain, foot, now[foot][0])
             if cell == ledger.cells[foot]:
                 continue
             ledger.cells[foot] = cell
             ledger.carried[foot] = carried_in_cell(terrain, cell)
+            self.edges[foot] = edges_at(terrain, foot, cell)
             if ledger.carried[foot] and now[foot][1] < 0.0:
                 self._end(int(Outcome.OFF_PAD))
 
@@ -136,6 +203,19 @@ class Follower:
             self._end(int(Outcome.NO_HEEL_STRIKE))
 
 
+@dataclass(frozen=True, order=True)
+class Turn:
+    """A knee locks or is released: at what share of a step, and by which signal of a walk."""
+
+    share: float
+    signal: int
+
+
+def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Feet:
+    """Extension and its rate of each knee, zero of a locked one."""
+    return [[0.0, float(q[place]), 0.0, float(v[place])] if place >= 0 else [0.0] * 4 for place in scene.knee_places]
+
+
 class FeetAndForces:
     """The compiled function with what stays the same in its calls."""
 
@@ -144,7 +224,7 @@ class FeetAndForces:
         n = len(scene.chain)
         like = ((0.0,) * (4 + 2 * n), (0.0,) * n)
         self._fixed = (*in_arrays(scene.walker), *like, scene.chain, carried)
-        self._feet, self._forces, self._none = np.zeros((2, 4)), np.zeros(2 + n), np.zeros(0)
+        self._feet, self._forces, self._none = np.zeros((2, 4)), np.zeros(scene.model.size), np.zeros(0)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
         """How the feet move."""
@@ -164,7 +244,13 @@ def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> Follower:
     feet = look.feet(q, v)
     for row in feet:
         row[1] = min(row[1], -sys.float_info.min)  # both stand on the ground, inside or outside by rounding
-    return Follower(scene, look, ledger, feet, has_pads(scene.ground.terrain))
+    edges = [edges_at(scene.ground.terrain, foot, int(ledger.cells[foot])) for foot in range(2)]
+    return Follower(scene, look, ledger, feet, bends_of(scene, q, v), edges)
+
+
+def edges_at(terrain: Any, foot: int, cell: int) -> tuple[float, float]:
+    """Where a pad or gap begins and ends (m); ordinary ground does nowhere."""
+    return cell_edges(terrain, foot, cell) if has_pads(terrain) else (-math.inf, math.inf)
 
 
 def motions(rows: Feet) -> tuple[FootMotion, FootMotion]:

@@ -12,30 +12,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from walkerlab.benchmarks.engines.adapter import (
-    Contact,
-    Forces,
-    Integrator,
-    Law,
-    OnStep,
-    OwnContact,
-    Simulation,
-    Stepping,
-)
+from walkerlab.benchmarks.engines.adapter import Contact, Floats, Forces, Integrator, OnStep, OwnContact, Simulation
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
-Floats = NDArray[np.float64]
-INTEGRATORS = {"Euler": Integrator(1, 200_000), "RK4": Integrator(4, 60_000)}
+INTEGRATORS = {"Euler": Integrator(1, 120_000), "RK4": Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
     "a force that grows with a power of the penetration, or damping that does: its contact is linear",
     "stiffness in N/m: it is scaled by the contact's own effective mass",
     "two coefficients of friction: static and dynamic are one",
     "point feet: a ball of half a millimetre stands in for one",
+    "a knee that locks rigidly at an instant: its equality constraint is soft, so another model takes over there",
 )
+LEAST_INERTIA = 2e-15  # kg m^2, twice what MuJoCo asks for
 IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
 AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
@@ -56,27 +45,21 @@ def tuned(model: str, target: Contact) -> OwnContact:
     return OwnContact(model, settings)
 
 
-def simulation(model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> Simulation:
-    """The model at coordinates q with velocities v."""
-    return Run(model, stepping, q, v, law)
-
-
-class Run:
+class Run(Simulation):
     """A model and its data."""
 
-    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
+    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         """Compile the model and put it into its start state."""
         import mujoco
 
-        own = law if isinstance(law, OwnContact) else None
         mujoco.set_mjcb_passive(None)  # one for the whole process, and the last run's may still be there
         self._advance = mujoco.mj_step
-        self._model = mujoco.MjModel.from_xml_string(described(model, own))
-        self._model.opt.timestep = stepping.step_s
-        self._model.opt.integrator = getattr(mujoco.mjtIntegrator, MODES[stepping.integrator])
+        self._model = mujoco.MjModel.from_xml_string(described(model, self.own))
+        self._model.opt.timestep = self.stepping.step_s
+        self._model.opt.integrator = getattr(mujoco.mjtIntegrator, MODES[self.stepping.integrator])
         self._data = mujoco.MjData(self._model)
         self._data.qpos[:], self._data.qvel[:] = q, v
-        mujoco.set_mjcb_passive(None if law is None or isinstance(law, OwnContact) else applied(law))
+        mujoco.set_mjcb_passive(None if self.forces is None else applied(self.forces, self._data))
 
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""
@@ -93,11 +76,12 @@ class Run:
             self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(carried)
 
 
-def applied(forces: Forces) -> Any:
+def applied(forces: Forces, data: Any) -> Any:
     """The callback for passive forces, which every stage of every integrator asks."""
+    q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
-    def passive(_model: Any, data: Any) -> None:
-        data.qfrc_passive[:] = forces(data.qpos, data.qvel)
+    def passive(_model: Any, _data: Any) -> None:
+        passive_forces[:] = forces(q, v)
 
     return passive
 
@@ -135,7 +119,8 @@ def body(model: PlanarModel, place: int, contact: Any) -> str:
         else "".join(geom(n, ball, contact) for n, ball in enumerate(model.balls) if ball.link == place)
     )
     inside = "".join(body(model, child, contact) for child, other in enumerate(model.links) if other.parent == place)
-    (px, pz), (x, z), (cx, cz), i = link.parent_point_m, link.point_m, link.centre_m, link.inertia_kg_m2
+    (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
+    i = max(link.inertia_kg_m2, LEAST_INERTIA)
     return (
         f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{joints}'
         f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" '

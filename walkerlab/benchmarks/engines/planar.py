@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.mechanics.assembly import Anchor, levers, neighbours
-from walkerlab.mechanics.parts import Assembly, Position
+from walkerlab.mechanics.assembly import Anchor, levers, masses, neighbours
+from walkerlab.mechanics.parts import Assembly, Knee, Position
 
 Floats = NDArray[np.float64]
 Freedom = Literal["along", "height", "turn"]
@@ -23,7 +24,7 @@ SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than
 
 @dataclass(frozen=True)
 class Link:
-    """One rigid body, its particles lumped into it.
+    """One rigid body, lumped from bodies that move as one and the particles on them.
 
     parent        place of the body it is hinged to in `links`; -1 for the base
     parent_point  the hinge in the parent's frame (m); for the base the point that the root's freedoms move
@@ -71,19 +72,69 @@ class PlanarModel:
         return len(self.freedoms) + len(self.links) - 1
 
 
+@dataclass(frozen=True)
+class Skeleton:
+    """Which bodies make up each link, and how the links hang from each other.
+
+    members  of each link: a body, and where its frame's origin is in the link's (m); the link's own body first
+    hinges   of each link: its parent's place, the hinge in the parent's frame and in its own (m)
+    chain    (bodies, links) which relative angles, base first, add up to each body's absolute one (assembly's order)
+    """
+
+    members: tuple[tuple[tuple[str, Position], ...], ...]
+    hinges: tuple[tuple[int, Position, Position], ...]
+    chain: Floats
+
+    def placed(self, body: str, at_m: Position) -> tuple[int, Position]:
+        """The link that a point of a body belongs to, and where it is in that link's frame."""
+        for link, members in enumerate(self.members):
+            for name, shift in members:
+                if name == body:
+                    return link, moved(at_m, shift)
+        raise KeyError(body)
+
+
+def moved(point: Position, shift: Position) -> Position:
+    """A point in a frame whose origin is shifted."""
+    return (point[0] + shift[0], point[1] + shift[1])
+
+
+def skeleton(assembly: Assembly, base: str, base_point: Position, welds: Collection[Knee] = ()) -> Skeleton:
+    """The assembly from its base outwards, depth first; shank and thigh of a welded knee are one link."""
+    one = [{knee.thigh, knee.shank} for knee in welds]
+    members: list[list[tuple[str, Position]]] = [[(base, (0.0, 0.0))]]
+    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base_point)]
+    rows = {base: np.eye(1, len(assembly.bodies))[0]}
+
+    def grow(name: str, link: int, shift: Position) -> None:
+        for other, leaving, entering in neighbours(assembly, name):
+            if other in rows:
+                continue
+            hinge, rows[other] = moved(leaving, shift), rows[name].copy()
+            if {name, other} in one:
+                place, there = link, (hinge[0] - entering[0], hinge[1] - entering[1])
+                members[link].append((other, there))
+            else:
+                place, there = len(members), (0.0, 0.0)
+                rows[other][place] = 1.0
+                members.append([(other, there)])
+                hinges.append((link, hinge, entering))
+            grow(other, place, there)
+
+    grow(base, 0, (0.0, 0.0))
+    chain = np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)]
+    return Skeleton(tuple(tuple(link) for link in members), tuple(hinges), np.ascontiguousarray(chain))
+
+
 def planar_model(
-    assembly: Assembly, base: str, base_point: Position, freedoms: tuple[Freedom, ...], gravity: float, slope: float
+    assembly: Assembly, bones: Skeleton, freedoms: tuple[Freedom, ...], gravity: float, slope: float
 ) -> PlanarModel:
     """The assembly hung from a point of its base; gravity in m/s^2, slope in rad."""
-    names, hinges = order_from(assembly, base)
-    links = []
-    for name in names:
-        parent, parent_point, point = hinges.get(name, ("", (0.0, 0.0), base_point))
-        links.append(lumped(assembly, name, names.index(parent) if parent else -1, parent_point, point))
+    links = tuple(lumped(assembly, *link) for link in zip(bones.members, bones.hinges, strict=True))
     balls = tuple(
-        Ball(names.index(foot.body), foot.centre_m, *ball_and_ground(foot.radius_m)) for foot in assembly.feet
+        Ball(*bones.placed(foot.body, foot.centre_m), *ball_and_ground(foot.radius_m)) for foot in assembly.feet
     )
-    return PlanarModel(tuple(links), freedoms, balls, gravity * math.sin(slope), gravity * math.cos(slope))
+    return PlanarModel(links, freedoms, balls, gravity * math.sin(slope), gravity * math.cos(slope))
 
 
 def ball_and_ground(radius_m: float) -> tuple[float, float]:
@@ -92,41 +143,25 @@ def ball_and_ground(radius_m: float) -> tuple[float, float]:
     return ball, radius_m - ball
 
 
-def order_from(assembly: Assembly, base: str) -> tuple[list[str], dict[str, tuple[str, Position, Position]]]:
-    """The bodies from the base outwards, and for each but the base: its parent and the hinge in both frames."""
-    names, hinges = [base], {}
-    for name in names:
-        for other, leaving, entering in neighbours(assembly, name):
-            if other not in names:
-                names.append(other)
-                hinges[other] = (name, leaving, entering)
-    return names, hinges
-
-
-def lumped(assembly: Assembly, name: str, parent: int, parent_point: Position, point: Position) -> Link:
-    """A body and the particles on it as one."""
-    body = assembly.bodies[assembly.index(name)]
-    particles = [particle for particle in assembly.particles if particle.body == name and particle.mass_kg > 0.0]
-    masses = np.array([body.mass_kg, *(particle.mass_kg for particle in particles)])
-    places = np.array([body.centre_m, *(particle.at_m for particle in particles)])
-    total = float(masses.sum())
-    centre = masses @ places / total
-    inertia = body.inertia_kg_m2 + float(masses @ ((places - centre) ** 2).sum(axis=1))
+def lumped(
+    assembly: Assembly, members: tuple[tuple[str, Position], ...], hinge: tuple[int, Position, Position]
+) -> Link:
+    """Bodies that move as one, and the particles on them, as a link."""
+    parent, parent_point, point = hinge
+    every = [
+        (mass, moved(at.at_m, shift))
+        for name, shift in members
+        for mass, at in masses(assembly)
+        if at.body == name and mass > 0.0
+    ]
+    weights, places = np.array([mass for mass, _ in every]), np.array([at for _, at in every])
+    total = float(weights.sum())
+    centre = weights @ places / total
+    inertia = sum(assembly.bodies[assembly.index(name)].inertia_kg_m2 for name, _ in members)
+    inertia += float(weights @ ((places - centre) ** 2).sum(axis=1))
     least = SMALLEST_INERTIA * total * max(float(np.hypot(*(np.array(point) - centre))), SMALLEST_BALL_M) ** 2
     at = (float(centre[0]), float(centre[1]))
-    return Link(name, total, at, max(inertia, least), parent, parent_point, point)
-
-
-def chain_of(assembly: Assembly, base: str) -> Floats:
-    """Matrix (n, n): which relative angles, base first, add up to each body's absolute angle (assembly's order)."""
-    names, hinges = order_from(assembly, base)
-    chain = np.zeros((len(names), len(names)))
-    for name in names:
-        row = assembly.index(name)
-        if name in hinges:
-            chain[row] = chain[assembly.index(hinges[name][0])]
-        chain[row, names.index(name)] = 1.0
-    return chain
+    return Link(members[0][0], total, at, max(inertia, least), parent, parent_point, point)
 
 
 def levers_from(assembly: Assembly, base: str, base_point: Position, body: str, at_m: Position) -> Floats:

@@ -39,8 +39,11 @@ class Engine:
 
     @property
     def version(self) -> str:
-        """Of the package that is installed."""
-        return importlib.metadata.version(self.package)
+        """Of the package that is installed; "unknown" of a module that came without one."""
+        try:
+            return importlib.metadata.version(self.package)
+        except importlib.metadata.PackageNotFoundError:
+            return "unknown"
 
     def adapter(self) -> Adapter:
         """The module that drives it."""

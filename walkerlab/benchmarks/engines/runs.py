@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ from walkerlab.benchmarks.engines.planar import (
     Link,
     PlanarModel,
     ball_and_ground,
-    chain_of,
     planar_model,
+    skeleton,
 )
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
@@ -28,6 +28,7 @@ from walkerlab.hybrid.outcome import Outcome
 
 Floats = NDArray[np.float64]
 ROUNDING = 1e-9
+MANY = 10_000_000  # steps
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class WalkAnswer:
     touches  (steps,) s; along: (steps,) m; slips: (steps,) m
     steps    of the engine
     time_s   when it was over
-    wall_s   time of its loop
+    wall_s   processor time of its loop: it has a process of its own, and others may be running
     """
 
     outcome: str
@@ -71,53 +72,86 @@ class WalkTask:
 
     def run(self) -> WalkAnswer:
         """Walk."""
-        scene = self.scene
-        q, v = scene.from_base(scene.start)
-        rules = follower(scene, self.touches, q, v)
-        law = rules.look.forces if self.own is None else self.own
-        engine = ENGINES[self.engine].adapter().simulation(scene.model, self.stepping, q, v, law)
-        seen = Seen(rules, engine)
-        begun = time.perf_counter()
-        engine.run(self.most, self.until_s, seen.on_step)
-        wall = time.perf_counter() - begun
-        over = rules.outcome is None and seen.time_s >= (1.0 - ROUNDING) * self.until_s
-        outcome = rules.outcome or Outcome.WALKED if over or rules.outcome is not None else Outcome.BUDGET_EXHAUSTED
-        done, ledger = int(rules.ledger.feet[STEPS]), rules.ledger
+        walk = Walk(self)
+        walk.go()
+        rules, ledger = walk.rules, walk.rules.ledger
+        outcome = rules.outcome
+        if outcome is None:
+            outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
+        done = int(ledger.feet[STEPS])
         return WalkAnswer(
             outcome.label,
-            scene.about_centre(seen.q, seen.v) if outcome is Outcome.WALKED else None,
+            rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None,
             ledger.touch_time[:done].copy(),
             ledger.touch_along[:done].copy(),
             ledger.slip[:done].copy(),
-            seen.steps,
-            seen.time_s,
-            wall,
+            walk.steps,
+            walk.time_s,
+            walk.wall_s,
         )
 
 
-class Seen:
-    """What is seen of a walk at the ends of its steps."""
+class Walk:
+    """A walk in an engine: one model after another, each for as long as no knee locks or is released."""
 
-    def __init__(self, rules: Follower, engine: Simulation) -> None:
-        """Nothing yet; the engine is told where there is ground."""
-        self.rules, self.engine = rules, engine
-        self.steps, self.time_s = 0, 0.0
-        self.q: Floats = np.zeros(0)
-        self.v: Floats = np.zeros(0)
-        self.hand_over_ground()
+    def __init__(self, task: WalkTask) -> None:
+        """At the start."""
+        self.task = task
+        self.q, self.v = task.scene.from_base(task.scene.start)
+        self.rules: Follower = follower(task.scene, task.touches, self.q, self.v)
+        self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
 
-    def on_step(self, time_s: float, q: Floats, v: Floats) -> bool:
-        """Let the rules look at a step's end; whether the walk goes on."""
-        self.steps += 1
-        self.time_s, self.q, self.v = time_s, q, v
-        if self.rules.follow(time_s, q, v):
-            self.hand_over_ground()
-        return self.rules.outcome is None
+    @property
+    def is_over(self) -> bool:
+        """Whether its time is."""
+        return self.time_s >= (1.0 - ROUNDING) * self.task.until_s
 
-    def hand_over_ground(self) -> None:
+    def go(self) -> None:
+        """Walk to the end."""
+        while self.rules.outcome is None and not self.is_over and self.steps < self.task.most:
+            self._simulate(self.task.until_s)
+            turn = self.rules.turn
+            if turn is not None:
+                self._come_to(turn.share * (self.seen_s - self.time_s))
+                self.q, self.v = self.rules.turn_knee(self.q, self.v)
+
+    def _come_to(self, wait_s: float) -> None:
+        """Take the last step again, up to where a knee turns."""
+        self.rules.watches = False
+        if wait_s > ROUNDING * self.task.stepping.step_s:
+            self._simulate(self.time_s + wait_s)
+        self.rules.watches = True
+
+    def _simulate(self, until_s: float) -> None:
+        """Let the engine go on from the present state, by a whole number of steps."""
+        task, span = self.task, until_s - self.time_s
+        stepping = task.stepping
+        if not ENGINES[task.engine].adapter().INTEGRATORS[stepping.integrator].adapts:
+            stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
+        law = self.rules.look.forces if task.own is None else task.own
+        engine = ENGINES[task.engine].adapter().Run(self.rules.scene.model, stepping, self.q, self.v, law)
+        since = self.time_s
+        self.hand_over_ground(engine)
+
+        def on_step(time_s: float, q: Floats, v: Floats) -> bool:
+            self.seen_s = since + time_s
+            changed = self.rules.follow(self.seen_s, q, v)
+            if self.rules.turn is not None and self.rules.watches:
+                return False
+            self.steps += 1
+            self.time_s, self.q, self.v = self.seen_s, np.array(q), np.array(v)
+            if changed:
+                self.hand_over_ground(engine)
+            return self.rules.outcome is None
+
+        begun = time.process_time()
+        engine.run(task.most - self.steps, span, on_step)
+        self.wall_s += time.process_time() - begun
+
+    def hand_over_ground(self, engine: Simulation) -> None:
         """Tell the engine under which feet there is ground."""
         for foot in range(2):
-            self.engine.carry(foot, bool(self.rules.ledger.carried[foot]))
+            engine.carry(foot, bool(self.rules.ledger.carried[foot]))
 
 
 @dataclass(frozen=True)
@@ -144,12 +178,11 @@ class SwingTask:
     def run(self) -> SwingAnswer:
         """Swing."""
         n = len(self.chain)
-        q: Floats = np.linalg.solve(self.chain, self.start[:n] + self.slope).astype(np.float64)
-        v: Floats = np.linalg.solve(self.chain, self.start[n:]).astype(np.float64)
-        engine = ENGINES[self.engine].adapter().simulation(self.model, self.stepping, q, v, None)
-        begun = time.perf_counter()
+        q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])))[0].T
+        engine = ENGINES[self.engine].adapter().Run(self.model, self.stepping, q, v, None)
+        begun = time.process_time()
         last = recorded(engine, self.most, self.until_s)[-1]
-        wall = time.perf_counter() - begun
+        wall = time.process_time() - begun
         end = np.concatenate((self.chain @ last[1] - self.slope, self.chain @ last[2]))
         return SwingAnswer(end, wall)
 
@@ -169,8 +202,8 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> list[tuple[float
 def pinned_model(scene: EngineScene) -> tuple[PlanarModel, Floats]:
     """The scene's walker hinged at the centre of its stance foot, and its chain of angles."""
     foot = scene.assembly.feet[scene.stance]
-    model = planar_model(scene.assembly, foot.body, foot.centre_m, HINGED, scene.gravity, scene.ours.slope)
-    return model, chain_of(scene.assembly, foot.body)
+    bones = skeleton(scene.assembly, foot.body, foot.centre_m, scene.locked)
+    return planar_model(scene.assembly, bones, HINGED, scene.gravity, scene.ours.slope), bones.chain
 
 
 @dataclass(frozen=True)
@@ -220,11 +253,12 @@ class Bench:
         model = PlanarModel(
             (link,), UPRIGHT, (Ball(0, (0.0, 0.0), radius, ground),), along * target.gravity, target.gravity
         )
-        stepping = Stepping(self.adapter.CONTACTS[self.own.model], h)
-        engine = self.adapter.simulation(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
+        name = self.adapter.CONTACTS[self.own.model]
+        stepping = Stepping(name, h, ROUNDING if self.adapter.INTEGRATORS[name].adapts else None)
+        engine = self.adapter.Run(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
-        return Motion(recorded(engine, steps, steps * h))
+        return Motion(recorded(engine, MANY, steps * h))
 
     @property
     def settling_s(self) -> float:

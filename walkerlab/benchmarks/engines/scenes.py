@@ -8,22 +8,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.benchmarks.engines.planar import (
-    FLOATING,
-    PlanarModel,
-    chain_of,
-    levers_from,
-    planar_model,
-)
+from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, levers_from, planar_model, skeleton
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.held import IdealLock
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import Ground
+from walkerlab.hybrid.contact_run import Ground, held_at_start
 from walkerlab.mechanics.assembly import masses, total_mass
-from walkerlab.mechanics.parts import Assembly, Position
+from walkerlab.mechanics.parts import Assembly, Knee, Position
 from walkerlab.mechanics.standing import swing_foot
-from walkerlab.scene.contact import contact_scene, hinge_of, start_state
+from walkerlab.scene.contact import contact_scene, hinge_of, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State
@@ -40,10 +35,10 @@ class EngineScene:
     hip       its point that does
     ours      the walker as this project walks it
     walker    the same with its feet's levers from the base's point
-    chain     (n, n) which relative angles add up to each absolute one
     ground    terrain, and the measures that a walk is judged by
     stance    the first stance foot
     start     state of the free walker on the gait
+    locked    the knees that are: what an engine builds has no hinge there
     """
 
     name: str
@@ -53,15 +48,41 @@ class EngineScene:
     gravity: float
     ours: ContactWalker
     walker: ContactWalker
-    chain: Floats
     ground: Ground
     stance: int
     start: State
+    locked: tuple[Knee, ...] = ()
+
+    @cached_property
+    def bones(self) -> Skeleton:
+        """What hangs from what."""
+        return skeleton(self.assembly, self.base, self.hip, self.locked)
+
+    @property
+    def chain(self) -> Floats:
+        """Matrix (bodies, links): which relative angles add up to each absolute one."""
+        return self.bones.chain
 
     @cached_property
     def model(self) -> PlanarModel:
         """What an engine builds."""
-        return planar_model(self.assembly, self.base, self.hip, FLOATING, self.gravity, self.ours.slope)
+        return planar_model(self.assembly, self.bones, FLOATING, self.gravity, self.ours.slope)
+
+    @cached_property
+    def knee_places(self) -> tuple[int, ...]:
+        """Where each knee's angle is among an engine's coordinates; a locked one is at none, -1."""
+        bends = [self.bends(knee) for knee in self.assembly.knees]
+        return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
+
+    def bends(self, knee: Knee) -> Floats:
+        """By how much a knee bends with each of the relative angles."""
+        shank, thigh = self.assembly.index(knee.shank), self.assembly.index(knee.thigh)
+        return np.asarray(self.chain[shank] - self.chain[thigh])
+
+    def with_knees_locked(self, held: NDArray[np.int8]) -> EngineScene:
+        """The scene while these bodies are held."""
+        knees = self.assembly.knees
+        return replace(self, locked=tuple(knee for knee in knees if held[self.assembly.index(knee.shank)]))
 
     @cached_property
     def centre_levers(self) -> Floats:
@@ -78,7 +99,7 @@ class EngineScene:
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
         at, moving = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
-        relative, turning = np.linalg.solve(self.chain, angles), np.linalg.solve(self.chain, rates)
+        relative, turning = np.linalg.lstsq(self.chain, np.column_stack((angles, rates)))[0].T
         return np.concatenate((at, relative)), np.concatenate((moving, turning))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
@@ -100,14 +121,15 @@ class EngineScene:
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
-def compass_scene(config: Config, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """The config's compass on its own ground, free from its start."""
+def scene_of(config: Config, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
+    """The config's walker on its own ground, free from its start."""
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
     assembly = scene.assembly
     start = start_state(scene, rigid_state)
     base = assembly.legs[STANCE_FOOT][0]
     hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
-    return engine_scene("compass", assembly, base, hip, config.gravity_m_s2, scene.walker, scene.ground, start)
+    name = "kneed" if assembly.knees else "compass"
+    return engine_scene(name, assembly, base, hip, config.gravity_m_s2, scene.walker, scene.ground, start)
 
 
 def engine_scene(
@@ -130,18 +152,22 @@ def engine_scene(
         for d in (levers_from(assembly, base, hip, part.body, part.centre_m),)
     )
     walker = ours._replace(feet=(feet[0], feet[1]))
-    return EngineScene(
-        name, assembly, base, hip, gravity, ours, walker, chain_of(assembly, base), ground, STANCE_FOOT, start
-    )
+    scene = EngineScene(name, assembly, base, hip, gravity, ours, walker, ground, STANCE_FOOT, start)
+    return scene.with_knees_locked(held_at_start(ours, STANCE_FOOT, start)[0])
 
 
 def scenes(config: Config, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
     """The walks of a config."""
     assembly = assembly_of(config.walker)
-    if assembly.knees or assembly.couplings:
+    if assembly.couplings:
         raise ConfigError(
-            "engines: only walkers whose bodies turn independently are taken to other engines so far.",
-            "Choose a compass or straight legs without a torso.",
+            "engines: a torso held on the bisector is a constraint that is not taken to other engines.",
+            "Choose a walker without a torso.",
+        )
+    if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
+        raise ConfigError(
+            "engines: the compliant stop of a knee is not taken to other engines.",
+            "Choose walker.knee.lock: ideal.",
         )
     length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
-    return (compass_scene(config, length, rigid_state),)
+    return (scene_of(config, length, rigid_state),)

@@ -19,6 +19,15 @@ CAUSES = {
     "together_s": "what they make together",
 }
 """Parts of the difference in period, and what they are called in a sentence."""
+CHANNELS = {
+    "damping": ("damping at touch-down", 4),
+    "friction": ("friction", 3),
+    "knee_strikes": ("the knee's strike", 3),
+    "knee_stop": ("the knees' stops", 3),
+}
+"""Where a step dissipates energy, by the names under which it is stored: what that is called, and digits to show."""
+POINT_FEET = "all, point foot"
+"""The series of a walker whose feet are points in the rigid model and balls in the contact model."""
 NOTHING = 1e-9
 """Imaginary part below which a multiplier is shown as real."""
 Summary = Mapping[str, Any]
@@ -59,6 +68,7 @@ def verdict(results: Results, summary: Summary) -> str:
 def needed(summary: Summary) -> str:
     """Whether and by how much the start has to be changed."""
     found = summary["adjustment"]
+    swing, stance = ("link 1", "link 2") if "paper_start" in summary else ("the swing leg", "the stance leg")
     if not found["found"]:
         return f"No adjustment of the two initial velocities helps: {found['reason']}."
     if found["needed"]:
@@ -66,14 +76,14 @@ def needed(summary: Summary) -> str:
         return (
             f"This contact needs an adjustment: from the rigid start the walk ends as {released['outcome']} after "
             f"{count(released['steps'], 'step')}. The smallest change that walks {found['walked_steps']} steps scales "
-            f"the velocities of link 1 and link 2 by {number(found['scale_dtheta1'], 4)} and "
+            f"the velocities of {swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "
             f"{number(found['scale_dtheta2'], 4)}."
         )
     down, up = (number(abs(found["margins"][f"dtheta_2 {way}"]["percent"]), 3) for way in ("down", "up"))
     return (
         f"No adjustment is needed: from the rigid start as it stands the contact model walks all "
-        f"{found['walked_steps']} steps and settles on its own gait. It still does so if link 2 starts {down} % slower "
-        f"or {up} % faster."
+        f"{found['walked_steps']} steps and settles on its own gait. It still does so if {stance} starts {down} % "
+        f"slower or {up} % faster."
     )
 
 
@@ -83,12 +93,14 @@ def explained(summary: Summary) -> str:
     if not gait["found"]:
         return f"The contact model has no gait of its own: {gait['reason']}."
     lost, slip = gait["lost_J"], length(gait["slip_m"])
-    damping, friction = quantity(lost["damping"], "J", 4), quantity(lost["friction"], "J", 3)
+    goes = (
+        f"{quantity(lost[key], 'J', digits)} into {name}" for key, (name, digits) in CHANNELS.items() if lost.get(key)
+    )
+    into = listed(goes).replace(" into ", " go into ", 1)
     size = f"{quantity(gait['period_s'], 's')} and {quantity(gait['step_length_m'], 'm')}"
     return (
         f"That gait takes {size} a step, its foot slips by {slip}; of the "
-        f"{quantity(gait['height_lost_J'], 'J', 4)} that a step descends, {damping} go "
-        f"into damping at touch-down and {friction} into friction."
+        f"{quantity(gait['height_lost_J'], 'J', 4)} that a step descends, {into}."
     )
 
 
@@ -108,7 +120,8 @@ def caused(summary: Summary) -> str:
 
 def reached(summary: Summary) -> str:
     """What the paper's claim would take; nothing if that was not asked."""
-    found = summary.get("reaches", {}).get("all, point foot")
+    reaches = summary.get("reaches", {})
+    found = reaches.get(POINT_FEET, reaches.get("all"))
     if not found or not found["settings"]:
         return ""
     first, last = found["settings"][0], found["settings"][-1]
@@ -119,9 +132,11 @@ def reached(summary: Summary) -> str:
         number(chosen[f"{name}_factor"], 3) for name in ("stiffness", "damping", "stiction_velocity")
     )
     contact = (
-        f"point feet, {stiffness} times the config's stiffness, {damping} times its damping and {stiction} times its "
-        f"stiction velocity"
+        f"{stiffness} times the config's stiffness, {damping} times its damping and {stiction} times its stiction "
+        "velocity"
     )
+    if POINT_FEET in reaches:
+        contact = f"point feet, {contact}"
     if within is not None:
         return (
             f"To differ from the rigid walk by no more than {claim} rad in phase instead of {differ} takes {contact}."
@@ -190,6 +205,11 @@ def gait_table(summary: Summary, rigid: Summary | None) -> Table:
         ["slip a step", length(gait["slip_m"]), "none"],
         ["energy lost to damping", quantity(gait["lost_J"]["damping"], "J"), "in the impact, all"],
         ["energy lost to friction", quantity(gait["lost_J"]["friction"], "J"), "none"],
+        *(
+            [f"energy lost in {CHANNELS[key][0]}", quantity(gait["lost_J"][key], "J"), instead]
+            for key, instead in (("knee_strikes", "in the strike"), ("knee_stop", "none"))
+            if gait["lost_J"].get(key)
+        ),
         ["height lost", quantity(gait["height_lost_J"], "J"), "the same as lost"],
     ]
     columns = [Column("quantity"), Column("contact model", numeric=True), Column("rigid model", numeric=True)]

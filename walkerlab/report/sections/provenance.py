@@ -77,7 +77,7 @@ def software(result: Stored) -> tuple[tuple[str, str], ...]:
     """What a result was made with."""
     made = result.provenance
     libraries = sorted(made.library_versions.items())
-    commit = made.git_commit or "not from a checkout"
+    commit = made.git_commit or "unknown"
     return (("walkerlab", made.package_version), ("commit", commit), *libraries, ("platform", made.platform))
 
 

@@ -1,0 +1,97 @@
+"""What a sweep itself costs: memory and time of the sweeping process over points that take no time to compute.
+
+    python scripts/sweep_scale.py [--points 10000 100000] [--limit-mb 500]
+
+Each point answers with the summary of a real fixed point, so that rows, files and the result are as large as real ones.
+Exit code 1 if the sweeping process needs more memory than the limit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from walkerlab.stages.graph import Graph, Stage
+from walkerlab.store.content import Content
+
+HERE = Path(__file__)
+GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", ("slope",)))
+
+
+def run(config: Any, _inputs: Any, _progress: Any) -> Content:
+    """A stage: the summary of the paper's gaits, on the slope of the point."""
+    return Content({}, real_summary() | {"slope_rad": config.slope_rad})
+
+
+@lru_cache
+def real_summary() -> dict[str, Any]:
+    """What `fixedpoint` says of the paper's walker."""
+    import walkerlab
+
+    return dict(walkerlab.run("fixedpoint", runs=os.environ["SWEEP_SCALE_RUNS"]).summary)
+
+
+def main() -> None:
+    """Measure each number of points in a process of its own."""
+    options = parsed()
+    if options.one:
+        measure(options.one)
+        return
+    worst = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.pathsep.join(filter(None, (str(HERE.parent), os.environ.get("PYTHONPATH"))))
+        environment = os.environ | {"SWEEP_SCALE_RUNS": folder, "PYTHONPATH": path}
+        for points in options.points:
+            command = [sys.executable, str(HERE), "--one", str(points)]
+            said = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
+            print(said, end="")
+            worst = max(worst, float(said.split(" MB")[0].split()[-1]))
+    print(f"within {options.limit_mb:.0f} MB: {worst <= options.limit_mb}")
+    sys.exit(worst > options.limit_mb)
+
+
+def parsed() -> argparse.Namespace:
+    """The options."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("--points", type=int, nargs="+", default=[10_000, 100_000])
+    parser.add_argument("--limit-mb", type=float, default=500.0)
+    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    return parser.parse_args()
+
+
+def measure(points: int) -> None:
+    """Sweep once, and say what it took."""
+    from walkerlab.config.loader import template
+    from walkerlab.store.runfolder import RunFolder
+    from walkerlab.sweeps.question import asked, axis_of_text
+    from walkerlab.sweeps.sweep import Sweep, Work
+
+    runs = Path(os.environ["SWEEP_SCALE_RUNS"], str(points))
+    real_summary()
+    before, started, used = peak_mb(), time.perf_counter(), time.process_time()
+    question = asked("echo", [axis_of_text(f"slope_deg=0.5:5:{points}")])
+    swept = Sweep(question, template(None), RunFolder(runs, "scale"), GRAPH).run(Work(graph=f"{HERE.stem}:GRAPH"))
+    wall, used = time.perf_counter() - started, time.process_time() - used
+    size, chunks = swept.path.stat().st_size, list(swept.path.parent.glob("sweep-chunks/*.h5"))
+    print(
+        f"{points} points: peak memory {peak_mb():.0f} MB, of it {before:.0f} MB before any point; "
+        f"{1e3 * used / points:.2f} ms a point of the sweeping process, {wall:.0f} s in all; "
+        f"result {size / 1e6:.0f} MB; {len(chunks)} chunks, {sum(path.stat().st_size for path in chunks) / 1e6:.0f} MB"
+    )
+
+
+def peak_mb() -> float:
+    """The most memory that this process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+if __name__ == "__main__":
+    main()

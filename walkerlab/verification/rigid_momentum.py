@@ -1,0 +1,131 @@
+"""Momentum and energy of the rigid model from its masses, whatever the walker: not from its equations of motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.mechanics.assembly import Anchor, levers, masses
+from walkerlab.mechanics.parts import Assembly
+from walkerlab.mechanics.rigid import hip_of, places_of
+from walkerlab.mechanics.standing import STANCE, SWING
+from walkerlab.verification.verdict import finite
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Every mass and body of a walker at an instant; the point on the ground under the stance foot is the origin.
+
+    mass      (masses,) kg
+    place     (masses, 2) m
+    velocity  (masses, 2) m/s
+    inertia   (bodies,) kg m^2, of the bodies about their own centres of mass
+    rate      (bodies,) rad/s
+    hip       (2,) m
+    contact   (2,) m, of the swing foot the point that would touch
+    """
+
+    mass: Array
+    place: Array
+    velocity: Array
+    inertia: Array
+    rate: Array
+    hip: Array
+    contact: Array
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy (J)."""
+        return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
+
+    def about(self, point: Array, on_masses: Array, on_bodies: Array) -> float:
+        """Angular momentum about a point (kg m^2/s), of masses and bodies by their share in what is meant."""
+        arm = self.place - point
+        orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
+        return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
+
+
+class RigidMasses:
+    """A walker's masses, and where states of the rigid model put them."""
+
+    def __init__(self, assembly: Assembly, slope: float) -> None:
+        """Sum up the levers from the centre of the stance foot's arc; slope in rad."""
+        foot, other, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
+        root = Anchor(foot.body, foot.centre_m)
+        self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
+        self.members = places_of(assembly).members
+        found = list(masses(assembly))
+        self.mass = np.array([mass for mass, _ in found])
+        self.owner = [assembly.index(at.body) for _, at in found]
+        self.levers = np.array([levers(assembly, root, at) for _, at in found])
+        self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
+        self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
+        self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
+
+    def at(self, state: Array) -> Moving:
+        """The masses in a state of the rigid model (2 n)."""
+        n = self.members.shape[1]
+        psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
+        s, c = np.sin(psi), np.cos(psi)
+        centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
+
+        def turned(d: Array) -> Array:
+            return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
+
+        arms = turned(self.levers)
+        swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[:, None]
+        return Moving(
+            self.mass,
+            centre + arms.sum(axis=1),
+            rolling + swept.sum(axis=1),
+            self.inertia,
+            rate,
+            centre + turned(self.to_hip).sum(axis=0),
+            turned(self.to_foot).sum(axis=0),
+        )
+
+    def share_of(self, leg: int) -> Array:
+        """By how much each body (bodies,) turns with a leg when that turns about the hip: a coupled body in part."""
+        names = [body.name for body in self.assembly.bodies]
+        share = np.array([1.0 if name in self.assembly.legs[leg] else 0.0 for name in names])
+        for coupling in self.assembly.couplings:
+            share[names.index(coupling.body)] = sum(
+                weight for name, weight in zip(coupling.of, coupling.weights, strict=True)
+                if name in self.assembly.legs[leg]
+            )  # fmt: skip
+        return share
+
+    def momenta(self, state: Array, new: bool) -> tuple[float, float]:
+        """The angular momenta that a heel strike keeps (kg m^2/s).
+
+        The whole walker's about the new foothold; that of the leg that lifts, and of what turns along with it in part,
+        about the hip.
+
+        new  whether the walker stands on the new foothold already
+        """
+        moving = self.at(state)
+        foothold = np.zeros(2) if new else moving.contact
+        share = self.share_of(SWING if new else STANCE)
+        whole = moving.about(foothold, np.ones(self.mass.size), np.ones(share.size))
+        return whole, moving.about(moving.hip, share[self.owner], share)
+
+    def momentum_change(self, before: Array, after: Array) -> float:
+        """Largest change of these momenta in heel strikes, as a share of their size; states (strikes, 2 n)."""
+        change, size = 0.0, 1e-300
+        for old, new in zip(before, after, strict=True):
+            kept, left = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
+            change, size = max(change, *np.abs(left - kept)), max(size, *np.abs(kept), *np.abs(left))
+        return finite(change / size)
+
+    def energy_won(self, before: Array, after: Array) -> float:
+        """Largest gain of kinetic energy (J) in heel strikes; 0 if each loses some."""
+        gains = [self.at(new).kinetic - self.at(old).kinetic for old, new in zip(before, after, strict=True)]
+        return max(0.0, *gains)
+
+    def feet_off_the_slope(self, before: Array) -> float:
+        """Largest distance of the foot that comes down from the slope (m)."""
+        return float(max(abs(self.at(state).contact[1]) for state in before))
