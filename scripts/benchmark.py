@@ -166,17 +166,12 @@ def contact_lines(trial: ContactTrial, reference: Reference, watch: Stopwatch) -
 
 def kneed_lines(watch: Stopwatch) -> Iterator[Line]:
     """What a step of the kneed walker costs against one of the compass at the same error, in both models."""
-    kneed = load(Path("kneed"), ()).config
-    for work, level, method, bar, trials in (
-        ("rigid step at 1e-9", 1e-9, "dop853", 3.0, [rigid_trial_of(ONE_DEGREE), rigid_trial_of(kneed)]),
-        (
-            "step of a contact walk at 2e-6",
-            2e-6,
-            "radau5",
-            2.5,
-            [contact_trial_of(ONE_DEGREE), contact_trial_of(kneed)],
-        ),
+    walkers = (ONE_DEGREE, load(Path("kneed"), ()).config)
+    for work, level, method, bar, trial_of in (
+        ("rigid step at 1e-9", 1e-9, "dop853", 3.0, rigid_trial_of),
+        ("step of a contact walk at 2e-6", 2e-6, "radau5", 2.5, contact_trial_of),
     ):
+        trials: list[Trial] = [trial_of(config) for config in walkers]
         one, other = (cheapest(trial, reference_for(trial), method, level, watch, LADDER) for trial in trials)
         if one is None or other is None:
             yield Line(f"{work}, kneed against compass", "the error was not reached", f"{bar:g} x", MISSED)
