@@ -30,15 +30,19 @@ from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
 from walkerlab.config.loader import load
+from walkerlab.config.schema import Config
+from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
+from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import newton
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.scene.rigid import compass, rigid_walker
+from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
+from walkerlab.stages.accuracy import OFF_THE_GAIT
 from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
@@ -152,19 +156,48 @@ def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
     yield replace(line, measured=line.measured.strip() + known)
 
 
-def contact_trial_at_one_degree() -> ContactTrial:
-    """Ten steps, 7 s, with the paper's contact from the rigid fixed point."""
-    gait = find_gaits(rigid_walker(ONE_DEGREE, "corrected")).gait
-    assert gait is not None, "there is a gait at 1 degree"
-    return contact_trial(ONE_DEGREE, tuple(gait.state), gait.step_length, STEPS)
-
-
 def contact_lines(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> Iterator[Line]:
     """The contact walker against SciPy's stiff solvers."""
     for level, peer, bar, stretch in ((2e-6, "scipy-radau", 30, 70), (1e-4, "scipy-lsoda", 8, 20)):
         ours = cheapest(trial, reference, "radau5", level, watch, LADDER)
         found = cheapest(trial, reference, peer, level, watch, LADDER[2:])
         yield against(f"contact walker, 7 s at {level:g}, against {peer}", ours, found, bar, stretch)
+
+
+def kneed_lines(watch: Stopwatch) -> Iterator[Line]:
+    """What a step of the kneed walker costs against one of the compass at the same error, in both models."""
+    walkers = (ONE_DEGREE, load(Path("kneed"), ()).config)
+    for work, level, method, bar, trial_of in (
+        ("rigid step at 1e-9", 1e-9, "dop853", 3.0, rigid_trial_of),
+        ("step of a contact walk at 2e-6", 2e-6, "radau5", 2.5, contact_trial_of),
+    ):
+        trials: list[Trial] = [trial_of(config) for config in walkers]
+        one, other = (cheapest(trial, reference_for(trial), method, level, watch, LADDER) for trial in trials)
+        if one is None or other is None:
+            yield Line(f"{work}, kneed against compass", "the error was not reached", f"{bar:g} x", MISSED)
+            continue
+        line = at_most(f"{work}, kneed against compass", other.seconds / one.seconds, "x", bar, 0.5 * (1.0 + bar))
+        yield replace(line, measured=f"{line.measured}: {spoken(other)} against {spoken(one)}, ten steps each")
+
+
+def rigid_trial_of(config: Config) -> RigidTrial:
+    """Ten rigid steps from near the gait of a config."""
+    walker = rigid_walker(config, "corrected")
+    start = with_scaled_rates(walker, chosen_gait(config).state, OFF_THE_GAIT, OFF_THE_GAIT)
+    return RigidTrial(walker, start, STEPS, compass_or_none(config, "corrected"))
+
+
+def contact_trial_of(config: Config) -> ContactTrial:
+    """Ten steps with the contact of a config from its rigid fixed point."""
+    gait = chosen_gait(config)
+    return contact_trial(config, tuple(gait.state), gait.step_length, STEPS)
+
+
+def chosen_gait(config: Config) -> Gait:
+    """The rigid gait of a config that has one."""
+    gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
+    assert gait is not None, "there is a gait"
+    return gait
 
 
 def newton_lines(watch: Stopwatch) -> Iterator[Line]:
@@ -305,8 +338,8 @@ def main() -> None:
     options = parser.parse_args()
     watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
 
-    lines = [*rigid_lines(watch), *newton_lines(watch), *family_lines(Stopwatch(3, 10.0))]
-    trial = contact_trial_at_one_degree()
+    lines = [*rigid_lines(watch), *kneed_lines(watch), *newton_lines(watch), *family_lines(Stopwatch(3, 10.0))]
+    trial = contact_trial_of(ONE_DEGREE)
     reference = reference_for(trial)
     lines += contact_lines(trial, reference, watch)
     lines += batch_lines(watch, options.quick)

@@ -16,12 +16,12 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
@@ -58,19 +58,32 @@ def straight_legs(draw: Draw) -> StraightLegs:
     )
 
 
-def kneed(draw: Draw) -> Kneed:
-    """Light shanks, knees around mid leg, either rule of the trailing knee."""
+def kneed(draw: Draw, at_heel_strike: Literal["locked", "free"] = "locked") -> Kneed:
+    """Light shanks, knees around mid leg."""
     upper = draw.uniform(0.4, 0.6)
     return Kneed(
         type="kneed",
-        thigh={"length_m": upper, "mass_kg": 0.5, "mass_below_hip_m": upper * draw.uniform(0.3, 0.8),
-               "inertia_kg_m2": draw.uniform(0.0, 0.005)},
-        shank={"length_m": 1.0 - upper, "mass_kg": draw.uniform(0.02, 0.15),
-               "mass_below_knee_m": draw.uniform(0.1, 0.25), "inertia_kg_m2": draw.uniform(0.0, 0.001)},
+        thigh=Thigh(
+            length_m=upper,
+            mass_kg=0.5,
+            mass_below_hip_m=upper * draw.uniform(0.3, 0.8),
+            inertia_kg_m2=draw.uniform(0.0, 0.005),
+        ),
+        shank=Shank(
+            length_m=1.0 - upper,
+            mass_kg=draw.uniform(0.02, 0.15),
+            mass_below_knee_m=draw.uniform(0.1, 0.25),
+            inertia_kg_m2=draw.uniform(0.0, 0.001),
+        ),
         hip_mass_kg=draw.uniform(0.2, 2.0),
-        foot_radius_m=draw.choice((0.0, draw.uniform(0.02, 0.25))),
-        knee={"at_heel_strike": "locked" if draw.random() < 0.8 else "free"},
-    )  # fmt: skip
+        foot_radius_m=float(draw.choice((0.0, draw.uniform(0.02, 0.25)))),
+        knee=KneeJoint(at_heel_strike=at_heel_strike),
+    )
+
+
+def kneed_free(draw: Draw) -> Kneed:
+    """The same with the trailing knee free during the heel strike."""
+    return kneed(draw, "free")
 
 
 def torso(draw: Draw) -> CompassWalker:
@@ -79,9 +92,12 @@ def torso(draw: Draw) -> CompassWalker:
         leg_mass_kg=5.0,
         foot_to_mass_m=draw.uniform(0.3, 0.7),
         hip_mass_kg=draw.uniform(0.0, 10.0),
-        torso={"mass_kg": draw.uniform(0.5, 10.0), "above_hip_m": draw.uniform(0.05, 0.5),
-               "inertia_kg_m2": draw.uniform(0.0, 0.5)},
-    )  # fmt: skip
+        torso=Torso(
+            mass_kg=draw.uniform(0.5, 10.0),
+            above_hip_m=draw.uniform(0.05, 0.5),
+            inertia_kg_m2=draw.uniform(0.0, 0.5),
+        ),
+    )
 
 
 def parts(draw: Draw) -> PartsWalker:
@@ -93,22 +109,23 @@ def parts(draw: Draw) -> PartsWalker:
     ankle = {"mass_kg": draw.uniform(0.0, 0.02), "at_m": [0.0, upper - 0.95]}
     knee = {"parent_point_m": [0.0, -upper], "child_point_m": [0.0, 0.0], "locks": True}
     hip = {"parent_point_m": [0.0, 0.0], "child_point_m": [0.0, 0.0]}
-    return PartsWalker(
-        type="parts",
-        leg_length_m=1.0,
-        bodies=[{"name": f"thigh {k}", **thigh} for k in (1, 2)] + [{"name": f"shank {k}", **shank} for k in (1, 2)],
-        hinges=[{"name": "hip", "parent": "thigh 2", "child": "thigh 1", **hip}]
+    return PartsWalker.model_validate({
+        "type": "parts",
+        "leg_length_m": 1.0,
+        "bodies": [{"name": f"thigh {k}", **thigh} for k in (1, 2)] + [{"name": f"shank {k}", **shank} for k in (1, 2)],
+        "hinges": [{"name": "hip", "parent": "thigh 2", "child": "thigh 1", **hip}]
         + [{"name": f"knee {k}", "parent": f"thigh {k}", "child": f"shank {k}", **knee} for k in (1, 2)],
-        particles=[{"name": "hip", "mass_kg": draw.uniform(0.2, 2.0), "body": "thigh 2", "at_m": [0.0, 0.0]}]
+        "particles": [{"name": "hip", "mass_kg": draw.uniform(0.2, 2.0), "body": "thigh 2", "at_m": [0.0, 0.0]}]
         + [{"name": f"ankle {k}", "body": f"shank {k}", **ankle} for k in (1, 2)],
-        feet=[{"body": f"shank {k}", **foot} for k in (1, 2)],
-        legs=[["thigh 1", "shank 1"], ["thigh 2", "shank 2"]],
-    )
+        "feet": [{"body": f"shank {k}", **foot} for k in (1, 2)],
+        "legs": [["thigh 1", "shank 1"], ["thigh 2", "shank 2"]],
+    })  # fmt: skip
 
 
 TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
     "straight-legs": straight_legs,
     "kneed": kneed,
+    "kneed-free": kneed_free,
     "torso": torso,
     "parts": parts,
 }

@@ -70,6 +70,14 @@ def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
     assert script("gait_campaign").campaign(25, seed=1) == []
 
 
+@pytest.mark.parametrize("name", ["straight-legs", "parts", "torso"])
+def test_gaits_of_random_walkers_forget_starts_aside_as_their_multipliers_say(name):
+    found = script("walker_campaign").tally(name, 6, seed=2)
+    assert found.wrong == []
+    assert found.steps_seen > 0
+    assert sum(found.ends.values()) == 6
+
+
 def test_the_benchmark_compares_methods_that_are_exact_enough(monkeypatch):
     benchmark = script("benchmark")
     monkeypatch.setattr(benchmark, "LADDER", (1e-10, 1e-11, 1e-12))

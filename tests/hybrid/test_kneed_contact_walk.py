@@ -201,6 +201,17 @@ def test_a_stiff_stop_walks_as_the_ideal_lock_does():
     assert apart[1] < 0.3 * apart[0]
 
 
+def test_a_stop_comes_to_the_ideal_lock_with_the_root_of_its_stiffness():
+    """At one damping ratio, fully developed far below the compression; when the knees lock, and the steps' ends."""
+    ideal, stiffnesses = walked(steps=3), (1e3, 1e5, 1e7)
+    laws = [NormalLaw(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
+    stopped = [walked(steps=3, rules=KneeRules(law)) for law in laws]
+    for times in ("knee_strike_s", "touch_time_s"):
+        apart = [np.abs(getattr(walk, times) - getattr(ideal, times)).max() for walk in stopped]
+        orders = -np.diff(np.log(apart)) / np.diff(np.log(stiffnesses))
+        assert orders == pytest.approx([0.5, 0.5], abs=0.05)
+
+
 def test_its_own_gait_is_found_on_the_section_and_is_the_one_that_a_long_walk_settles_on():
     scene, walk = scene_of(), walked(steps=40, tolerance=1e-9)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))

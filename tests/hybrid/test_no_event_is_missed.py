@@ -1,16 +1,21 @@
 """Events that lie close together are all found, on every terrain; the right answers are a plain integration's."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from contact_walks import settings, walked
+from kneed_walks import RIGID_ANGLES, RIGID_RATES
 
 from walkerlab.config.loader import load
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import method_named
 
 AFTER_MID_SWING = "contact.terrain=after-mid-swing"
 HINGED = ("contact.stance=pinned", "walker.foot_radius_m=0", "slope_deg=0.7")
@@ -52,3 +57,17 @@ def test_on_both_grounds_a_walk_that_scuffs_no_pad_is_the_same(sets):
 def test_slips_are_the_same_on_both_grounds_where_the_law_switches_as_the_foot_lifts():
     pads, plane = from_the_gait(*SWITCHING), from_the_gait(*SWITCHING, AFTER_MID_SWING)
     np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-7)
+
+
+def test_a_knee_strikes_at_its_time_at_any_tolerance():
+    """Also where the way to it, cut short of the step in which it was seen, takes more than one step."""
+    walker = rigid_walker(load(Path("kneed")).config, "corrected")
+    start = (*RIGID_ANGLES, *RIGID_RATES)
+
+    def strike(rtol):
+        method = method_named("dop853").new(len(start), rtol, 1e-2 * rtol, 10_000)
+        return take_walk(walker, method, start, 1).knee_strikes[0]
+
+    exact, tolerances = strike(1e-13), np.geomspace(1e-12, 1e-7, 101)
+    late = np.array([strike(float(rtol)) - exact for rtol in tolerances])
+    assert (np.abs(late) < 100.0 * tolerances).all()

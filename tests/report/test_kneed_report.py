@@ -47,7 +47,11 @@ def test_the_instant_of_release_decides_which_gait_is_walked(run):
     assert all(walk["steps"] == STEPS for walk in releases.values())
     assert releases["compression"]["period_s"] == pytest.approx(PERIOD, abs=2e-3)
     assert releases["touch"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=2e-3)
+    # the rigid model by either rule: the published gait, and the other one
+    assert releases["compression"]["rigid"]["period_s"] == pytest.approx(PERIOD, abs=1e-6)
+    assert releases["touch"]["rigid"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=1e-5)
     assert "decides which gait" in models.departure(results)
+    assert "the rigid model by that rule walks steps of 0.54259" in models.departure(results)
 
 
 def test_the_verdict_tells_in_one_paragraph_where_the_models_part(run):

@@ -40,6 +40,13 @@ def test_the_reference_is_known_to_rounding_and_by_two_ways(reference):
     assert reference.agreement < 1e-13
 
 
+def test_a_walker_that_taylor_series_cannot_walk_is_known_by_two_ways_too():
+    """Neither is then the Taylor method: the closed form is that of a compass."""
+    reference = reference_for(replace(TRIAL, compass=None, steps=1))
+    assert {reference.method, reference.second_method} == {"dop853", "radau5"}
+    assert reference.agreement < 1e-10
+
+
 def test_every_method_converges_to_the_reference(rows):
     for method in FEW:
         errors = [row.error for row in rows if row.method == method]

@@ -304,7 +304,7 @@ def swing(
         status = advance(method, system, limit)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
-        if coming == FOOT_DOWN:
+        if coming == FOOT_DOWN or (coming == KNEE_STRIKE and method.clock[T] < limit):
             continue
         if coming == KNEE_STRIKE:
             t, y = on_event(method, system, KNEE)

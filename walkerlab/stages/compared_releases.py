@@ -1,4 +1,8 @@
-"""What the release of the trailing knee decides: two contact walks from one gait that differ in its instant alone."""
+"""What the release of the trailing knee decides: two contact walks from one gait that differ in its instant alone.
+
+Beside each the rigid model with the rule that it stands for: released in the compression the trailing knee is rigid in
+the impact, released at first touch it is free.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,18 @@ from walkerlab.config.schema import Config
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Knees
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, by_channel, walk_contact
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.rigid import standing
 from walkerlab.scene.contact import GAIT_METHOD, ContactScene, contact_scene, start_state
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
 RELEASES = {"compression": False, "touch": True}
 """Instants of release, as the config names them, and whether that is the leading foot's first touch."""
 STEPS = 20  # enough for what starts at a gait to come to rest at another one, or to fall
+RIGID_METHOD, RIGID_STEPS = "dop853", 200
 RTOL, ATOL = 1e-8, 1e-10
 BUDGET = 2_000_000  # right-hand sides of one walk
 LEFT_OUT = (
@@ -38,7 +47,25 @@ def compare_releases(config: Config, start: KneedStart) -> dict[str, Any] | None
     scene = contact_scene(config, start.pitch_m, start.pitch_m)
     if not isinstance(scene.walker.knees, Knees):
         return None
-    return {name: told(scene, walked(scene, start.state, at_touch)) for name, at_touch in RELEASES.items()}
+    return {
+        name: {
+            **told(scene, walked(scene, start.state, at_touch)),
+            "rigid": rigid_counterpart(config, start.state, at_touch),
+        }
+        for name, at_touch in RELEASES.items()
+    }
+
+
+def rigid_counterpart(config: Config, state: State, free: bool) -> dict[str, Any]:
+    """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
+    own = rigid_walker(config, "corrected")
+    ruled = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
+    # which coordinates a section would have is no matter to a walk: as they are no other code is compiled
+    model = ruled._replace(picked=own.picked)
+    method = method_named(RIGID_METHOD).new(len(model.blank), RTOL, ATOL, BUDGET)
+    walk = take_walk(model, method, state, RIGID_STEPS)
+    last = {} if not walk.steps else {"period_s": float(walk.periods[-1]), "length_m": float(walk.lengths[-1])}
+    return {"outcome": walk.outcome.label, "steps": walk.steps, "of": RIGID_STEPS, **last}
 
 
 def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResult:

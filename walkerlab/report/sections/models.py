@@ -67,14 +67,18 @@ CHANNELS = {
 
 def releases_table(summary: Mapping[str, Any]) -> Table:
     """Walks from the rigid gait with either instant of release, beside that gait."""
-    heads = ("period (s)", "length (m)", "knee locks after (s)", "knee strikes (J a step)")
+    heads = ("period (s)", "length (m)", "knee locks after (s)", "knee strikes (J a step)", "rigid period (s)")
     columns = [Column("trailing knee released"), Column("steps"), *(Column(head, True) for head in heads)]
-    rows = [["rigid gait", NONE, *last_step(summary["steps"]["gait"]), NONE]]
+    rows = [["rigid gait", NONE, *last_step(summary["steps"]["gait"]), NONE, NONE]]
     for name, walk in summary["releases"].items():
         lost = (walk["dissipated_J_per_step"] or {}).get("knee_strikes")
         steps = f"{walk['steps']} of {walk['of']}, {walk['outcome']}"
-        rows.append([RELEASED[name], steps, *last_step(walk), number(lost, 3)])
-    note = "Each walk starts at the rigid gait; the numbers are those of its last step."
+        rigid = (walk.get("rigid") or {}).get("period_s")
+        rows.append([RELEASED[name], steps, *last_step(walk), number(lost, 3), number(rigid)])
+    note = (
+        "Each walk starts at the rigid gait; the numbers are those of its last step. The last column is the last step "
+        "of the rigid model when its trailing knee is as rigid or as free in the impact."
+    )
     return table("What the instant of release decides", columns, rows, note=note)
 
 
@@ -163,7 +167,17 @@ def release_in_words(name: str, walk: Mapping[str, Any], gait_period: float) -> 
             f"{released} the walker takes {walk['steps']} of {walk['of']} steps, {last}, and ends as {walk['outcome']}."
         )
     came = "keeps to the rigid gait" if end == "this gait" else "goes over to another gait"
-    return f"{released} the walker {came}: {walk['steps']} steps, {last}."
+    return f"{released} the walker {came}: {walk['steps']} steps, {last}{as_rigid(walk)}."
+
+
+def as_rigid(walk: Mapping[str, Any]) -> str:
+    """What the rigid model does whose trailing knee is as rigid or as free in the impact."""
+    rigid = walk.get("rigid")
+    if not rigid:
+        return ""
+    if rigid["outcome"] != "walked":
+        return f"; the rigid model by that rule ends as {rigid['outcome']} after {rigid['steps']} steps"
+    return f"; the rigid model by that rule walks steps of {quantity(rigid['period_s'], 's')}"
 
 
 def percent(value: float, reference: float) -> str:
