@@ -60,9 +60,9 @@ class ScaledStarts:
 
     walker: ContactWalker
     ground: Ground
-    place: State  # (4) position and angles of the start
-    by_swing: State  # (4) velocities that the swing leg's angular velocity brings along
-    by_stance: State  # (4) and the stance leg's
+    place: State  # (2 + n) position and angles of the start
+    by_swing: State  # (2 + n) velocities that the swing leg's angular velocity brings along
+    by_stance: State  # (2 + n) and the stance leg's
     steps: int
     gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if that is not asked
     rtol: float = 1e-7
@@ -119,7 +119,8 @@ def scaled_starts(
     start_of  the free walker's start for the two angular velocities' factors; linear in them
     """
     still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
-    return ScaledStarts(walker, ground, still[:4], swing[4:], stance[4:], steps, gait)
+    half = len(still) // 2
+    return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
 
 
 @dataclass(frozen=True)
