@@ -1,6 +1,5 @@
 """What compiled functions may do, and what they may not."""
 
-
 import gc
 from typing import NamedTuple
 

@@ -9,6 +9,7 @@ import pytest
 from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
 from walkerlab.stages.graph import PIPELINE
@@ -78,6 +79,19 @@ def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value
     assert np.interp(10.0, curve["second"][order], curve["value"][order]) == pytest.approx(flip, abs=1e-9)
 
 
+def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
+    monkeypatch.setattr(regions, "CELLS", (10, 3))
+    found = follow(
+        "over=slope_deg", "from=4", "to=4.8", "periods=1",
+        "second.over=walker.hip_mass_kg", "second.from=8", "second.to=12",
+    )  # fmt: skip
+    plane, curve = found["rigid/regions"], found["rigid/curve_0"]
+    order = np.argsort(curve["second"])
+    flips = np.interp(plane["second"], curve["second"][order], curve["value"][order])
+    assert plane["period"].tolist() == [[1 if value < flip else 2 for flip in flips] for value in plane["value"]]
+    assert sum(one["share"] for one in found.summary["regions"]) == pytest.approx(1.0)
+
+
 def test_what_follows_from_a_key_follows_it():
     own = config("walker={leg_length_m: 1.0}")
     longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
@@ -99,6 +113,8 @@ def test_what_follows_from_a_key_follows_it():
         (["contact=null", "model=contact"], "needs a contact block"),
         (["contact=null", "over=contact.stiffness"], "the config has none"),
         (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
+        (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is the number that gaits are followed over"),
+        (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not touch the rigid model"),
     ],
 )  # fmt: skip
 def test_bad_questions_end_in_words(sets, said):
