@@ -57,13 +57,14 @@ def gait_diagram(results: Results) -> Diagram | None:
         return None
     value = np.concatenate([branch["value"] for _, branch in branches])
     period = np.concatenate([branch["step_period"].ravel() for _, branch in branches])
+    over = str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
     across = scale_of(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = scale_of(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     return Diagram(
-        title=f"Gaits over {summary['over']}",
+        title=f"Gaits over {over}",
         caption="The duration of each step of the rigid model's gaits; broken lines are unstable. A mark is a gait: "
         "chosen, it walks in the player above.",
-        titles=(f"{summary['over']} ({summary['unit']})", "duration of a step (s)"),
+        titles=(f"{over} ({summary['unit']})", "duration of a step (s)"),
         curves=tuple(curve for _, branch in branches for curve in curves(branch, across, up)),
         ticks=(across.ticks(), up.ticks()),
         gaits=tuple(gaits(results, across, up)),
@@ -107,7 +108,7 @@ def gaits(results: Results, across: Scale, up: Scale) -> Iterator[Gait]:
                 channels=tuple(thin.channels),
                 samples=int(thin["t"].size),
                 floats=thin.packed(),
-                strikes=tuple(np.cumsum(branch["step_period"][place]).round(6).tolist()),
+                strikes=tuple(moving["time"][1:][np.diff(moving["step"]) > 0].round(6).tolist()),
                 stills=(),
             )
             y = up.place(float(branch["step_period"][place][0]))

@@ -1,4 +1,4 @@
-"""How gaits of a family move: one cycle of some of them, stored for whoever wants to see them walk."""
+"""How gaits of a family move: some of them walk for a stride or a cycle, for whoever wants to see them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 MOST_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
+STRIDE = 2  # steps, after which each leg is where it was
 RTOL, ATOL = 1e-9, 1e-11
 EVERY = 3  # which samples are kept beside those at heel strikes
 
 
 def motions(branches: Sequence[Branch], config: Config, parameter: Parameter) -> dict[str, Group]:
-    """One cycle of some gaits of each branch of the rigid model, by branch and point: branch_0/motion_7."""
+    """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
@@ -44,8 +45,8 @@ def spread(count: int) -> list[int]:
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, MOST_OF_BRANCH))})
 
 
-def motion(point: GaitPoint, steps: int, config: Config, parameter: Parameter) -> Iterator[Group]:
-    """The cycle of a gait as `simulate` stores a walk; nothing where the config refuses the value."""
+def motion(point: GaitPoint, period: int, config: Config, parameter: Parameter) -> Iterator[Group]:
+    """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return
@@ -53,6 +54,7 @@ def motion(point: GaitPoint, steps: int, config: Config, parameter: Parameter) -
     unit, units = unit_walker(walker)
     section, n = on_section(unit, [float(number) for number in point.z]), len(walker.tree.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
+    steps = max(period, STRIDE)
     method = new_dop853(2 * n, RTOL, ATOL, ENDLESS)
     walk = take_walk(walker, method, start, steps, sampled=True)
     if walk.steps < steps or walk.samples is None:
@@ -60,7 +62,7 @@ def motion(point: GaitPoint, steps: int, config: Config, parameter: Parameter) -
     knee = knee_of(assembly_of(changed.walker, rigid=True))
     scene = RigidScene(walker, method, coordinates(changed), knee, states=True, energies=True, forces=True)
     seen = trajectory_group(scene, walk, thinned(walk.samples))
-    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": steps})
+    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
 
 
 def thinned(samples: Samples) -> Samples:
