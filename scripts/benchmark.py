@@ -279,7 +279,7 @@ def basin_line(work: str, bar: float, *sets: str) -> Line:
 def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
     """Starts of a basin's window that SciPy walks in a second, each for PEER_STEPS steps or to its fall."""
     walker = rigid_walker(config, config.equations)
-    script, trial = compass(config, config.equations), contact_trial_at_one_degree()
+    script, trial = compass(config, config.equations), contact_trial_of(ONE_DEGREE)
     scene = contact_scene(config, trial.ground.frame.leg_length, trial.ground.frame.leg_length)
 
     def fallen(_t: float, x: Any) -> float:

@@ -131,3 +131,16 @@ def test_a_span_without_a_gait_has_no_answer():
 def test_a_span_runs_upward():
     with pytest.raises(ConfigError, match="must be above `from`"):
         config("from=0.2", "to=0.1")
+
+
+def test_gaits_of_the_rigid_model_are_stored_walking_and_come_back_to_where_they_began(in_degrees):
+    moving = {path: group for path, group in in_degrees.groups.items() if "/motion_" in path}
+    assert {int(group.attrs["steps"]) for group in moving.values()} == {1, 2}
+    for path, group in moving.items():
+        branch, place = in_degrees[path.rpartition("/")[0]], int(path.rpartition("_")[2])
+        assert group.attrs["value"] == branch["value"][place]
+        # a stride of one gait of one step twice, or of a gait of two steps once; unstable ones drift by a little
+        assert group["angle"][-1] == pytest.approx(group["angle"][0], abs=1e-5)
+        way = 2 / branch["step_length"].shape[1] * branch["step_length"][place].sum()
+        ends = group["foot_along_m"][[0, -1]]
+        assert ends[1] - ends[0] == pytest.approx([way, way], abs=1e-5)
