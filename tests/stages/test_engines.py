@@ -115,9 +115,9 @@ def test_a_period_that_has_settled_is_told_apart_from_one_that_still_changes():
     rows = [replace(one, period_s=0.71251) if one.period_s == 0.7125 else one for one in ROWS]
     rows = [replace(one, period_s=0.71252) if one.period_s == 0.7126 else one for one in rows]
     text = content(rows).summary["conclusions"]["compass"]["own-law"]
-    assert "next to nothing: mujoco soft 0.01 ms." in text
+    assert "the difference is the model's: mujoco soft by 0.01 ms." in text
     # 4.9 and 0.6 ms off
-    assert "still changes it: drake lagged 4.3 ms." in text
+    assert "still changes the period: drake lagged by 4.3 ms." in text
 
 
 def test_what_the_last_halving_divides_the_error_by_is_told():
