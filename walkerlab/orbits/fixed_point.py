@@ -146,10 +146,9 @@ class Search:
         d, settings = len(self.walker.picked), self.settings
         starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (settings.random_starts, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
-        residuals = np.zeros(len(starts))
-        plain = new_dop853(len(self.walker.blank), settings.rtol, settings.atol, settings.budget)
-        newton_from_each(self.looking, plain, starts, LOOKED_RESIDUAL, residuals)
-        for z in starts[residuals < LOOKED_RESIDUAL]:
+        found = np.zeros((len(starts), 4))
+        newton_from_each(self.looking, starts, LOOKED_RESIDUAL, True, found)
+        for z in starts[found[:, 2] < LOOKED_RESIDUAL]:
             self.keep(z, RANDOM_START)
 
     def keep(self, z: Vector, by: str) -> bool:

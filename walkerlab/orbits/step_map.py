@@ -17,9 +17,10 @@ from walkerlab.mechanics.impact import heel_strike, heel_strike_along
 from walkerlab.mechanics.links import spread
 from walkerlab.mechanics.standing import STANCE, SWING, Mode, Standing, Variation
 from walkerlab.mechanics.tuples import Vector, put
+from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.stepping import H_NEXT, T, clear_counts
+from walkerlab.solvers.stepping import BUDGET, H_NEXT, T, clear_counts
 from walkerlab.solvers.system import State, derivative
 
 WALKED, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.NO_HEEL_STRIKE)
@@ -67,6 +68,7 @@ class Shooting(NamedTuple):
 
     walker: Standing
     method: Any  # for the equations of Variation
+    plain: Any  # for those of the walker alone
     finder: CrossingFinder
     blank: State  # zeros of Variation
     no_move: Vector  # (d) zeros
@@ -89,8 +91,9 @@ def variation_size(walker: Standing) -> int:
 def new_shooting(walker: Standing, method: Any, finder: CrossingFinder) -> Shooting:
     """The step map of `walker`, integrated with `method`, which has room for `variation_size` equations."""
     d = len(walker.picked)
+    plain = new_dop853(len(walker.blank), method.rtol, method.atol, int(method.counts[BUDGET]))
     return Shooting(
-        walker, method, finder, (0.0,) * variation_size(walker), (0.0,) * d, np.zeros(d), np.zeros((d, d)),
+        walker, method, plain, finder, (0.0,) * variation_size(walker), (0.0,) * d, np.zeros(d), np.zeros((d, d)),
         np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d), np.zeros(d), np.zeros((d, d)),
     )  # fmt: skip
 
@@ -150,8 +153,47 @@ def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
     return status, period
 
 
-@kernel
 def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
+    """`solved_from` one start z (d,), which is overwritten."""
+    found = np.zeros((1, 4))
+    newton_from_each(shooting, z.reshape(1, -1), tolerance, False, found)
+    status, period, residual, evaluations = found[0].tolist()
+    return int(status), period, residual, int(evaluations)
+
+
+@kernel
+def newton_from_each(shooting: Shooting, starts: Any, tolerance: float, may_fall: bool, found: Any) -> None:
+    """`solved_from` many starts.
+
+    starts    (starts, d); overwritten with the best states found
+    may_fall  whether each is tried by a first step without its derivative, a fraction of the work, and given up if that
+              does not end in a heel strike
+    found     (starts, 4) what `solved_from` returns; written
+    """
+    z = shooting.start
+    for i in range(len(starts)):
+        for j in range(z.size):
+            z[j] = starts[i, j]
+        status, period, residual, evaluations = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL, 0
+        if not may_fall or walks_a_step(shooting, z):
+            status, period, residual, evaluations = solved_from(shooting, z, tolerance)
+        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = status, period, residual, evaluations
+        for j in range(z.size):
+            starts[i, j] = z[j]
+
+
+@inlined
+def walks_a_step(shooting: Shooting, z: Any) -> bool:
+    """Whether the step from z (d,) ends in a heel strike."""
+    walker, method = shooting.walker, shooting.plain
+    clear_counts(method)
+    method.clock[H_NEXT] = 0.0
+    mode, y0 = Mode(walker, walker.bent), on_section(walker, z)
+    return swing(method, mode, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time) == WALKED
+
+
+@inlined
+def solved_from(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
     """Solve P(z) = z by Newton's method with the exact derivative, halving moves that make the residual grow.
 
     z  (d,) start; overwritten with the best state found, whose derivative is left in `DP`
@@ -181,28 +223,6 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
             z[i] = best[i] + scale * move[i]
     keep(best, DP, z, shooting.DP)
     return best_status, best_period, best_residual, evaluations
-
-
-@kernel
-def newton_from_each(shooting: Shooting, method: Any, starts: Any, tolerance: float, residuals: Any) -> None:
-    """`newton` from many starts; one whose first step does not end in a heel strike is given up at once.
-
-    method     for the walker's equations alone, which tell that for a fraction of the derivative's work
-    starts     (starts, d); overwritten with the best states found
-    residuals  (starts,) of these, huge for a start given up; written
-    """
-    walker, z = shooting.walker, shooting.start
-    for i in range(residuals.size):
-        residuals[i] = NO_RESIDUAL
-        for j in range(z.size):
-            z[j] = starts[i, j]
-        clear_counts(method)
-        method.clock[H_NEXT] = 0.0
-        mode, y0 = Mode(walker, walker.bent), on_section(walker, z)
-        if swing(method, mode, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time) == WALKED:
-            _, _, residuals[i], _ = newton(shooting, z, tolerance)
-            for j in range(z.size):
-                starts[i, j] = z[j]
 
 
 @inlined
