@@ -165,3 +165,12 @@ def test_the_page_tells_of_the_kneed_adjustment_in_its_own_words():
     assert "the stance leg starts" in made.finding
     assert "into the knee's strike" in made.blocks[0].text
     assert "link" not in made.finding
+
+
+def test_the_page_names_a_shanks_angle_as_such():
+    (starts,) = (
+        block
+        for block in adjustment.section(Results(load(Path("kneed")).config, {"tune": kneed()})).blocks
+        if getattr(block, "caption", "").startswith("The start before")
+    )
+    assert [row[0].text for row in starts.bodies[0].rows][2] == "θ₁, shank (rad)"

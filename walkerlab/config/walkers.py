@@ -402,7 +402,7 @@ def rigid_bodies(walker: Any) -> int:
 
 def is_plain_compass(walker: Any) -> bool:
     """Whether this is the walker of Appendix A."""
-    return isinstance(walker, CompassWalker) and walker.torso is None
+    return bool(walker.type == "compass" and walker.torso is None)
 
 
 def arc_within(radius: float, longest: float | None, name: str) -> float:

@@ -100,7 +100,9 @@ class Stage:
 
     def reads_under(self, config: Config) -> tuple[str, ...]:
         """The keys that its result depends on under a config."""
-        return self.reads if not self.reads_of_scene or of_the_compass(config) else (*self.reads, *self.reads_of_scene)
+        if not self.reads_of_scene or of_the_compass(config):
+            return self.reads
+        return (*(key for key in self.reads if key.split(".")[0] not in self.reads_of_scene), *self.reads_of_scene)
 
     @property
     def optional(self) -> bool:
@@ -226,7 +228,7 @@ PIPELINE = Graph(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
-        reads=("stability.cases",),
+        reads=("walker.type", "walker.torso", "stability.cases"),
         reads_of_paper=PAPERS_WALK,
         reads_of_scene=PAPERS_WALK,
         inputs=known_and_start,

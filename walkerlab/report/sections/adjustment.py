@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,6 +27,8 @@ CHANNELS = {
     "knee_stop": ("the knees' stops", 3),
 }
 """Where a step dissipates energy, by the names under which it is stored: what that is called, and digits to show."""
+BODY = re.compile(r"_(?=[a-z]+$)")
+"""Where the name of a coordinate goes on with that of a body: theta_1_shank."""
 POINT_FEET = "all, point foot"
 """The series of a walker whose feet are points in the rigid model and balls in the contact model."""
 NOTHING = 1e-9
@@ -160,7 +163,10 @@ def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
     if not results.of_the_paper:
         rows = [
-            [in_signs(f"{name} ({row['unit']})"), *(number(row[key], 6) for key in ("ours_rigid", "ours_adjusted"))]
+            [
+                in_signs(f"{BODY.sub(r', ', name)} ({row['unit']})"),
+                *(number(row[key], 6) for key in ("ours_rigid", "ours_adjusted")),
+            ]
             for name, row in summary["table2"].items()
         ]
         heads = [Column("coordinate"), Column("rigid gait", numeric=True), Column("adjusted", numeric=True)]
