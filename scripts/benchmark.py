@@ -9,6 +9,7 @@ docs/performance.md. With --quick each time is the median of fewer repeats, and 
 from __future__ import annotations
 
 import argparse
+import math
 import platform
 import re
 import tempfile
@@ -29,28 +30,34 @@ from whole_process import whole_process_times
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.benchmarks.user_script import walk_as_a_script
+from walkerlab.config.basin import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
+from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import Span
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import seeds
-from walkerlab.orbits.step_map import newton
+from walkerlab.orbits.step_map import newton, on_section
+from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
 from walkerlab.stages.accuracy import OFF_THE_GAIT
 from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
+from walkerlab.stages.tune import MAP_RTOL
 from walkerlab.store.runfolder import RunFolder
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
 BUDGET = 2_000_000
+PEER_STARTS, PEER_STEPS = 24, 12  # of a basin's starts, walked by a library
 LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
 PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
 PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -257,14 +264,40 @@ def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
 
 
 def basin_line(work: str, bar: float, *sets: str) -> Line:
-    """A basin of the paper's walker at one degree, as the command computes it with two processes."""
+    """A basin of the paper's walker at one degree, as the command computes it with two processes, beside SciPy."""
     with tempfile.TemporaryDirectory() as folder:
         loaded = load(None, ["slope_deg=1", *sets])
         place = RunFolder(Path(folder), loaded.run_name)
         execute(loaded.config, "fixedpoint", place)
         report = execute(loaded.config, "basin", place, jobs=2)
     line = at_most(f"{work}, two processes", report.wall_s, "s", bar, bar / 2.0)
-    return replace(line, measured=f"{line.measured}, {report.summary['trajectories_per_s']:.3g} walks/s")
+    peer = peer_walks_per_s(loaded.config, report.summary)
+    rates = f"{report.summary['trajectories_per_s']:.3g} walks/s (SciPy, one process: {peer:.3g})"
+    return replace(line, measured=f"{line.measured}, {rates}")
+
+
+def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
+    """Starts of a basin's window that SciPy walks in a second, each for PEER_STEPS steps or to its fall."""
+    walker = rigid_walker(config, config.equations)
+    script, trial = compass(config, config.equations), contact_trial_of(ONE_DEGREE)
+    scene = contact_scene(config, trial.ground.frame.leg_length, trial.ground.frame.leg_length)
+
+    def fallen(_t: float, x: Any) -> float:
+        return math.cos(x[1] + walker.slope) - FALLEN_HIP
+
+    ending: Any = fallen
+    ending.terminal = True
+    generator = np.random.default_rng(config.seed)
+    began = time.perf_counter()
+    for _ in range(PEER_STARTS):
+        drawn = {name: float(generator.uniform(*sides)) for name, sides in basin["window"].items()} | basin["held"]
+        start = on_section(walker, [drawn[name] for name in COORDINATES])
+        if basin["model"] == "rigid":
+            walk_as_a_script(script, start, PEER_STEPS, RTOL, ATOL, BUDGET, ends=(ending,))
+        else:
+            start = start_state(scene, start)
+            replace(trial, start=start, steps=PEER_STEPS).prepare("scipy-radau", MAP_RTOL, BUDGET)()
+    return PEER_STARTS / (time.perf_counter() - began)
 
 
 def memory_line() -> Line:

@@ -1,5 +1,6 @@
 """What compiled functions may do, and what they may not."""
 
+import gc
 from typing import NamedTuple
 
 import numpy as np
@@ -48,8 +49,10 @@ def allocating(n):
 
 def test_memory_comes_with_the_arguments():
     """Code that allocates would count references, which takes as long as its arithmetic."""
+    thresholds = gc.get_threshold()
     with pytest.raises(TypingError):
         allocating(3)
+    assert gc.get_threshold() == thresholds  # as before, also where nothing could be compiled
     assert uncompiled(allocating)(3) == 0.0
 
 

@@ -7,6 +7,7 @@ package's kernels alone: what another program compiles with Numba stays where th
 
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import re
@@ -27,7 +28,7 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.extending import overload, register_jitable
 
 # the only packages in which compiled functions may stand (a test says so)
@@ -41,6 +42,9 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": Fa
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
 # of what takes lanes: handing them on in memory costs as much as the work
 WOVEN_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
+# thresholds of the garbage collector while compiling, which makes objects by the million and leaves few behind: at the
+# usual ones a quarter of the time goes into looking them through
+SELDOM = (100_000, 50, 100)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -242,10 +246,22 @@ def watched(tell: Callable[[str], None]) -> Iterator[None]:
 
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    compiled = numba.njit(**FLAGS)(function)
+    compiled = numba.njit(pipeline_class=_KernelCompiler, **FLAGS)(function)
     # what enable_caching does, with the kernels' own folder
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
+
+
+class _KernelCompiler(Compiler):  # type: ignore[misc]
+    """Numba's own compiler, with garbage collected seldom meanwhile."""
+
+    def compile_extra(self, func: Any) -> Any:
+        usual = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
+        try:
+            return super().compile_extra(func)
+        finally:
+            gc.set_threshold(*usual)
 
 
 class _WithoutEnvironment:

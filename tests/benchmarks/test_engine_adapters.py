@@ -79,7 +79,7 @@ def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
 def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
     """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
     scene = kneed()
-    until = 0.45
+    until = 0.4
     truth = walked(scene, "radau5", 1e-10, 1, until)
     name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
     stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)

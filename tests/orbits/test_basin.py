@@ -69,6 +69,18 @@ def test_where_steps_never_repeat_there_is_no_cycle():
     assert found.cycles == ()
 
 
+def test_walks_one_by_one_fare_as_those_in_lanes_do_but_at_edges(gentle):
+    window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (12, 12), tuple(GAIT))
+    starts = window.starts(np.arange(window.size))
+    lanes, alone = (arrivals(walker, gentle, starts, 40) for walker in (UNIT, UNIT.model))
+    inner = np.setdiff1d(np.arange(window.size), edge_cells(lanes.outcome.reshape(window.cells)))
+    for name in ("outcome", "attractor"):
+        np.testing.assert_array_equal(getattr(alone, name)[inner], getattr(lanes, name)[inner])
+    walked = inner[lanes.outcome[inner] == Outcome.WALKED]
+    assert np.abs(alone.steps[walked] - lanes.steps[walked]).max() <= 1
+    np.testing.assert_allclose(alone.last[walked], lanes.last[walked], atol=2.0 * CAPTURE)
+
+
 def test_cells_fare_as_their_walks_do_but_at_edges(gentle):
     window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (32, 32), tuple(GAIT))
     found = arrivals(UNIT, gentle, window.starts(np.arange(window.size)), 100)

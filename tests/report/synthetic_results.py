@@ -1,7 +1,9 @@
 """A small run as the report gets it: results made by hand, in the layout that the stages store."""
 
 import math
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -10,6 +12,9 @@ from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
 from walkerlab.store.provenance import Provenance
+
+sys.path.append(str(Path(__file__).parent.parent / "figures"))
+from synthetic_families import families
 
 STEPS, PERIOD, LENGTH, SLOPE = 4, 0.7, 0.37, 0.0174
 COORDINATES = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
@@ -160,6 +165,25 @@ def with_motion(result):
         }
     groups = {**result.groups, "trajectory": Group({**trajectory.variables, **more})}
     return stored(result.identity.stage, groups, result.summary)
+
+
+def families_that_move(walk):
+    """A family of gaits, two of which move as a walk does."""
+    family = families()["continuation"]
+    seen = walk.groups["trajectory"].variables
+    time = seen["time"].values
+    feet = np.column_stack((0.6 * time, 0.5 * time))
+    joints = {
+        "hip_along_m": column(0.5 * time, "time", "m"),
+        "hip_height_m": column(0.98 + 0.0 * time, "time", "m"),
+        "foot_along_m": Variable(feet, ("time", "leg"), "m", "foot"),
+        "foot_height_m": Variable(0.0 * feet, ("time", "leg"), "m", "foot"),
+    }
+    two = {
+        f"rigid/branch_0/motion_{place}": Group({**seen, **joints}, {"value": value, "slope_rad": slope, "steps": 1})
+        for place, value, slope in ((0, 1.0, 0.02), (3, 5.0, 0.09))
+    }
+    return stored("continuation", {**family.groups, **two}, family.summary)
 
 
 def paper_row(where, quantity, printed, verdict, evidence, **values):

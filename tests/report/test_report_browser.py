@@ -2,7 +2,7 @@
 
 import pytest
 from browser import Browser, executable
-from synthetic_results import EVERYTHING, config, contact_sim, simulate, stored, with_motion
+from synthetic_results import EVERYTHING, config, contact_sim, families_that_move, simulate, stored, with_motion
 
 from walkerlab.stages.report import write_pages
 
@@ -33,6 +33,7 @@ def folder(tmp_path_factory):
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0L9 9"/></svg>'
     )
     (folder / "a.png").write_bytes(b"\x89PNG")
+    made["continuation"] = families_that_move(made["simulate"])
     made["plot"] = stored("plot", {}, {"figures": [figure]})
     write_pages(config(), made, folder)
     return folder
@@ -135,6 +136,28 @@ def test_a_link_to_a_folded_section_unfolds_it(page):
     assert not page.evaluate("document.querySelector('#gait details').open")
     page.evaluate("document.querySelector('nav a[href=\"#gait\"]').click()")
     page.until("document.querySelector('#gait details').open")
+
+
+def test_a_gait_that_is_chosen_in_the_diagram_walks_in_the_player_and_the_walk_comes_back(page):
+    walk = page.evaluate(SEEN["walk"])
+    page.evaluate("document.querySelector('.diagram [data-gait]').dispatchEvent(new Event('click'))")
+    assert "Gait of 1 step at 1" in page.evaluate("document.querySelector('.player .key').textContent")
+    assert page.evaluate(SEEN["walk"]) != walk
+    page.evaluate("document.querySelector('.play').click()")
+    page.until(f"{TIME} > 0.1")
+    page.evaluate("document.querySelector('.player .back').click()")
+    assert page.evaluate(SEEN["walk"]) == walk
+    assert page.complaints() == []
+
+
+def test_the_diagram_is_walked_through_with_keys(page):
+    page.evaluate("document.querySelector('#families details').open = true")
+    page.evaluate("document.querySelector('.diagram [data-gait]').focus()")
+    page.press("ArrowRight", 39)
+    chosen = page.evaluate("document.activeElement.getAttribute('aria-label')")
+    page.press("Enter", 13)
+    assert chosen == "Gait of 1 step at 5\u00a0deg, unstable"
+    assert page.evaluate("document.querySelector('.player .key').textContent") == chosen
 
 
 @pytest.mark.parametrize("width", WIDTHS)

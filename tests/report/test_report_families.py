@@ -1,14 +1,11 @@
 """What the report says of families of gaits."""
 
-import sys
-from pathlib import Path
+from synthetic_results import config, families, families_that_move, simulate, with_motion
 
 from walkerlab.config.loader import load
+from walkerlab.report.gait_diagram import gait_diagram
 from walkerlab.report.results import Results
 from walkerlab.report.sections import families as section
-
-sys.path.append(str(Path(__file__).parent.parent / "figures"))
-from synthetic_families import families
 
 
 def test_a_run_without_families_has_no_such_section():
@@ -22,3 +19,14 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     assert "0.2 a step" in paragraph.text
     assert "leaves its attractor: fell" in paragraph.text
     assert [cell.text for cell in table.bodies[0].rows[0]][:4] == ["flip", "rigid", "1", "4"]
+
+
+def test_the_diagram_has_a_mark_for_every_gait_whose_motion_is_stored():
+    walk = with_motion(simulate())
+    made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))
+    first, second = made.gaits
+    assert (first.stable, second.stable) == (True, False)
+    assert first.x < second.x
+    assert first.walker.samples > 2
+    assert [scene["slope_rad"] for scene in (first.scene, second.scene)] == [0.02, 0.09]
+    assert gait_diagram(Results(config(), families())) is None

@@ -1,5 +1,7 @@
 """The stage basin: shares, a run that is cut off, any number of processes, the contact model, and what it refuses."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -146,8 +148,10 @@ def test_contact_needs_a_contact_block(tmp_path):
 
 
 def test_walkers_with_more_coordinates_are_refused(tmp_path):
-    with pytest.raises(ConfigError, match="two straight legs"):
-        run(tmp_path, state=[0.0] * 6)
+    free = load(Path("kneed"), ["walker.knee.at_heel_strike=free"]).config
+    inputs = {"fixedpoint": Content({}, GAIT)}
+    with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):
+        basin.run(only(free, PIPELINE["basin"].reads), inputs, Silent(), parts=Parts(tmp_path / "parts", "key"))
 
 
 def test_a_window_upside_down_is_refused(tmp_path):

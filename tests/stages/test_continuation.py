@@ -9,6 +9,7 @@ import pytest
 from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
 from walkerlab.stages.graph import PIPELINE
@@ -78,6 +79,19 @@ def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value
     assert np.interp(10.0, curve["second"][order], curve["value"][order]) == pytest.approx(flip, abs=1e-9)
 
 
+def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
+    monkeypatch.setattr(regions, "CELLS", (10, 3))
+    found = follow(
+        "over=slope_deg", "from=4", "to=4.8", "periods=1",
+        "second.over=walker.hip_mass_kg", "second.from=8", "second.to=12",
+    )  # fmt: skip
+    plane, curve = found["rigid/regions"], found["rigid/curve_0"]
+    order = np.argsort(curve["second"])
+    flips = np.interp(plane["second"], curve["second"][order], curve["value"][order])
+    assert plane["period"].tolist() == [[1 if value < flip else 2 for flip in flips] for value in plane["value"]]
+    assert sum(one["share"] for one in found.summary["regions"]) == pytest.approx(1.0)
+
+
 def test_what_follows_from_a_key_follows_it():
     own = config("walker={leg_length_m: 1.0}")
     longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
@@ -99,6 +113,8 @@ def test_what_follows_from_a_key_follows_it():
         (["contact=null", "model=contact"], "needs a contact block"),
         (["contact=null", "over=contact.stiffness"], "the config has none"),
         (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
+        (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is the number that gaits are followed over"),
+        (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not touch the rigid model"),
     ],
 )  # fmt: skip
 def test_bad_questions_end_in_words(sets, said):
@@ -115,3 +131,16 @@ def test_a_span_without_a_gait_has_no_answer():
 def test_a_span_runs_upward():
     with pytest.raises(ConfigError, match="must be above `from`"):
         config("from=0.2", "to=0.1")
+
+
+def test_gaits_of_the_rigid_model_are_stored_walking_and_come_back_to_where_they_began(in_degrees):
+    moving = {path: group for path, group in in_degrees.groups.items() if "/motion_" in path}
+    assert {int(group.attrs["steps"]) for group in moving.values()} == {1, 2}
+    for path, group in moving.items():
+        branch, place = in_degrees[path.rpartition("/")[0]], int(path.rpartition("_")[2])
+        assert group.attrs["value"] == branch["value"][place]
+        # a stride of one gait of one step twice, or of a gait of two steps once; unstable ones drift by a little
+        assert group["angle"][-1] == pytest.approx(group["angle"][0], abs=1e-5)
+        way = 2 / branch["step_length"].shape[1] * branch["step_length"][place].sum()
+        ends = group["foot_along_m"][[0, -1]]
+        assert ends[1] - ends[0] == pytest.approx([way, way], abs=1e-5)

@@ -111,6 +111,21 @@ def test_a_conclusion_names_the_closest_contact_its_cost_and_its_step():
     assert "fell after 3 steps" in text
 
 
+def test_a_period_that_has_settled_is_told_apart_from_one_that_still_changes():
+    rows = [replace(one, period_s=0.71251) if one.period_s == 0.7125 else one for one in ROWS]
+    rows = [replace(one, period_s=0.71252) if one.period_s == 0.7126 else one for one in rows]
+    text = content(rows).summary["conclusions"]["compass"]["own-law"]
+    assert "the difference is the model's: mujoco soft by 0.01 ms." in text
+    # 4.9 and 0.6 ms off
+    assert "still changes the period: drake lagged by 4.3 ms." in text
+
+
+def test_what_the_last_halving_divides_the_error_by_is_told():
+    found = content().summary["convergence"]["compass"]["same-law"]
+    assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
+    assert "divides the error by: mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]
+
+
 def test_the_stored_result_is_the_same_whatever_the_run_times():
     slower = [replace(one, wall_s=3.0 * one.wall_s) for one in ROWS]
     assert content(slower).digest() == content().digest()

@@ -118,3 +118,50 @@ def test_a_start_that_flies_is_an_answer():
     summary = small("paper", "start=[-0.2018, 0.167, -1.02, -3.2]", cells=3).summary
     assert summary["adjustment"]["needed"]
     assert summary["procedure"]["released"]["outcome"] != "walked"
+
+
+@functools.cache
+def kneed():
+    return small(
+        "kneed", "strides=1", "solver.contact={rtol: 1.0e-5, atol: 1.0e-7}", "tune.stance_factors=[0.9, 1.1]", cells=2
+    )
+
+
+def test_a_kneed_walker_needs_no_adjustment_on_plain_ground():
+    summary = kneed().summary
+    found = summary["adjustment"]
+    assert (found["needed"], found["found"], found["walked_steps"]) == (False, True, 2)
+    down, up = (found["margins"][f"dtheta_2 {way}"] for way in ("down", "up"))
+    assert 0.9 < down["factor"] < 1.0 < up["factor"]
+    assert down["beyond"] is not None
+
+
+def test_a_kneed_gait_gives_its_height_to_ground_friction_and_knees():
+    gait = kneed().summary["gait"]
+    assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
+    assert gait["lost_J"]["knee_strikes"] > 0.0
+    assert len(gait["multipliers"]) == len(gait["state"]) == len(gait["state_is"]) == 8
+    assert "angular velocity of the swing shank (rad/s)" in gait["state_is"]
+    step = kneed().summary["procedure"]["adjusted"]["step_periods_s"][-1]
+    assert step == pytest.approx(gait["period_s"], rel=0.01)
+
+
+def test_what_is_the_papers_alone_is_left_out_for_another_walker_in_words():
+    content = kneed()
+    assert set(content.summary["procedure"]) == {"released", "adjusted"}
+    assert "paper_start" not in content.summary
+    assert not {"hinged", "paper_start"} & set(content.groups)
+    assert [entry["what"] for entry in content.summary["left_out"]] == [
+        "the first step with a hinged stance foot",
+        "the paper's start of its ADAMS model",
+    ]
+    assert set(content.summary["table2"]) == {f"{d}theta_{leg}" for d in ("", "d") for leg in ("1", "2", "1_shank")}
+    assert content.summary["table2"]["dtheta_2"].keys() >= {"unit", "ours_rigid", "ours_adjusted"}
+    assert small("paper").summary["left_out"] == []
+
+
+def test_the_page_tells_of_the_kneed_adjustment_in_its_own_words():
+    made = adjustment.section(Results(load(Path("kneed")).config, {"tune": kneed()}))
+    assert "the stance leg starts" in made.finding
+    assert "into the knee's strike" in made.blocks[0].text
+    assert "link" not in made.finding

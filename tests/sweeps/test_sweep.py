@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StorageError
+from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
+from walkerlab.store.content import untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER
+from walkerlab.sweeps.chunk import FOLDER, row_of, without_outputs
 from walkerlab.sweeps.result import as_csv
 
 GRAVITIES = "gravity_m_s2=1:9:5"
@@ -197,3 +200,22 @@ def test_the_file_says_what_was_asked(toy):
     assert stored.identity.config_slice["over"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
     assert json.dumps(stored.summary["outcomes"]) == '{"answered": 5}'
     assert stored.digest() == swept.content.digest()
+
+
+@pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
+def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
+    config = load(sets=("strides=1",)).config
+    keys = Keys().of(config, stage)
+    row, _ = row_of(InMemory(), config, stage, keys)
+    alone = InMemory().answer(config, stage, keys).content
+    assert "trajectory" in alone.groups
+    apart = ("left_out",)
+    assert {name: value for name, value in row.summary.items() if name not in apart} == {
+        name: value for name, value in untimed(alone.summary, alone.timed).items() if name not in apart
+    }
+
+
+def test_arrays_that_another_stage_draws_on_are_not_left_out():
+    config = load().config
+    assert without_outputs(config, "compare", PIPELINE) == config
+    assert without_outputs(config, "contact-sim", PIPELINE).outputs == ()

@@ -96,8 +96,9 @@ def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_the
 
 def test_one_and_two_processes_find_the_same():
     cases = [case for case in shipped() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")]
-    cells = [cell for cell in cells_of(cases) if hasattr(cell, "case")]
-    one, two = ([replace(item, wall_s=0.0) for found in run_cells(cells, jobs) for item in found] for jobs in (1, 2))
+    one, two = (
+        [replace(item, wall_s=0.0) for found in run_cells(cells_of(cases), jobs) for item in found] for jobs in (1, 2)
+    )
     assert one == two
 
 

@@ -87,16 +87,21 @@ def climb(trial: Trial, method: str) -> Climb:
 
 
 def finished(
-    trials: Sequence[Trial], climbs: Sequence[Climb], jobs: int
+    trials: Sequence[Trial], climbs: Sequence[Climb], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Climb]]:
-    """The first ends of the references, or why there is none, and the climbs with the run that was put off."""
+    """The first ends of the references, or why there is none, and the climbs with the run that was put off.
+
+    long_runs  whether what was put off is run at all
+    """
     # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
     ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
-    put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in climbs if one.unfinished]
+    wanted = [one for one in climbs if one.unfinished and long_runs]
+    put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in wanted]
     done = in_processes([*ends, *put_off], jobs)
     firsts: list[End | WalkEndsError] = [next(done) for _ in trials][::-1]
     return firsts, [
-        replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished else one for one in climbs
+        replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished and long_runs else one
+        for one in climbs
     ]
 
 
@@ -169,8 +174,11 @@ def row_of(one: Climb, run: Run, reference: Reference) -> Row:
 
 def left_of(one: Climb) -> list[dict[str, Any]]:
     """The tolerances that were not run, and why."""
-    last = one.runs[-1]
-    why = f"{last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g} already"
+    if one.unfinished:
+        why = f"more than {SHORT} right-hand sides, each in Python"
+    else:
+        last = one.runs[-1]
+        why = f"{last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g} already"
     return [
         {"scene": one.trial.name, "method": one.method, "tolerance": rtol, "why": why}
         for rtol in one.ladder[len(one.runs) :]

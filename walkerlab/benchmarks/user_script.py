@@ -27,10 +27,13 @@ def walk_as_a_script(
     atol: float,
     budget: int,
     method: str = "DOP853",
+    ends: tuple[Any, ...] = (),
 ) -> tuple[Floats | None, int]:
     """Walk `steps` steps with SciPy's solve_ivp, a NumPy right-hand side and its terminal events.
 
-    Returns the state after the last impact (None if the budget did not last) and the right-hand sides used.
+    ends  further terminal events, which end the walk
+
+    Returns the state after the last impact (None if it was not reached) and the right-hand sides used.
     """
     from scipy.integrate import solve_ivp
 
@@ -60,7 +63,11 @@ def walk_as_a_script(
     limit = 10.0 * np.sqrt(L / g)
     try:
         for _ in range(steps):
-            swing = solve_ivp(right_hand_side, (0.0, limit), state, method=method, rtol=rtol, atol=atol, events=event)
+            swing = solve_ivp(
+                right_hand_side, (0.0, limit), state, method=method, rtol=rtol, atol=atol, events=[event, *ends]
+            )
+            if not swing.t_events[0].size:
+                return None, used
             state = np.array(impact(walker, *swing.y[:, -1].tolist()))
     except OutOfBudgetError:
         return None, used

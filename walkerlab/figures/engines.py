@@ -168,12 +168,11 @@ def caption_errors(scene: str, results: Results) -> str:
 def caption_periods(scene: str, results: Results) -> str:
     """The conclusion on own contacts, with what did not walk to the end."""
     failed = [
-        f"{one.label} at {step:.3g} s"
+        f"{one.label} at {', '.join(f'{step:.3g}' for step in one.step_s[~one.walked])} s"
         for one in series_of(scene, OWN_LAW, results)
-        for step, walked in zip(one.step_s, one.walked, strict=True)
-        if not walked
+        if not one.walked.all()
     ]
-    missed = f" Not walked to the end: {', '.join(failed)}." if failed else ""
+    missed = f" Not walked to the end: {'; '.join(failed)}." if failed else ""
     return f"{scene}: {results[STAGE].summary['conclusions'][scene][OWN_LAW]}{missed}"
 
 

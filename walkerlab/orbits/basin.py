@@ -15,7 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
+from walkerlab.hybrid.rigid_lanes import (
+    GOES_ON,
+    REJECTED,
+    WALKED,
+    Fates,
+    TwoLegs,
+    new_fates,
+    new_lane_memory,
+    struck,
+    walk_lanes,
+)
+from walkerlab.hybrid.rigid_observer import Unobserved
+from walkerlab.hybrid.rigid_walk import EVENTS, hip_above_fall, walk
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits import step_map
+from walkerlab.solvers.dop853 import new_dop853
+from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.stepping import H_NEXT, clear_counts
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -33,6 +50,10 @@ WATCHED = 32  # walks that are looked at
 CAPTURE = 1e-3  # distance from an attractor at which it is called reached
 NEARER, NARROWINGS = 0.25, 6
 AROUND = 24  # starts around each point of an attractor that must come back to it
+AT_ONCE, BUDGET = 16, 4_000_000  # steps that one walk takes before it is looked at; right-hand sides of these
+
+Walker = TwoLegs | Standing
+"""A unit walker: two straight legs walk in lanes, more bodies from one start after the other."""
 
 
 class Capture(NamedTuple):
@@ -111,7 +132,7 @@ def on_section(walker: TwoLegs, z: Floats) -> Floats:
 
 
 def arrivals(
-    walker: TwoLegs,
+    walker: Walker,
     attractors: Attractors,
     z: Floats,
     most: int,
@@ -121,11 +142,45 @@ def arrivals(
     """Walk from section coordinates z (n, 3) to an attractor, a failure, or `most` steps."""
     fates: Fates = new_fates(len(z))
     capture = attractors.capture(len(z), most, share)
-    walk_lanes(walker, new_lane_memory(*tolerances), capture, on_section(walker, z), fates)
+    if isinstance(walker, Standing):
+        walk_one_by_one(walker, capture, z, fates, tolerances)
+    else:
+        walk_lanes(walker, new_lane_memory(*tolerances), capture, on_section(walker, z), fates)
     return Arrivals(fates.outcome, fates.steps, capture.attractor, capture.last)
 
 
-def find_attractors(walker: TwoLegs, starts: Floats, seed: int) -> Attractors:
+def walk_one_by_one(
+    walker: Standing, capture: Capture, z: Floats, fates: Fates, tolerances: tuple[float, float]
+) -> None:
+    """`walk_lanes` for any walker; a walk is looked at every so many steps."""
+    size = len(walker.blank)
+    method = new_dop853(size, *tolerances, BUDGET)
+    finder = finder_for(method, EVENTS)
+    strikes, knees = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
+    before, after = np.zeros((AT_ONCE, size)), np.zeros((AT_ONCE, size))
+    for number, start in enumerate(z):
+        y = step_map.on_section(walker, tuple(start.tolist()))
+        outcome, steps = REJECTED if hip_above_fall(walker, y) < 0.0 else WALKED, 0
+        while outcome == WALKED and steps < capture.most:
+            clear_counts(method)
+            method.clock[H_NEXT] = 0.0
+            room = min(AT_ONCE, capture.most - steps)
+            outcome, taken = walk(walker, method, finder, Unobserved(), y, strikes[:room], before, after, knees)
+            points = after[:taken][:, list(walker.picked)]
+            near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
+            if near.any():
+                taken = int(np.argmax(near.any(axis=1))) + 1
+                capture.attractor[number] = capture.owner[np.argmax(near[taken - 1])]
+                outcome = WALKED
+            if taken:
+                capture.last[number], y = points[taken - 1], tuple(after[taken - 1].tolist())
+            steps += taken
+            if near.any():
+                break
+        fates.outcome[number], fates.steps[number] = outcome, steps
+
+
+def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """The attractors that walks from section coordinates `starts` (n, 3) come to.
 
     walker  the unit walker
@@ -156,7 +211,7 @@ def distinct_points(points: Floats) -> Floats:
     return np.asarray(points[np.sort(first)])
 
 
-def cycle_through(walker: TwoLegs, point: Floats) -> Floats | None:
+def cycle_through(walker: Walker, point: Floats) -> Floats | None:
     """The cycle (period, 3) that a walk from a point (3,) is on, rotated to begin with its smallest angle."""
     orbit = [point]
     for _ in range(LONGEST_PERIOD):
@@ -175,7 +230,7 @@ def same_cycle(one: Floats, other: Floats) -> bool:
     return len(one) == len(other) and bool(np.abs(one - other).max() < 100.0 * REPEATS)
 
 
-def reach_of(walker: TwoLegs, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
+def reach_of(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
     """Distance from a cycle within which walks from all sides came back to it; zero if not even the nearest did.
 
     It also stays clear of the other cycles.

@@ -23,7 +23,7 @@ from walkerlab.orbits.continuation import Floats
 from walkerlab.orbits.families import Branch, Follower, Span
 from walkerlab.orbits.step_maps import StepMap, multipliers_of
 
-CELLS = (96, 48)
+CELLS = (72, 36)
 NOTHING = -1  # no walk goes on
 TRANSIENT, KEPT = 400, 96  # steps
 KICK = 1e-3  # away from an unstable gait, coordinates being of magnitude one

@@ -256,6 +256,51 @@ class Player(Block):
 
 
 @dataclass(frozen=True)
+class Gait:
+    """A point of a diagram whose gait a player can show.
+
+    x, y    where its mark is, in the diagram's own units
+    said    what it is
+    walker  how it moves
+    """
+
+    x: float
+    y: float
+    said: str
+    stable: bool
+    walker: Walker
+    slope_rad: float
+
+    @property
+    def scene(self) -> dict[str, object]:
+        """What is different in the player's scene."""
+        return {"slope_rad": self.slope_rad, "pads": []}
+
+
+@dataclass(frozen=True)
+class Diagram(Block):
+    """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player.
+
+    curves  points of a line, and whether the gaits on it are stable
+    ticks   of both axes: place and text
+    """
+
+    template: ClassVar[str] = "diagram"
+    WIDTH: ClassVar[int] = 720
+    HEIGHT: ClassVar[int] = 340
+    LEFT: ClassVar[int] = 62
+    RIGHT: ClassVar[int] = 12
+    TOP: ClassVar[int] = 12
+    BOTTOM: ClassVar[int] = 46
+    title: str
+    caption: str
+    titles: tuple[str, str]
+    curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
+    ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
+    gaits: tuple[Gait, ...]
+
+
+@dataclass(frozen=True)
 class Section:
     """A part of a page under a heading.
 

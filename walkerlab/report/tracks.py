@@ -70,9 +70,14 @@ class Track:
 def track_of(config: Config, result: Stored) -> Track | None:
     """The motion that a stage stored; None if it stored none, or none that tells where the joints are."""
     trajectory = result.groups.get("trajectory")
-    if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < 2:
+    return None if trajectory is None else track_in(config, result.summary, trajectory)
+
+
+def track_in(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Track | None:
+    """The motion in a stored trajectory; None if it does not tell where the joints are."""
+    if "angle" not in trajectory.variables or trajectory["time"].size < 2:
         return None
-    channels = {"t": trajectory["time"]} | joints(config, result.summary, trajectory)
+    channels = {"t": trajectory["time"]} | joints(config, summary, trajectory)
     if "hx" not in channels:
         return None
     channels |= pairs(trajectory, {"angle": "a", "velocity": "v", "shank_angle": "b"})

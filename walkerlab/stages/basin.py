@@ -16,9 +16,11 @@ from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import two_legs
+from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.basin import NONE, Attractors, Floats, Window, edge_cells, find_attractors
 from walkerlab.orbits.scaled_starts import scaled_starts
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import contact_gait, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.basin_pieces import (
@@ -54,15 +56,16 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
     Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
     there is not.
     """
-    gait = inputs["fixedpoint"].summary
-    if len(gait["state"]) != 1 + len(COORDINATES):
+    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config, config.equations)
+    if len(rigid.picked) != len(COORDINATES):
         raise ConfigError(
-            "basin takes walkers of two straight legs: this one has more coordinates just after heel strike.",
-            "Take a walker of type compass or straight-legs without a torso.",
+            f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
+            f"{len(rigid.picked)}.",
+            "Lock the knees in the heel strike: --set walker.knee.at_heel_strike=locked.",
         )
-    window = window_of(config, [float(number) for number in gait["state"][1:]])
+    window = window_of(config, [float(gait["state"][place]) for place in rigid.picked])
     progress.start("basin: attractors")
-    question = question_of(config, inputs, window)
+    question = question_of(config, inputs, window, rigid)
     clock = Stopwatch()
     pieces = cells_of(question, window)
     finish(pieces, "basin", progress, parts, jobs, clock)
@@ -76,7 +79,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
         walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
     group = group_of(config.basin, window, found, walking)
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
-    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, gait), aperiodic)
+    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, rigid), aperiodic)
     said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
     return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
 
@@ -120,25 +123,23 @@ def window_of(config: Config, z: list[float]) -> Window:
     return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
-def question_of(config: Config, inputs: Mapping[str, Content], window: Window) -> Question:
+def question_of(config: Config, inputs: Mapping[str, Content], window: Window, rigid: Standing) -> Question:
     """What is walked."""
     if config.basin.model == "contact":
-        return contact_question(config, inputs)
-    unit, units = unit_walker(rigid_walker(config, config.equations))
-    walker = two_legs(unit)
-    if walker is None:
-        raise ConfigError(
-            "basin.model: rigid walks in lanes, which have room for two straight legs; this walker has more bodies.",
-            "Ask the contact model: --set basin.model=contact.",
-        )
+        return contact_question(config, inputs, rigid)
+    unit, units = unit_walker(rigid)
+    legs = two_legs(unit)
+    walker = unit if legs is None else legs
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
     drawn = np.concatenate([np.array([window.rest]), window.drawn(DRAWN, generator)])
     attractors = find_attractors(walker, drawn * np.array(scale), config.seed)
-    return RigidQuestion(walker, scale, attractors, config.basin.steps)
+    question = RigidQuestion(walker, scale, attractors, config.basin.steps)
+    one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
+    return question if legs is not None else one_by_one
 
 
-def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQuestion:
+def contact_question(config: Config, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
     """The contact model at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise ConfigError("basin.model: contact needs a contact block, and the config has none.", "Add one.")
@@ -147,8 +148,6 @@ def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQu
     answer = contact_gait(config, float(gait["step_length_m"]), state)
     scene = free_scene(config, float(gait["step_length_m"]), answer)
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
-
-    rigid = rigid_walker(config, config.equations)
 
     def start_of(swing: float, stance: float) -> tuple[float, ...]:
         return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
@@ -160,7 +159,7 @@ def contact_question(config: Config, inputs: Mapping[str, Content]) -> ContactQu
     return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
 
 
-def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str, Any]]:
+def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
     """Period and a state (SI) of each attractor."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
@@ -168,8 +167,7 @@ def attractors_of(question: Question, gait: Mapping[str, Any]) -> list[dict[str,
     found: Attractors = question.attractors
     rows = []
     for cycle in found.cycles:
-        z = cycle.points[0] / np.array(question.scale)
-        state = [-2.0 * float(gait["slope_rad"]) - float(z[0]), *(float(number) for number in z)]
+        state = list(on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist())))
         rows.append({"period": cycle.period, "state": state, "reached_within": cycle.reach})
     return rows
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_lanes import TwoLegs
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.basin import NONE, Attractors, Window, arrivals, inside_cell
+from walkerlab.orbits.basin import NONE, Attractors, Walker, Window, arrivals, inside_cell
 from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import ContactScene, start_state
@@ -52,7 +51,7 @@ class RigidQuestion:
     scale   (3) units of the section's coordinates: unit walker's over SI
     """
 
-    walker: TwoLegs
+    walker: Walker
     scale: tuple[float, float, float]
     attractors: Attractors
     steps: int

@@ -32,6 +32,7 @@ from walkerlab.orbits.step_maps import StepMap
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.continuation_motions import motions
 from walkerlab.stages.continuation_results import groups, summary
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
@@ -124,7 +125,13 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
         followed = FOLLOW[model](asked, progress)
         found.append(over_plane(followed, asked, progress))
     said = summary(found, parameter, block) | {"left_out": left_out(found, asked)}
-    content = Content(groups(found, parameter, block), said)
+    moving = {
+        f"{RIGID}/{path}": group
+        for one in found
+        if one.model == RIGID
+        for path, group in motions(one.branches, config, parameter).items()
+    }
+    content = Content({**groups(found, parameter, block), **moving}, said)
     if not any(followed.branches for followed in found):
         raise NoAnswer(
             f"no gait with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}",

@@ -284,7 +284,9 @@ def same_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
         label = f"{level:.0e}".replace("e-0", "e-")
         reached = shares.get(label, {})
         if reached:
-            told = ", ".join(f"{name} {ratio:.3g}" for name, ratio in sorted(reached.items(), key=lambda one: one[1]))
+            told = ", ".join(
+                f"{name} {plainly(ratio)}" for name, ratio in sorted(reached.items(), key=lambda one: one[1])
+            )
             sentences.append(f"An error of {label} takes, as a multiple of walkerlab's time: {told}.")
         missed = [name for name in names if name not in reached]
         if missed:
@@ -303,9 +305,16 @@ def same_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
     return " ".join(sentences)
 
 
+def plainly(number: float) -> str:
+    """Three digits without a power of ten."""
+    return f"{float(f'{number:.3g}'):g}"
+
+
 def steps_in_words(steps: Mapping[str, float]) -> str:
     """Step sizes by name, the largest first."""
-    return ", ".join(f"{name} {1e6 * step:.3g} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1]))
+    return ", ".join(
+        f"{name} {plainly(1e6 * step)} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1])
+    )
 
 
 def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
@@ -327,17 +336,21 @@ def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
         elif row.error is not None:
             others.append(f"{row.engine} {row.integrator} {1e3 * row.error:.3g} ms off")
         else:
-            others.append(f"{row.engine} {row.integrator} {row.outcome} after {row.steps} steps")
+            steps = "one step" if row.steps == 1 else f"{row.steps} steps"
+            others.append(f"{row.engine} {row.integrator} {row.outcome} after {steps}")
     if others:
         sentences.append(f"The others: {'; '.join(others)}.")
     series = series_of(rows, scene, OWN_LAW)
     changes = convergence(rows, scene)[OWN_LAW]
     settled = {name for name in changes if has_settled(*series[name][-2:])}
     for said, names in (
-        ("What they are off is the model's where the last refinement changes the period by next to nothing", settled),
-        ("At the finest steps that a run is given the last halving still changes it", changes.keys() - settled),
+        ("Where the last refinement hardly changes the period, the difference is the model's", settled),
+        (
+            "At the finest steps that a run is given, the last halving still changes the period",
+            changes.keys() - settled,
+        ),
     ):
-        told = ", ".join(f"{name} {1e3 * change:.2g} ms" for name, change in changes.items() if name in names)
+        told = ", ".join(f"{name} by {1e3 * change:.2g} ms" for name, change in changes.items() if name in names)
         if told:
             sentences.append(f"{said}: {told}.")
     told = steps_in_words(three_digits(rows, scene, truth)[OWN_LAW])

@@ -37,9 +37,9 @@ def gait_for_start_or_pads(config: Config) -> tuple[str, ...]:
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
-def scene_of_other_walkers(config: Config) -> tuple[str, ...]:
-    """What a walk starts from, for other walkers than the paper's compass: only these are judged in their own scene."""
-    return () if of_the_compass(config) else gait_for_start_or_pads(config)
+def known_and_start(config: Config) -> tuple[str, ...]:
+    """The known problems, and for other walkers than the paper's compass, judged in their own scene, its start."""
+    return ("known-problems", *(() if of_the_compass(config) else gait_for_start_or_pads(config)))
 
 
 def engines_installed() -> Mapping[str, str]:
@@ -217,13 +217,19 @@ PIPELINE = Graph(
         programs=engines_installed,
     ),
     Stage(
+        "known-problems",
+        "walkerlab.stages.known_problems",
+        "Answer problems with known answers through the contact code, once for every scene.",
+        reads=(),
+    ),
+    Stage(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
         reads=("stability.cases",),
         reads_of_paper=PAPERS_WALK,
         reads_of_scene=PAPERS_WALK,
-        inputs=scene_of_other_walkers,
+        inputs=known_and_start,
         has_cells=True,
         does_without=of_verification,
     ),

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.scene.contact import pads_pitch
 from walkerlab.scene.left_out import of_verification
 from walkerlab.stages.contact_sim import own_pitch, rigid_start
+from walkerlab.stages.known_problems import known_group, known_of, known_row, rows_group
 from walkerlab.stages.progress import Progress
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.content import Content, Group
 from walkerlab.verification.catalogue import judged
 from walkerlab.verification.cells import cells_of, run_cells
 from walkerlab.verification.known import Known
@@ -26,7 +25,7 @@ OF_THE_SCENE = ("walker", "gravity_m_s2", "slope_rad", "equations", "contact", "
 
 
 def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Judge the catalogue and the config's own cases, answer the known problems, and try ordinary methods.
+    """Judge the catalogue and the config's own cases, try ordinary methods, and tell of the known problems.
 
     The paper's compass has a catalogue of named cases; of any other walker it is the scene's own extremes.
 
@@ -42,13 +41,12 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
         cells = cells_of(config.stability.cases, own)
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
-    known: list[Known] = []
     ordinary: list[Choice] = []
     for found in run_cells(cells, jobs):
         cases += [item for item in found if isinstance(item, CaseResult)]
-        known += [item for item in found if isinstance(item, Known)]
         ordinary += [item for item in found if isinstance(item, Choice)]
         progress.advance()
+    known = [known_of(row) for row in inputs["known-problems"].summary["known"]]
     summary = summary_of(cases, known, ordinary)
     summary["left_out"] = list(of_verification(config))
     return Content({"cases": cases_group(cases), "known": known_group(known)}, summary | verdict(cases, known))
@@ -111,22 +109,6 @@ def case_row(case: CaseResult) -> dict[str, Any]:
     }
 
 
-def known_row(answer: Known) -> dict[str, Any]:
-    """A known problem."""
-    return {
-        "name": answer.name,
-        "quantity": answer.quantity,
-        "value": answer.value,
-        "reference": answer.reference,
-        "source": answer.source,
-        "error": answer.error,
-        "limit": answer.limit,
-        "why_limit": answer.why,
-        "ok": answer.ok,
-        "wall_s": answer.wall_s,
-    }
-
-
 def ordinary_row(choice: Choice) -> dict[str, Any]:
     """An ordinary method on a case; without an error if it did not arrive."""
     row: dict[str, Any] = {
@@ -156,23 +138,3 @@ def cases_group(cases: Sequence[CaseResult]) -> Group:
         ("rhs_evaluations", [case.rhs_evaluations for case in cases], "1", "right-hand sides evaluated"),
     ]
     return rows_group("case", len(cases), columns)
-
-
-def known_group(known: Sequence[Known]) -> Group:
-    """The table of known problems."""
-    columns: list[tuple[str, Any, str, str]] = [
-        ("name", [answer.name for answer in known], "", "name of the problem"),
-        ("quantity", [answer.quantity for answer in known], "", "what is compared, with its unit"),
-        ("value", [answer.value for answer in known], "1", "by the contact code, in the quantity's unit"),
-        ("reference", [answer.reference for answer in known], "1", "by another route, in the quantity's unit"),
-        ("error", [answer.error for answer in known], "1", "difference over reference"),
-    ]
-    return rows_group("problem", len(known), columns)
-
-
-def rows_group(dim: str, size: int, columns: Sequence[tuple[str, Any, str, str]]) -> Group:
-    """Columns over one numbered dimension."""
-    variables = {dim: Variable(np.arange(size), (dim,), "1", "number of the row")}
-    for name, values, units, text in columns:
-        variables[name] = Variable(np.array(values, dtype=object if units == "" else None), (dim,), units, text)
-    return Group(variables)

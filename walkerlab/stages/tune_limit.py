@@ -40,7 +40,7 @@ from walkerlab.store.content import Group, Variable
 
 FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
 COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
-OTHERS_EVERY = 2  # of the settings, for other walkers than the compass: their walks take several times as long
+OTHERS_EVERY = 3  # of the settings, for other walkers than the compass: their walks take several times as long
 # of each setting: name, unit, meaning, whether it is a run time
 COLUMNS = (
     ("period", "period_s", "s", "period of the contact gait"),

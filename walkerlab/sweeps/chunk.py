@@ -129,7 +129,7 @@ def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tu
     """One point's row, and the content it is from."""
     key = keys[target]
     try:
-        answer = worker.answer(config, target, keys)
+        answer = worker.answer(without_outputs(config, target, worker.graph), target, keys)
     except Exception as error:
         # A point that meets a bug is told as such; the others are there.
         return Row(key, "failed", f"{type(error).__name__}: {error}", {}), Content()
@@ -138,6 +138,15 @@ def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tu
     if no_answer is None:
         return Row(key, "answered", "", summary), content
     return Row(key, "no-answer", no_answer.message, summary), content
+
+
+def without_outputs(config: Config, target: str, graph: Graph) -> Config:
+    """The config without the arrays in time that a walk is stored with: a row is the summary, which is the same.
+
+    A stage that draws on another's arrays is left them.
+    """
+    asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads]
+    return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 
 
 def labels_in(content: Content, known: Mapping[str, Any]) -> dict[str, tuple[str, str]]:

@@ -9,7 +9,6 @@ from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.contact_case import judge_contact
-from walkerlab.verification.known import PROBLEMS, Known
 from walkerlab.verification.ordinary import Choice, choices
 from walkerlab.verification.processes import in_order
 from walkerlab.verification.rigid_case import judge_rigid
@@ -26,40 +25,27 @@ class CaseCell:
     case: Case
     config: Config | None = None
 
-    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
+    def run(self) -> tuple[CaseResult | Choice, ...]:
         """The verdict, then the ordinary methods."""
         config = self.config or config_of(self.case)
         judge = judge_rigid if self.case.model == "rigid" else judge_contact
         return (judge(self.case, config), *choices(self.case, config))
 
 
-@dataclass(frozen=True)
-class KnownCell:
-    """A known problem, by its place in the list."""
-
-    index: int
-
-    def run(self) -> tuple[CaseResult | Known | Choice, ...]:
-        """Its answer."""
-        return (PROBLEMS[self.index].answered(),)
+Found = tuple[CaseResult | Choice, ...]
 
 
-Cell = CaseCell | KnownCell
-Found = tuple[CaseResult | Known | Choice, ...]
+def cells_of(cases: Sequence[Case], own: Sequence[tuple[Case, Config]] = ()) -> list[CaseCell]:
+    """Everything there is to run: a scene's own cases, then lines over the paper's config."""
+    return [*(CaseCell(*case) for case in own), *(CaseCell(case) for case in cases)]
 
 
-def cells_of(cases: Sequence[Case], own: Sequence[tuple[Case, Config]] = ()) -> list[Cell]:
-    """Everything there is to run: known problems first, since they are the longest; then a scene's own cases."""
-    known = (KnownCell(index) for index in range(len(PROBLEMS)))
-    return [*known, *(CaseCell(*case) for case in own), *(CaseCell(case) for case in cases)]
-
-
-def run_cells(cells: Sequence[Cell], jobs: int) -> Iterator[Found]:
+def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[Found]:
     """The pieces' results in their order, whoever ran them."""
     return in_order(cells, jobs, first_of_each_model(cells))
 
 
-def first_of_each_model(cells: Sequence[Cell]) -> list[int]:
+def first_of_each_model(cells: Sequence[CaseCell]) -> list[int]:
     """Places of the first case of each model."""
-    models = [cell.case.model if isinstance(cell, CaseCell) else "" for cell in cells]
+    models = [cell.case.model for cell in cells]
     return [models.index(model) for model in ("contact", "rigid") if model in models]

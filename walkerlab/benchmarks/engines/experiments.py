@@ -46,7 +46,7 @@ EXACT_ENOUGH = 1e-5  # error on the same law from which on nothing finer is run
 SETTLED = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
 LARGEST_STEP_S = 0.01  # where they are
 STARTS = (0.95, 0.99)  # of the gait's velocities
-TUNING_STEP_S = 1e-5
+TUNING_STEP_S = 2e-5
 TOUCHES, OWN_TOUCHES = 2, 10
 INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
 SWING_S = 0.48
@@ -177,6 +177,21 @@ def state_at_end(result: ContactWalkResult) -> Floats:
     return np.asarray(result.samples.states[1])
 
 
+def answered(result: ContactWalkResult, wall_s: float, touches: int) -> WalkAnswer:
+    """Our own walk as an engine would have answered, of so many touches."""
+    there = result.samples is not None and len(result.samples.states) > 1
+    return WalkAnswer(
+        result.outcome.label,
+        state_at_end(result) if there else None,
+        result.touch_time_s[:touches],
+        result.touch_along_m[:touches],
+        result.slip_m[:touches],
+        int(result.work[1]),
+        float(result.end_time_s),
+        wall_s,
+    )
+
+
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
     """Our own method over its ladder of tolerances, on the same walk."""
     walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
@@ -186,20 +201,8 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
             begun = time.process_time()
             result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
             walls.append(time.process_time() - begun)
-        there = result.samples is not None and len(result.samples.states) > 1
-        end = state_at_end(result) if there else None
-        touches, along = result.touch_time_s[:TOUCHES], result.touch_along_m[:TOUCHES]
-        answer = WalkAnswer(
-            result.outcome.label,
-            end,
-            touches,
-            along,
-            result.slip_m[:TOUCHES],
-            int(result.work[1]),
-            result.end_time_s,
-            median(walls),
-        )
-        mean = float(result.end_time_s) / max(1, int(result.work[1]))
+        answer = answered(result, median(walls), TOUCHES)
+        mean = answer.time_s / max(1, answer.steps)
         yield same_law_row(scene, OURS, version, OUR_METHOD, mean, rtol, truth, answer)
 
 
@@ -394,17 +397,8 @@ def adams_rows(scene: EngineScene, version: str) -> Iterator[Row]:
         begun = time.process_time()
         result = walked(scene.started(factor), OUR_METHOD, 1e-7, OWN_TOUCHES)
         wall = time.process_time() - begun
-        answer = WalkAnswer(
-            result.outcome.label,
-            None,
-            result.touch_time_s,
-            result.touch_along_m,
-            result.slip_m,
-            0,
-            result.end_time_s,
-            wall,
-        )
-        mean = float(result.end_time_s) / max(1, int(result.work[1]))
+        answer = answered(result, wall, OWN_TOUCHES)
+        mean = answer.time_s / max(1, answer.steps)
         yield Row(
             scene.name, OURS, version, OWN_LAW, "impact", factor, mean, 1e-7, None, None, wall,
             *last_step(answer), answer.touches_s.size, answer.outcome,

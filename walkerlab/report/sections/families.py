@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
+from walkerlab.report.gait_diagram import gait_diagram
 from walkerlab.report.numbers import count, number, quantity
 from walkerlab.report.results import Results
 
@@ -19,6 +20,9 @@ def section(results: Results) -> Section | None:
         return None
     first, *others = findings(summary) or [f"{count(len(summary['branches']), 'branch', 'branches')} followed."]
     blocks: list[Block] = [Paragraph(" ".join(others))] if others else []
+    diagram = gait_diagram(results)
+    if diagram is not None:
+        blocks.append(diagram)
     if summary["bifurcations"]:
         blocks.append(bifurcations(summary))
     return Section("families", f"Families of gaits over {summary['over']}", tuple(blocks), first)

@@ -549,4 +549,44 @@ function makeReadout(table, tracks) {
   };
 }
 
+// A gait of a diagram takes the walk's place in the player, until the walk is asked for again.
+function load(mark, walk) {
+  const next = walk.cloneNode(true);
+  const [first, ...others] = next.querySelectorAll(".track");
+  for (const other of others) other.remove();
+  Object.assign(first.dataset, { meta: mark.dataset.meta, floats: mark.dataset.floats });
+  next.dataset.player = JSON.stringify({ ...JSON.parse(walk.dataset.player), ...JSON.parse(mark.dataset.gait) });
+  next.querySelector(".loop").checked = true;
+  const [key, back] = [next.querySelector(".key"), document.createElement("button")];
+  key.replaceChildren(Object.assign(document.createElement("li"), { className: "rigid", textContent: mark.getAttribute("aria-label") }));
+  Object.assign(back, { type: "button", className: "back", textContent: "Back to the walk" });
+  back.addEventListener("click", () => begin(next, walk.cloneNode(true)));
+  key.after(back);
+  begin(document.querySelector("[data-player]"), next);
+}
+
+function begin(old, next) {
+  old.replaceWith(next);
+  play(next);
+  next.focus();
+  next.scrollIntoView({ block: "nearest" });
+}
+
+const pristine = document.querySelector("[data-player]")?.cloneNode(true);
 for (const root of document.querySelectorAll("[data-player]")) play(root);
+for (const diagram of document.querySelectorAll(".diagram")) {
+  const marks = [...diagram.querySelectorAll("[data-gait]")];
+  for (const [index, mark] of marks.entries()) {
+    mark.addEventListener("click", () => pristine && load(mark, pristine));
+    mark.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === " ") mark.dispatchEvent(new Event("click"));
+      const to = marks[index + { ArrowRight: 1, ArrowLeft: -1 }[event.key]];
+      if (to) {
+        mark.tabIndex = -1;
+        to.tabIndex = 0;
+        to.focus();
+      }
+      if (to || event.key === "Enter" || event.key === " ") event.preventDefault();
+    });
+  }
+}

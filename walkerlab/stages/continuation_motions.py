@@ -1,0 +1,72 @@
+"""How gaits of a family move: some of them walk for a stride or a cycle, for whoever wants to see them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from walkerlab.hybrid.recorded_walk import Samples, take_walk
+from walkerlab.mechanics.rigid import knee_of
+from walkerlab.orbits.families import Branch, GaitPoint
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import on_section
+from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import ENDLESS, RigidScene, coordinates, rigid_walker
+from walkerlab.solvers.dop853 import new_dop853
+from walkerlab.stages.simulate import trajectory_group
+from walkerlab.store.content import Group
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+MOST_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
+STRIDE = 2  # steps, after which each leg is where it was
+RTOL, ATOL = 1e-9, 1e-11
+EVERY = 3  # which samples are kept beside those at heel strikes
+
+
+def motions(branches: Sequence[Branch], config: Config, parameter: Parameter) -> dict[str, Group]:
+    """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
+    return {
+        f"branch_{number}/motion_{place}": group
+        for number, branch in enumerate(branches)
+        if branch.period <= LONGEST
+        for place in spread(len(branch.points))
+        for group in motion(branch.points[place], branch.period, config, parameter)
+    }
+
+
+def spread(count: int) -> list[int]:
+    """Places of at most so many points, both ends among them."""
+    return sorted({round(place) for place in np.linspace(0, count - 1, min(count, MOST_OF_BRANCH))})
+
+
+def motion(point: GaitPoint, period: int, config: Config, parameter: Parameter) -> Iterator[Group]:
+    """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
+    changed = parameter.config_at(config, point.value)
+    if changed is None:
+        return
+    walker = rigid_walker(changed, changed.equations)
+    unit, units = unit_walker(walker)
+    section, n = on_section(unit, [float(number) for number in point.z]), len(walker.tree.arm_x)
+    start = (*section[:n], *(rate / units.time for rate in section[n:]))
+    steps = max(period, STRIDE)
+    method = new_dop853(2 * n, RTOL, ATOL, ENDLESS)
+    walk = take_walk(walker, method, start, steps, sampled=True)
+    if walk.steps < steps or walk.samples is None:
+        return
+    knee = knee_of(assembly_of(changed.walker, rigid=True))
+    scene = RigidScene(walker, method, coordinates(changed), knee, states=True, energies=True, forces=True)
+    seen = trajectory_group(scene, walk, thinned(walk.samples))
+    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
+
+
+def thinned(samples: Samples) -> Samples:
+    """Every third sample, and both sides of every heel strike."""
+    changes = np.flatnonzero(np.diff(samples.step))
+    kept = np.unique(np.concatenate((np.arange(0, samples.time.size, EVERY), changes, changes + 1)))
+    return Samples(samples.time[kept], samples.state[kept], samples.step[kept], samples.bent[kept])
