@@ -98,6 +98,7 @@ def main() -> None:
     rigid = found[0]
     print(f"rigid model: {rigid:.7f} deg")
     velocity, ball, point = asked.velocities[-1], asked.radii[0], asked.radii[-1]
+    stiffer = [Ground(velocity, point, factor, factor**asked.damping) for factor in asked.factors]
     series = (
         ("stiction velocity (mm/s)", [Ground(one, ball) for one in asked.velocities], asked.velocities),
         ("radius of the feet (m)", [Ground(velocity, one) for one in asked.radii], asked.radii),
