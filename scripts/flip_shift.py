@@ -102,11 +102,7 @@ def main() -> None:
     series = (
         ("stiction velocity (mm/s)", [Ground(one, ball) for one in asked.velocities], asked.velocities),
         ("radius of the feet (m)", [Ground(velocity, one) for one in asked.radii], asked.radii),
-        (
-            "times the stiffness",
-            [Ground(velocity, point, one, one**asked.damping) for one in asked.factors],
-            asked.factors,
-        ),
+        ("times the stiffness", stiffer, asked.factors),
     )
     for name, grounds, knob in series:
         flips = rows(name, grounds, knob, rigid)
