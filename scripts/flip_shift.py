@@ -1,10 +1,10 @@
-"""How the contact model's first flip comes to the rigid model's as its ground stiffens and creeps less.
+"""How the contact model's first flip comes to the rigid model's as its ground creeps less and stiffens.
 
-    python scripts/flip_shift.py [--factors 1 10 100] [--velocities 100 25 6.25]
+    python scripts/flip_shift.py [--velocities 100 25 6.25] [--radii 0.001 0.0001 0.00001] [--factors 1 10 100]
 
-The paper's walker over slope. Two series: the stiction velocity falls on the config's ground; the ground stiffens at
-the last of these velocities. With the stiffness k goes the damping as k^(1/2) and the penetration of full damping as
-k^(-1/e); with the stiction velocity goes the friction velocity. The observed order comes from the changes between
+The paper's walker over slope. Three series, each from the end of the one before: the stiction velocity falls and the
+friction velocity with it; the ball feet, which roll, shrink to points; the ground stiffens, its damping as k^p
+(--damping) and the penetration of full damping as k^(-1/e). The observed order comes from the changes between
 neighbours, and so does not hang on what else separates the models.
 """
 
@@ -14,6 +14,7 @@ import argparse
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
@@ -25,18 +26,28 @@ from walkerlab.stages.progress import Silent
 SPAN = Span(3.9, 4.5)  # deg; holds every flip that is asked for
 
 
-def config_of(stiffer: float, velocity: float) -> Config:
-    """The paper's walker on ground `stiffer` times as stiff, with this stiction velocity (mm/s)."""
+class Ground(NamedTuple):
+    """What separates the contact model from the rigid one."""
+
+    velocity: float  # of stiction, mm/s
+    radius: float  # of the ball feet, m
+    stiffer: float = 1.0  # times the config's stiffness
+    damped: float = 1.0  # times its damping
+
+
+def config_of(ground: Ground) -> Config:
+    """The paper's walker on another ground."""
     own = load().config.contact
     assert own is not None, "the paper's walker has a contact block"
     changed = {
-        "stiffness": own.stiffness * stiffer,
-        "damping": own.damping * math.sqrt(stiffer),
-        "full_damping_penetration": own.full_damping_penetration * stiffer ** (-1.0 / own.exponent),
-        "stiction_velocity": velocity,
-        "friction_velocity": own.friction_velocity / own.stiction_velocity * velocity,
+        "stiffness": own.stiffness * ground.stiffer,
+        "damping": own.damping * ground.damped,
+        "full_damping_penetration": own.full_damping_penetration * ground.stiffer ** (-1.0 / own.exponent),
+        "stiction_velocity": ground.velocity,
+        "friction_velocity": own.friction_velocity / own.stiction_velocity * ground.velocity,
     }
-    return load(sets=[f"contact.{name}={value!r}" for name, value in changed.items()]).config
+    sets = [f"contact.{name}={value!r}" for name, value in changed.items()]
+    return load(sets=[*sets, f"walker.foot_radius_m={ground.radius!r}"]).config
 
 
 def question(config: Config) -> Question:
@@ -44,23 +55,22 @@ def question(config: Config) -> Question:
     return Question(config, parameter_of("slope_deg", config), SPAN, periods=1, points=400)
 
 
-def flip(stiffer: float, velocity: float) -> float:
+def flip(ground: Ground) -> float:
     """Where the contact model's gait of one step first doubles its period (deg)."""
-    found = first_flip(contact_branches(question(config_of(stiffer, velocity)), Silent()).branches)
+    found = first_flip(contact_branches(question(config_of(ground)), Silent()).branches)
     assert found is not None, "the span holds the flip"
     return found[0]
 
 
-def rows(name: str, grounds: Sequence[tuple[float, float]], knob: Sequence[float], rigid: float) -> list[float]:
+def rows(name: str, grounds: Sequence[Ground], knob: Sequence[float], rigid: float) -> list[float]:
     """Print the series as it is computed; returns its flips.
 
-    grounds  how much stiffer, and the stiction velocity, of each
-    knob     what changes
+    knob  what changes
     """
     flips: list[float] = []
     print(f"{name:>24} {'flip (deg)':>12} {'shift (deg)':>12} {'order':>7}")
     for ground, value in zip(grounds, knob, strict=True):
-        flips.append(flip(*ground))
+        flips.append(flip(ground))
         order = ""
         if len(flips) > 2:
             (first, second), ratio = [b - a for a, b in pairwise(flips[-3:])], knob[1] / knob[0]
@@ -78,17 +88,21 @@ def limit(flips: Sequence[float]) -> float:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--factors", type=float, nargs="+", default=[1.0, 10.0, 100.0], help="of the stiffness")
     parser.add_argument("--velocities", type=float, nargs="+", default=[100.0, 25.0, 6.25], help="mm/s")
+    parser.add_argument("--radii", type=float, nargs="+", default=[1e-3, 1e-4, 1e-5], help="m")
+    parser.add_argument("--factors", type=float, nargs="+", default=[1.0, 10.0, 100.0], help="of the stiffness")
+    parser.add_argument("--damping", type=float, default=1.0, help="power of the stiffness that the damping goes with")
     asked = parser.parse_args()
     found = first_flip(rigid_branches(question(load().config), Silent())[0].branches)
     assert found is not None, "the rigid walker's flip is in the span"
     rigid = found[0]
     print(f"rigid model: {rigid:.7f} deg")
-    last = asked.velocities[-1]
+    velocity, ball, point = asked.velocities[-1], asked.radii[0], asked.radii[-1]
+    stiffer = [Ground(velocity, point, factor, factor**asked.damping) for factor in asked.factors]
     series = (
-        ("stiction velocity (mm/s)", [(1.0, velocity) for velocity in asked.velocities], asked.velocities),
-        ("times the stiffness", [(factor, last) for factor in asked.factors], asked.factors),
+        ("stiction velocity (mm/s)", [Ground(one, ball) for one in asked.velocities], asked.velocities),
+        ("radius of the feet (m)", [Ground(velocity, one) for one in asked.radii], asked.radii),
+        ("times the stiffness", stiffer, asked.factors),
     )
     for name, grounds, knob in series:
         flips = rows(name, grounds, knob, rigid)
