@@ -11,7 +11,7 @@ from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_s
 
 from walkerlab.report.blocks import MAIN, Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
 from walkerlab.report.page import Page as Sheet
-from walkerlab.report.page import render, said
+from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
 
@@ -181,3 +181,7 @@ def test_two_sections_cannot_have_one_anchor():
 def test_a_row_with_a_cell_too_few_is_refused():
     with pytest.raises(ValueError, match="2 cells"):
         table("t", [Column("a"), Column("b")], [["only one"]])
+
+
+def test_the_script_is_small():
+    assert len(source("page.js").encode()) + len(source("player.js").encode()) < 30_000

@@ -109,6 +109,15 @@ def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_
     assert done.stdout.split() == [undisturbed, "0"]
 
 
+def test_two_sweeps_on_one_folder_at_once_come_to_the_same_bits(toy, tmp_path):
+    script = tmp_path / "sweeper.py"
+    script.write_text(SWEEPER)
+    command = [sys.executable, str(script), str(toy.runs)]
+    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=120)[0].split() for process in both]
+    assert said[0] == said[1] == [toy.run("deadly", "seed=100:179:80").content.digest(), "0"]
+
+
 def is_alive(pid):
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
