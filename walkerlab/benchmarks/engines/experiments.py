@@ -332,11 +332,12 @@ def own_law_rows(
 ) -> Iterator[Row]:
     """An engine's own contact over step sizes from the gait, then from other starts at the finest but one.
 
-    A walk that takes more steps than its integrator is given is the last.
+    Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
+    would take more is not begun.
     """
     name = engine.adapter().CONTACTS[contact]
     integrator = engine.adapter().INTEGRATORS[name]
-    most = LONGER * integrator.most_steps
+    most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
 
     def walk(stepping: Stepping, factor: float) -> tuple[Row, int]:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
@@ -348,12 +349,13 @@ def own_law_rows(
         row = own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
         return row, answer.steps
 
-    before, done = None, []
+    before, done, spent = None, [], 0
     for stepping in own_law_ladder(name, integrator, float(truth.walk.touch_time_s[-1])):
         row, steps = walk(stepping, 1.0)
         yield row
         done.append(stepping)
-        if steps > integrator.most_steps:
+        spent += steps
+        if steps >= most or (integrator.adapts and spent + steps > most):
             return
         if before is not None and has_settled(before, row):
             break
