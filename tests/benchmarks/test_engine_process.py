@@ -1,5 +1,7 @@
 """An engine's crash, exception or endless loop ends its own task and nothing else."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 from crashing_tasks import Answers, Crashes, Raises, Sleeps
 
@@ -36,3 +38,13 @@ def test_what_takes_for_ever_is_ended(own, monkeypatch):
     assert lost.timed_out
     monkeypatch.setattr(process, "START_UP_S", 30.0)
     assert own.do(Answers(2), 1.0) == 2
+
+
+def test_who_stops_waiting_ends_what_runs(own):
+    assert own.do(Answers(1), 30.0) == 1
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(own.do, Sleeps(), 60.0)
+        own.abandon()
+        assert isinstance(waiting.result(30.0), Lost)
+    with pytest.raises(RuntimeError, match="nobody waits"):
+        own.do(Answers(2), 1.0)

@@ -85,13 +85,24 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
         progress.start(f"engines: {scene.name}", len(engines) + 1)
         found.rows += [*our_rows(scene, truth, __version__), *adams_rows(scene, __version__)]
         progress.advance()
-        with ThreadPoolExecutor(max(1, jobs)) as pool:
-            for measured in pool.map(partial(measure, scene=scene, truth=truth), engines):
-                found.add(measured)
-                progress.advance()
+        for measured in side_by_side(engines, scene, truth, jobs):
+            found.add(measured)
+            progress.advance()
     if not found.truths:
         raise NoAnswer("engines: no scene walks under ADAMS's law", "Start nearer to a gait (start: fixed-point).")
     return content(found, rigid)
+
+
+def side_by_side(engines: Sequence[Engine], scene: EngineScene, truth: Truth, jobs: int) -> Iterator[Findings]:
+    """What is found of each engine, `jobs` of them at a time; who stops waiting ends those that run."""
+    processes = [OwnProcess() for _ in engines]
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        try:
+            yield from pool.map(partial(measure, scene=scene, truth=truth), engines, processes)
+        except BaseException:
+            for process in processes:
+                process.abandon()
+            raise
 
 
 def not_installed() -> list[dict[str, str]]:
@@ -110,11 +121,11 @@ def hinge_left_out(config: Config) -> list[dict[str, str]]:
     return [{"what": "hinged first step", "why": "engines are measured on a walk that is free from its start"}]
 
 
-def measure(engine: Engine, scene: EngineScene, truth: Truth) -> Findings:
+def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Truth) -> Findings:
     """All experiments of one engine on one scene, in a process of its own."""
     found = Findings()
     version, target = engine.version, target_of(scene)
-    with OwnProcess() as process:
+    with process:
         found.swings, lost = swing_rows(engine, scene, process)
         found.left_out += [{"what": f"a swing in {engine.name}", "why": one.why} for one in lost]
         found.rows += same_law_rows(engine, version, scene, truth, process)
@@ -355,7 +366,7 @@ def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
             sentences.append(f"{said}: {told}.")
     told = steps_in_words(three_digits(rows, scene, truth)[OWN_LAW])
     if told:
-        sentences.append(f"Their own period keeps three digits up to steps of: {told}.")
+        sentences.append(f"Three digits of their own period take steps of at most: {told}.")
     return " ".join(sentences)
 
 

@@ -330,29 +330,37 @@ def tuned(
 def own_law_rows(
     engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
 ) -> Iterator[Row]:
-    """An engine's own contact over step sizes from the gait, then from other starts at the finest but one."""
+    """An engine's own contact over step sizes from the gait, then from other starts at the finest but one.
+
+    Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
+    would take more is not begun.
+    """
     name = engine.adapter().CONTACTS[contact]
     integrator = engine.adapter().INTEGRATORS[name]
-    most = LONGER * integrator.most_steps
+    most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
 
-    def walk(stepping: Stepping, factor: float) -> Row:
+    def walk(stepping: Stepping, factor: float) -> tuple[Row, int]:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
         if isinstance(answer, Lost):
-            return lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
+            lost = lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
+            return lost, most if answer.timed_out else 0
         step = answer.time_s / max(1, answer.steps) if integrator.adapts else stepping.step_s
-        return own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
+        row = own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
+        return row, answer.steps
 
-    before, done = None, []
+    before, done, spent = None, [], 0
     for stepping in own_law_ladder(name, integrator, float(truth.walk.touch_time_s[-1])):
-        row = walk(stepping, 1.0)
+        row, steps = walk(stepping, 1.0)
         yield row
         done.append(stepping)
-        timed_out = row.outcome == Outcome.BUDGET_EXHAUSTED.label and row.why
-        if timed_out or (before is not None and has_settled(before, row)):
+        spent += steps
+        if steps >= most or (integrator.adapts and spent + steps > most):
+            return
+        if before is not None and has_settled(before, row):
             break
         before = row
-    yield from (walk(stepping, factor) for stepping in done[-2:][:1] for factor in STARTS)
+    yield from (walk(stepping, factor)[0] for stepping in done[-2:][:1] for factor in STARTS)
 
 
 def own_law_ladder(name: str, integrator: Integrator, usual_s: float) -> Iterator[Stepping]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces, in_arrays
-from walkerlab.ground.held import BENT, FLEXED, RELEASED, held_flags, stop_flags
+from walkerlab.ground.held import BENT, FLEXED, LOCKED, RELEASED, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import carried_in_cell, cell_at, cell_edges, has_pads
 from walkerlab.ground.walker import FootMotion
@@ -46,6 +46,7 @@ from walkerlab.hybrid.contact_rules import (
 from walkerlab.hybrid.contact_run import new_ledger
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
 Feet = list[list[float]]
@@ -155,8 +156,22 @@ class Follower:
             state, _ = locked(OnGround(walker, carried, held, stop_flags(knees, ledger.knee)), state)
         else:
             release(knees, ledger, 1 - int(ledger.feet[STANCE]))
-        self.turn, self.scene = None, self.scene.with_knees_locked(ledger.held)
-        self.look = FeetAndForces(self.scene, ledger.carried)
+        self.turn = None
+        return self._in_next_model(state)
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether a knee was released by a touch itself: the engine's model has it locked."""
+        return int(np.count_nonzero(self.ledger.knee == LOCKED)) != len(self.scene.locked)
+
+    def release_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Go on from this state with the knee that a touch has released."""
+        return self._in_next_model(tuple(self.scene.about_centre(q, v).tolist()))
+
+    def _in_next_model(self, state: State) -> tuple[Floats, Floats]:
+        """Coordinates and velocities of the walker with its knees as they are now."""
+        self.scene = self.scene.with_knees_locked(self.ledger.held)
+        self.look = FeetAndForces(self.scene, self.ledger.carried)
         q, v = self.scene.from_base(state)
         self.feet, self.bends = self.look.feet(q, v), bends_of(self.scene, q, v)
         return q, v

@@ -49,6 +49,7 @@ class OwnProcess:
         """Nothing is started before the first task."""
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+        self._abandoned = False
 
     def __enter__(self) -> OwnProcess:
         """Itself."""
@@ -59,7 +60,9 @@ class OwnProcess:
         self.end()
 
     def do(self, task: Task[R], timeout_s: float) -> R | Lost:
-        """A task's result, or what became of it."""
+        """A task's result, or what became of it; RuntimeError once it is abandoned."""
+        if self._abandoned:
+            raise RuntimeError("nobody waits for this process any more")
         if self._pipe is None:
             self._start()
             timeout_s += START_UP_S
@@ -80,6 +83,13 @@ class OwnProcess:
         self._process = context.Process(target=serve, args=(there,), daemon=True)
         self._process.start()
         there.close()
+
+    def abandon(self) -> None:
+        """End what is running and take no more tasks; from another thread than the one that waits."""
+        self._abandoned = True
+        process = self._process
+        if process is not None:
+            process.kill()
 
     def end(self) -> int | None:
         """End the process, by force if need be; its exit code."""

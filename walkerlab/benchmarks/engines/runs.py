@@ -114,6 +114,8 @@ class Walk:
             if turn is not None:
                 self._come_to(turn.share * (self.seen_s - self.time_s))
                 self.q, self.v = self.rules.turn_knee(self.q, self.v)
+            elif self.rules.is_outdated:
+                self.q, self.v = self.rules.release_knee(self.q, self.v)
 
     def _come_to(self, wait_s: float) -> None:
         """Take the last step again, up to where a knee turns."""
@@ -142,7 +144,7 @@ class Walk:
             self.time_s, self.q, self.v = self.seen_s, np.array(q), np.array(v)
             if changed:
                 self.hand_over_ground(engine)
-            return self.rules.outcome is None
+            return self.rules.outcome is None and not (changed and self.rules.is_outdated)
 
         begun = time.process_time()
         engine.run(task.most - self.steps, span, on_step)
@@ -178,7 +180,9 @@ class SwingTask:
     def run(self) -> SwingAnswer:
         """Swing."""
         n = len(self.chain)
-        q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])))[0].T
+        q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])), rcond=None)[
+            0
+        ].T
         engine = ENGINES[self.engine].adapter().Run(self.model, self.stepping, q, v, None)
         begun = time.process_time()
         last = recorded(engine, self.most, self.until_s)[-1]

@@ -99,7 +99,7 @@ class EngineScene:
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
         at, moving = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
-        relative, turning = np.linalg.lstsq(self.chain, np.column_stack((angles, rates)))[0].T
+        relative, turning = np.linalg.lstsq(self.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((at, relative)), np.concatenate((moving, turning))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
