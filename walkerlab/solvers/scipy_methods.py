@@ -198,7 +198,9 @@ def step_solver(method: ScipyMethod) -> int:
     if method.solver is None:
         return OUT_OF_BUDGET
     try:
-        method.solver.step()
+        # a step tried too far may leave all bounds: the library then takes a shorter one
+        with np.errstate(over="ignore", invalid="ignore"):
+            method.solver.step()
         if method.solver.status == "failed":
             return STEP_TOO_SMALL
         # some dense outputs evaluate the right-hand side too
