@@ -30,7 +30,7 @@ def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
 
 def test_the_check_runs_the_second_command_to_the_letter():
     assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
-    assert 'part 1500 "README: test" bash -euc "$readme_test"' in CHECK
+    assert 'part 1800 "README: test" bash -euc "$readme_test"' in CHECK
 
 
 def test_the_check_names_no_place_to_install_from():
