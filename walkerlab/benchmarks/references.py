@@ -14,7 +14,7 @@ from walkerlab.paper.appendix_a import RigidWalker
 
 Floats = NDArray[np.float64]
 
-BUDGET = 40_000_000  # right-hand sides: the explicit steps that light shanks on stiff ground take, and some to spare
+BUDGET = 20_000_000  # right-hand sides: a million explicit steps, which stiff ground takes, and some to spare
 # on stiff ground an explicit step errs by rounding alone: asked for less, it shrinks without end and gains nothing
 TIGHTEST = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
