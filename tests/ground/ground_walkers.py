@@ -3,8 +3,9 @@
 import math
 
 import numpy as np
+from compass_parts import CompassParts, compass_assembly
 
-from walkerlab.ground.compliant import CompassParts, compass_assembly, contact_walker
+from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body

@@ -3,8 +3,9 @@
 import ground_walkers as ground
 import numpy as np
 import pytest
+from compass_parts import compass_assembly
 
-from walkerlab.ground.compliant import compass_assembly, pinned_walker
+from walkerlab.ground.compliant import pinned_walker
 from walkerlab.ground.motion import OnGround
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.solvers.system import derivative, jacobian

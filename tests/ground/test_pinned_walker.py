@@ -3,10 +3,11 @@
 import ground_walkers as ground
 import numpy as np
 import pytest
+from compass_parts import compass_assembly
 from hypothesis import given
 from hypothesis import strategies as st
 
-from walkerlab.ground.compliant import compass_assembly, pinned_walker
+from walkerlab.ground.compliant import pinned_walker
 from walkerlab.ground.pinned import floating_state
 from walkerlab.ground.walker import foot_motion
 from walkerlab.mechanics.tree import sines_cosines

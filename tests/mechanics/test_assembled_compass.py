@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from compass_parts import CompassParts, compass_assembly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from printed_compass import released_mass_matrix
 
-from walkerlab.ground.compliant import CompassParts, compass_assembly, contact_walker, pinned_walker
+from walkerlab.ground.compliant import contact_walker, pinned_walker
 from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from compass_parts import CompassParts, compass_assembly
 from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
-from walkerlab.ground.compliant import STANCE_FOOT, CompassParts, compass_assembly, contact_walker
+from walkerlab.ground.compliant import STANCE_FOOT, contact_walker
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.motion import OnGround
 from walkerlab.hybrid.contact_events import MATERIAL, STICKS_FORWARD, feet_motion, joins

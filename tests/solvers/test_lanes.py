@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from compass_parts import CompassParts, compass_assembly
 
-from walkerlab.ground.compliant import CompassParts, compass_assembly, contact_walker, pinned_walker
+from walkerlab.ground.compliant import contact_walker, pinned_walker
 from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.kernels import kernel

@@ -1,4 +1,4 @@
-"""The compass walker described by its parts, and the walker on compliant ground assembled from any such description."""
+"""The walker on compliant ground assembled from a description by its parts."""
 
 import math
 from dataclasses import dataclass
@@ -12,39 +12,9 @@ from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned
 from walkerlab.ground.walker import ContactWalker, Foot
 from walkerlab.mechanics.assembly import Anchor, levers, tree_about, tree_about_centre
-from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Particle, Revolute
+from walkerlab.mechanics.parts import Assembly
 
 SWING_FOOT, STANCE_FOOT = 0, 1  # of the first step; body k carries foot k
-
-
-@dataclass(frozen=True)
-class CompassParts:
-    """Measures of a compass walker, SI."""
-
-    leg_length_m: float
-    foot_to_mass_m: float
-    leg_mass_kg: float
-    hip_mass_kg: float
-    leg_inertia_kg_m2: float
-    foot_radius_m: float
-
-
-def compass_assembly(parts: CompassParts) -> Assembly:
-    """Two legs hinged at a hip that is a point mass; each leg's frame has its origin at the hip and points up the leg.
-
-    A ball foot's centre is L - r from the hip, so that an upright leg reaches L.
-    """
-    mass_at = (0.0, parts.foot_to_mass_m - parts.leg_length_m)
-    foot_at = (0.0, parts.foot_radius_m - parts.leg_length_m)
-    hip = (0.0, 0.0)
-    legs = ("leg 1", "leg 2")
-    return Assembly(
-        bodies=tuple(Body(leg, parts.leg_mass_kg, mass_at, parts.leg_inertia_kg_m2) for leg in legs),
-        joints=(Revolute("hip", "leg 2", hip, "leg 1", hip),),
-        particles=(Particle("hip", parts.hip_mass_kg, "leg 2", hip),),
-        feet=tuple(BallFoot(f"foot of {leg}", leg, foot_at, parts.foot_radius_m) for leg in legs),
-        legs=(legs[:1], legs[1:]),
-    )
 
 
 @dataclass(frozen=True)
