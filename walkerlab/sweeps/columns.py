@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +21,8 @@ UNITS: Final = {
 }  # fmt: skip
 """By what names of numbers end in."""
 STATES: Final = ("state", "start_state", "final_state")
+TEXT_BYTES: Final = 6
+"""What a text of some words takes in a file, in units of what it takes here."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -92,22 +94,31 @@ class Columns:
         """Take units and meanings."""
         self.labels.update(labels)
 
-    def variables(
-        self, inverse: NDArray[np.int64], shape: tuple[int, ...], dims: tuple[str, ...]
-    ) -> Iterator[tuple[str, Variable]]:
-        """The variables over the points, by name; each is handed over, so that no two copies are held of all.
+    @property
+    def names(self) -> Collection[str]:
+        """Of the variables."""
+        return self._columns.keys()
+
+    @property
+    def size_bytes(self) -> int:
+        """About what all take in a file."""
+        return sum(column.values.nbytes * (TEXT_BYTES if column.text else 1) for column in self._columns.values())
+
+    def variable(
+        self, name: str, inverse: NDArray[np.int64], shape: tuple[int, ...], dims: tuple[str, ...]
+    ) -> Variable:
+        """A variable over the points; it is handed over, so that no two copies are held of all.
 
         inverse      which result each point has
         shape, dims  of the points
         """
-        for name in sorted(self._columns):
-            column = self._columns.pop(name)
-            values = column.typed()[inverse]
-            extra = values.shape[1:]
-            own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
-            unit, text = ("", name) if column.text else self._label(name)
-            gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
-            yield name, Variable(values.reshape(shape + extra), dims + own, unit, text, missing=gaps)
+        column = self._columns.pop(name)
+        values = column.typed()[inverse]
+        extra = values.shape[1:]
+        own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
+        unit, text = ("", name) if column.text else self._label(name)
+        gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
+        return Variable(values.reshape(shape + extra), dims + own, unit, text, missing=gaps)
 
     def _label(self, name: str) -> tuple[str, str]:
         """Unit and meaning of a number: as the stage labelled it, else by how its name ends."""
