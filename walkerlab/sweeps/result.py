@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -16,7 +17,7 @@ from walkerlab.config.canonical import canonical_json
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, Row
+from walkerlab.sweeps.chunk import Chunk
 from walkerlab.sweeps.columns import OWN, TEXT_BYTES, Columns
 from walkerlab.sweeps.question import Question, described
 
@@ -40,21 +41,18 @@ class Merge:
         self.own = {name: np.full(size, "", object) for name in OWN}
         self.there = np.zeros(size, bool)
 
-    def put(self, place: int, row: Row) -> None:
-        """Take one result's row."""
-        self.there[place] = True
-        summary = dict(row.summary)
-        outcome = summary.pop("outcome", None) or OUTCOMES[row.status]
-        for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
-            self.own[name][place] = sys.intern(text)
-        self.columns.put(place, summary)
-
-    def put_all(self, chunk: Chunk, places: Mapping[str, int]) -> None:
+    def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
         """Take the rows of a chunk that have a place."""
         self.columns.label(chunk.labels)
-        for row in chunk.rows:
-            if row.key in places:
-                self.put(places[row.key], row)
+        wanted = [row for row in chunk.rows if row.key in places]
+        at = [places[row.key] for row in wanted]
+        said = [json.loads(row.numbers) for row in wanted]
+        for place, row, numbers in zip(at, wanted, said, strict=True):
+            outcome = numbers.pop("outcome", None) or OUTCOMES[row.status]
+            for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
+                self.own[name][place] = sys.intern(text)
+        self.there[at] = True
+        self.columns.put(at, said)
 
     def content(self, question: Question, points: Any, inverse: NDArray[np.int64]) -> InTurn:
         """What is stored of the sweep; to be asked for once.

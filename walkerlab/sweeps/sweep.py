@@ -193,7 +193,7 @@ class Sweep:
 
     def _take_over(self, merge: Merge) -> None:
         for chunk in self._stored():
-            merge.put_all(chunk, self.places)
+            merge.put(chunk, self.places)
 
     def _compute(self, merge: Merge, work: Work, progress: Progress, begun: provenance.Provenance) -> None:
         missing = np.sort(self.first[~merge.there])
@@ -204,7 +204,7 @@ class Sweep:
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
-            merge.put_all(chunk, self.places)
+            merge.put(chunk, self.places)
             progress.advance(len(chunk.rows))
 
         chunk_s = work.chunk_s or work.engine.chunk_s
