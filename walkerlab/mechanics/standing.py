@@ -141,30 +141,29 @@ def rates(model: Standing, links: Any, y: State) -> Vector:
 
 
 @inlined
-def torque_change(
-    model: Standing, s: Vector, c: Vector, F: Vector, U: Vector, alpha: Vector, y: State, columns: State, at: int
-) -> Vector:
-    """Change (n) of r - M' alpha at fixed alpha along the direction columns[at], ... (2 n)."""
+def torque_gradients(
+    model: Standing, s: Vector, c: Vector, F: Vector, U: Vector, alpha: Vector, y: State
+) -> tuple[Vector, Vector]:
+    """Derivatives (n n each) of r - M' alpha at fixed alpha with respect to the angles and to their velocities."""
     n, tree, R = len(s), model.tree, model.radius
-    change = s
-    turned, rolled = 0.0, 0.0
-    for l in range(n):
-        omega, turn, faster = y[n + l], columns[at + l], columns[at + n + l]
-        turned += F[l] * turn * alpha[l]
-        rolled += 2.0 * omega * faster * F[l] - omega * omega * U[l] * turn
+    by_angle, by_rate = tree.cosine, tree.cosine
     for k in range(n):
-        total = (model.gravity_down * U[k] - model.gravity_along * F[k]) * columns[at + k]
-        total -= R * F[k] * columns[at + k] * alpha[STANCE]
+        own = model.gravity_down * U[k] - model.gravity_along * F[k] - R * F[k] * alpha[STANCE]
         for l in range(n):
             omega = y[n + l]
             A, B = tree.cosine[k * n + l], tree.sine[k * n + l]
             A_c, B_c = model.centrifugal.cosine[k * n + l], model.centrifugal.sine[k * n + l]
             cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            by_angle = omega * omega * (A_c * cos_d + B_c * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
-            total += by_angle * (columns[at + l] - columns[at + k])
-            total += 2.0 * omega * (A_c * sin_d - B_c * cos_d) * columns[at + n + l]
-        change = put(change, k, total)
-    return put(change, STANCE, change[STANCE] - R * (turned + rolled))
+            between = omega * omega * (A_c * cos_d + B_c * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
+            own -= between
+            by_angle = put(by_angle, k * n + l, between)
+            by_rate = put(by_rate, k * n + l, 2.0 * omega * (A_c * sin_d - B_c * cos_d))
+        by_angle = put(by_angle, k * n + k, by_angle[k * n + k] + own)
+    for l in range(n):
+        omega, at = y[n + l], STANCE * n + l
+        by_angle = put(by_angle, at, by_angle[at] - R * (F[l] * alpha[l] - omega * omega * U[l]))
+        by_rate = put(by_rate, at, by_rate[at] - 2.0 * R * omega * F[l])
+    return by_angle, by_rate
 
 
 @inlined
@@ -181,13 +180,19 @@ def rates_along(model: Standing, links: Any, y: State, columns: State, first: in
     M, r = reduced(links, standing_mass(model, s, c, U), standing_torques(model, s, c, F, U, y))
     factors = factored(M, n)
     alpha = spread(links, solve_factored(factors, r))
+    by_angle, by_rate = torque_gradients(model, s, c, F, U, alpha, y)
     out = columns
     for k in range(n):
         out = put(out, k, columns[n + k])
         out = put(out, n + k, alpha[k])
     for at in range(first, len(columns), 2 * n):
-        change = gathered(links, torque_change(model, s, c, F, U, alpha, y, columns, at))
-        faster = spread(links, solve_factored(factors, change))
+        change = alpha
+        for k in range(n):
+            total = 0.0
+            for l in range(n):
+                total += by_angle[k * n + l] * columns[at + l] + by_rate[k * n + l] * columns[at + n + l]
+            change = put(change, k, total)
+        faster = spread(links, solve_factored(factors, gathered(links, change)))
         for k in range(n):
             out = put(out, at + k, columns[at + n + k])
             out = put(out, at + n + k, faster[k])
