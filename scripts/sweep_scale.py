@@ -19,11 +19,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from walkerlab.config.reads import RigidConfig
 from walkerlab.stages.graph import Graph, Stage
 from walkerlab.store.content import Content
 
 HERE = Path(__file__)
-GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", ("slope",)))
+GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", RigidConfig))
 
 
 def run(config: Any, _inputs: Any, _progress: Any) -> Content:

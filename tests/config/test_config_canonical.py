@@ -1,51 +1,82 @@
-"""What a stage sees of a config, and what its key is made of."""
+"""What a stage is given of a config, and what its key is made of."""
+
+from __future__ import annotations
 
 import json
 import math
+from typing import Protocol
 
 import pytest
 
-from walkerlab.config.canonical import canonical_json, only, slice_of
-from walkerlab.config.fields import leaves
+from walkerlab.config.canonical import canonical_json, slice_of
+from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, StartConfig, dotted_keys, only
 from walkerlab.config.schema import Config, Contact
 
 CONFIG = Config(contact=Contact())
 
 
-def test_a_slice_holds_what_is_declared_and_nothing_else() -> None:
-    part = slice_of(CONFIG, ("slope", "solver.rigid", "contact.units", "outputs"))
-    assert part == {
-        "slope_rad": 0.0174,
-        "solver": {"rigid": {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}},
-        "contact": {"units": "adams"},
-        "outputs": ["states", "energies", "forces"],
-    }
+class Tolerance(Protocol):
+    @property
+    def rtol(self) -> float: ...
 
 
-def test_two_keys_of_one_block_are_both_in_the_slice() -> None:
-    part = slice_of(CONFIG, ("solver.rigid.rtol", "solver.contact.rtol"))
-    assert part == {"solver": {"rigid": {"rtol": 1e-10}, "contact": {"rtol": 1e-7}}}
+class Tolerances(Protocol):
+    @property
+    def rigid(self) -> Tolerance: ...
+    @property
+    def contact(self) -> Tolerance: ...
 
 
-def test_a_block_that_is_left_out_is_none_in_the_slice() -> None:
-    assert slice_of(Config(), ("contact",)) == slice_of(Config(), ("contact.units",)) == {"contact": None}
+class ToleranceConfig(Protocol):
+    @property
+    def solver(self) -> Tolerances: ...
 
 
-def test_a_slice_does_not_depend_on_the_order_of_declaration() -> None:
-    one, other = slice_of(CONFIG, ("walker", "slope")), slice_of(CONFIG, ("slope_rad", "walker"))
+class ToleranceThenStart(StartConfig, ToleranceConfig, Protocol):
+    """Keys of bases come in the order opposite to theirs."""
+
+
+class StartThenTolerance(ToleranceConfig, StartConfig, Protocol):
+    """The same keys."""
+
+
+class MisspeltConfig(Protocol):
+    @property
+    def slope_deg(self) -> float: ...
+
+
+def test_a_type_has_the_keys_of_its_bases() -> None:
+    keys = ("walker", "gravity_m_s2", "slope_rad", "equations", "contact", "start")
+    assert tuple(dotted_keys(SceneConfig)) == keys
+    assert tuple(slice_of(CONFIG, SceneConfig)) == keys
+
+
+def test_a_slice_holds_what_a_type_names_of_blocks_and_nothing_else() -> None:
+    assert tuple(dotted_keys(ToleranceConfig)) == ("solver.rigid.rtol", "solver.contact.rtol")
+    assert slice_of(CONFIG, ToleranceConfig) == {"solver": {"rigid": {"rtol": 1e-10}, "contact": {"rtol": 1e-7}}}
+
+
+def test_a_block_that_is_left_out_is_none() -> None:
+    assert slice_of(Config(), ContactConfig)["contact"] is None
+    assert only(Config(), ContactConfig).contact is None
+
+
+def test_a_slice_does_not_depend_on_the_order_of_keys() -> None:
+    one, other = slice_of(CONFIG, ToleranceThenStart), slice_of(CONFIG, StartThenTolerance)
+    assert list(one) != list(other)
     assert canonical_json(one) == canonical_json(other)
 
 
-def test_every_key_can_be_sliced_and_all_of_them_are_the_config() -> None:
-    everything = slice_of(CONFIG, tuple(".".join(path) for path, _ in leaves(Config)))
-    assert everything == CONFIG.model_dump(mode="json")
+def test_without_a_type_it_is_the_config() -> None:
+    assert slice_of(CONFIG, None) == CONFIG.model_dump(mode="json")
+    assert only(CONFIG, None) is CONFIG
 
 
 def test_a_key_that_does_not_exist_is_a_bug() -> None:
-    with pytest.raises(AttributeError, match=r"no key 'solver\.rigit'"):
-        slice_of(CONFIG, ("solver.rigit",))
-    with pytest.raises(AttributeError, match=r"no key 'slope_rad\.x'"):
-        only(CONFIG, ("slope_rad.x",))
+    with pytest.raises(KeyError, match="slope_deg"):
+        slice_of(CONFIG, MisspeltConfig)
+    with pytest.raises(AttributeError, match="slope_deg"):
+        only(CONFIG, MisspeltConfig)
 
 
 def test_canonical_json_is_one_text_for_one_content() -> None:
@@ -55,24 +86,18 @@ def test_canonical_json_is_one_text_for_one_content() -> None:
         canonical_json(math.nan)
 
 
-def test_a_view_shows_declared_keys_as_the_config_has_them() -> None:
-    view = only(CONFIG, ("walker", "solver.rigid", "slope", "contact"))
-    assert view.walker is CONFIG.walker
-    assert view.solver.rigid is CONFIG.solver.rigid
-    assert view.slope_rad == 0.0174
-    assert view.contact is not None
-    assert view.contact.in_si() == Contact().in_si()
+def test_what_is_given_has_its_keys_as_the_config_has_them() -> None:
+    given = only(CONFIG, SceneConfig)
+    assert given.walker is CONFIG.walker
+    assert given.contact is CONFIG.contact
+    assert given.slope_rad == 0.0174
+    assert only(CONFIG, SimulateConfig).solver.rigid is CONFIG.solver.rigid
 
 
-def test_a_view_of_a_left_out_block_is_none() -> None:
-    assert only(Config(), ("contact.units",)).contact is None
-
-
-@pytest.mark.parametrize("key", ["strides", "solver.contact", "contact.stiffness", "contact.in_si"])
-def test_reading_an_undeclared_key_is_a_bug_that_names_it(key: str) -> None:
-    view = only(CONFIG, ("walker", "solver.rigid", "contact.units"))
-    *blocks, name = key.split(".")
+@pytest.mark.parametrize("key", ["strides", "solver.rigid.atol", "solver.model_dump", "model_dump"])
+def test_what_is_given_has_no_other_keys(key: str) -> None:
+    given, (*blocks, name) = only(CONFIG, StartThenTolerance), key.split(".")
     for block in blocks:
-        view = getattr(view, block)
-    with pytest.raises(AttributeError, match=f"'{key}' is not declared .* contact.units, solver.rigid, walker"):
-        getattr(view, name)
+        given = getattr(given, block)
+    with pytest.raises(AttributeError, match=name):
+        getattr(given, name)

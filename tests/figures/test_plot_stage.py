@@ -3,7 +3,7 @@
 import pytest
 from synthetic_walks import both_models, rigid_alone
 
-from walkerlab.config.canonical import only
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.stages import plot
 from walkerlab.stages.graph import PIPELINE
@@ -30,7 +30,7 @@ class Count:
 
 
 def draw(folder, results, left_out=(), progress=None):
-    return plot.run(only(Config(), PIPELINE["plot"].reads), results, progress or Count(), folder, left_out)
+    return plot.run(only(Config(), PIPELINE["plot"].takes), results, progress or Count(), folder, left_out)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import pytest
 from html_page import Page
 from synthetic_results import EVERYTHING, config, stored
 
-from walkerlab.config.canonical import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.report.images import fitting
@@ -20,7 +19,6 @@ from walkerlab.store.index import broken_file, indexed_files
 SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>
 <foreignObject/><path d="M0 0L518 396" onclick="alert(1)" style="fill: url(https://elsewhere.example/x)"/>
 <image href="https://elsewhere.example/y"/></svg>"""
-READS = PIPELINE["report"].reads
 
 
 def plot(folder, svg=SVG, **changed):
@@ -33,7 +31,7 @@ def plot(folder, svg=SVG, **changed):
 
 def run(folder, *sets, inputs=None, left_out=()):
     made = {name: make() for name, make in EVERYTHING.items()} if inputs is None else inputs
-    return report.run(only(config(*sets), READS), made, Silent(), folder, left_out)
+    return report.run(config(*sets), made, Silent(), folder, left_out)
 
 
 def test_the_page_is_written_and_indexed(tmp_path):
@@ -131,12 +129,7 @@ def test_the_same_results_give_the_same_file(tmp_path):
 
 
 def test_the_page_shows_the_whole_config_so_the_stage_reads_all_of_it():
-    assert set(only_top(READS)) == set(Config.model_fields)
-
-
-def only_top(reads):
-    names = {"slope": "slope_rad", "gravity": "gravity_m_s2"}
-    return [names.get(name, name) for name in reads]
+    assert set(PIPELINE["report"].reads) == set(Config.model_fields)
 
 
 def test_a_slope_without_a_gait_has_a_page_that_says_so_first(tmp_path):

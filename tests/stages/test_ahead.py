@@ -39,7 +39,7 @@ def test_what_is_compiled_ahead_is_all_that_the_stage_calls(sets):
 
 
 def test_a_second_process_that_fails_is_waited_for_and_forgotten():
-    stage = Stage("broken", "walkerlab.no_such_module", "Fails.", reads=(), compiles_long=True)
+    stage = Stage("broken", "walkerlab.no_such_module", "Fails.", takes=object, compiles_long=True)
     ahead = Ahead()
     ahead.begin((stage,), load(None, ()).config)
     ahead.wait_for(stage)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages import basin
@@ -39,7 +39,7 @@ class CutOff(Silent):
 
 
 def run(folder, *sets, progress=None, jobs=1, **gait):
-    config = only(load(None, sets or SMALL).config, PIPELINE["basin"].reads)
+    config = only(load(None, sets or SMALL).config, PIPELINE["basin"].takes)
     parts = Parts(folder / "basin.parts", "key")
     inputs = {"fixedpoint": Content({}, GAIT | gait)}
     with pytest.MonkeyPatch.context() as patch:
@@ -151,7 +151,7 @@ def test_walkers_with_more_coordinates_are_refused(tmp_path):
     free = load(Path("kneed"), ["walker.knee.at_heel_strike=free"]).config
     inputs = {"fixedpoint": Content({}, GAIT)}
     with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):
-        basin.run(only(free, PIPELINE["basin"].reads), inputs, Silent(), parts=Parts(tmp_path / "parts", "key"))
+        basin.run(only(free, PIPELINE["basin"].takes), inputs, Silent(), parts=Parts(tmp_path / "parts", "key"))
 
 
 def test_a_window_upside_down_is_refused(tmp_path):

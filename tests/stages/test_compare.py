@@ -7,8 +7,8 @@ import pytest
 import xarray
 from numpy.testing import assert_allclose
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.paper.study import study_the_paper
 from walkerlab.stages import compare, simulate
 from walkerlab.stages.graph import PIPELINE
@@ -18,7 +18,7 @@ from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.runfolder import RunFolder
 
 SLOWER = 1.01
-READS = PIPELINE["compare"].reads
+TAKES = PIPELINE["compare"].takes
 FIXED_KEYS = {
     "paper_numbers",
     "table3",
@@ -96,7 +96,7 @@ def compared(gaits):
         rigid = simulate.run(load(None, ["solver.rigid.rtol=1e-9"]).config, {"fixedpoint": gaits}, Silent())
         walk = contact_walk(rigid, steps, *leave_out, outcome=outcome, samples=samples)
         inputs = {"fixedpoint": fixedpoint, "simulate": rigid, "contact-sim": walk}
-        return compare.run(only(config, READS), inputs, Silent())
+        return compare.run(only(config, TAKES), inputs, Silent())
 
     return result
 

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.stages import contact_sim
@@ -39,7 +39,7 @@ STUMBLE = "start=[-0.2042, 0.1694, 0, 0]"
 
 def run(*sets, inputs=(("fixedpoint", GAIT),)):
     config = load(None, sets).config
-    return contact_sim.run(only(config, PIPELINE["contact-sim"].reads), dict(inputs), Silent())
+    return contact_sim.run(only(config, PIPELINE["contact-sim"].takes), dict(inputs), Silent())
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +215,7 @@ def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
     notes = []
     sets = ("contact.units=si", "contact.stiction_velocity=1e-7", "contact.friction_velocity=1e-6", "strides=1")
     config = load(None, (*sets, f"solver.contact.atol={atol}")).config
-    contact_sim.run(only(config, PIPELINE["contact-sim"].reads), {"fixedpoint": GAIT}, Listener())
+    contact_sim.run(only(config, PIPELINE["contact-sim"].takes), {"fixedpoint": GAIT}, Listener())
     assert any("stiction_velocity" in note and "lower atol" in note for note in notes) is told
 
 

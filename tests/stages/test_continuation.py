@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
@@ -24,7 +24,7 @@ KEYS = ("over", "from", "to", "model", "periods", "points", "second.over", "seco
 
 
 def follow(*sets):
-    return continuation.run(only(config(*sets), PIPELINE["continuation"].reads), {}, Silent())
+    return continuation.run(only(config(*sets), PIPELINE["continuation"].takes), {}, Silent())
 
 
 @pytest.fixture(scope="module")

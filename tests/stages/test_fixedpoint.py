@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.stages import fixedpoint
@@ -29,7 +29,7 @@ FIXED_KEYS = {
 
 def run(**changes):
     config = Config.model_validate(changes)
-    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].reads), {}, Silent())
+    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
 
 
 @pytest.fixture(scope="module")

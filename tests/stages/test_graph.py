@@ -1,6 +1,10 @@
+import importlib
+import inspect
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import get_args
 
 import pytest
 
@@ -8,6 +12,8 @@ from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
+from walkerlab.config.reads import dotted_keys, only
+from walkerlab.config.schema import Config
 from walkerlab.stages.graph import PIPELINE, STAGES, Graph, Stage, results_of
 from walkerlab.stages.plan import config_slice
 from walkerlab.store.key import differences
@@ -30,7 +36,32 @@ def test_inputs_stand_earlier_in_the_table(stage, config):
 @pytest.mark.parametrize("config", builtin_names())
 @pytest.mark.parametrize("stage", STAGES, ids=NAMES)
 def test_what_a_stage_reads_is_in_the_config(stage, config):
-    slice_of(load(Path(config)).config, stage.reads)
+    loaded = load(Path(config)).config
+    slice_of(loaded, stage.takes)
+    slice_of(loaded, stage.takes_under(loaded))
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
+    module = importlib.import_module(stage.module)
+    named = {Config if takes is None else takes for takes in (stage.takes, stage.takes_of_scene or stage.takes)}
+    for function in (module.run, getattr(module, "compile_kernels", module.run)):
+        first = next(iter(inspect.signature(function, eval_str=True).parameters.values())).annotation
+        assert set(get_args(first) or (first,)) == named
+
+
+@pytest.mark.parametrize("config", ["paper", "kneed"])
+@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+def test_a_stage_is_given_what_its_key_is_made_of_and_nothing_else(stage, config):
+    loaded = load(Path(config)).config
+    takes = stage.takes_under(loaded)
+    assert shown(only(loaded, takes)) == (set(Config.model_fields) if takes is None else set(dotted_keys(takes)))
+
+
+def shown(given):
+    names = vars(given)
+    parts = {name: shown(value) for name, value in names.items() if isinstance(value, SimpleNamespace)}
+    return (names.keys() - parts.keys()) | {f"{name}.{key}" for name, keys in parts.items() for key in keys}
 
 
 @pytest.mark.parametrize("stage", ["stability", "stability-maps"])
@@ -67,7 +98,7 @@ def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
 
 def test_two_stages_of_one_name_are_refused():
     with pytest.raises(ValueError, match="one name"):
-        Graph(Stage("a", "m", "", ()), Stage("a", "n", "", ()))
+        Graph(Stage("a", "m", "", object), Stage("a", "n", "", object))
 
 
 def test_results_of_names_them_whatever_the_config():

@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid import recorded_walk
@@ -35,8 +35,8 @@ def run(**changes):
     config = Config.model_validate(changes)
     inputs = {}
     if PIPELINE["simulate"].inputs(config):
-        inputs["fixedpoint"] = fixedpoint.run(only(config, PIPELINE["fixedpoint"].reads), {}, Silent())
-    return simulate.run(only(config, PIPELINE["simulate"].reads), inputs, Silent())
+        inputs["fixedpoint"] = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -152,8 +152,8 @@ def test_another_method_walks_the_same_way(paper):
 
 
 def test_a_long_walk_needs_memory_for_its_steps_only():
-    inputs = {"fixedpoint": fixedpoint.run(only(Config(), PIPELINE["fixedpoint"].reads), {}, Silent())}
-    config = only(Config(strides=2000, outputs=()), PIPELINE["simulate"].reads)
+    inputs = {"fixedpoint": fixedpoint.run(only(Config(), PIPELINE["fixedpoint"].takes), {}, Silent())}
+    config = only(Config(strides=2000, outputs=()), PIPELINE["simulate"].takes)
     tracemalloc.start()
     try:
         result = simulate.run(config, inputs, Silent())

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
 from walkerlab.report.blocks import Findings
 from walkerlab.report.results import Results
@@ -21,8 +21,8 @@ from walkerlab.stages.progress import Silent
 def tuned(config, *sets):
     """The stage's result with a small map."""
     loaded = load(Path(config), sets).config
-    gait = fixedpoint.run(only(loaded, PIPELINE["fixedpoint"].reads), {}, Silent())
-    return tune.run(only(loaded, PIPELINE["tune"].reads), {"fixedpoint": gait}, Silent())
+    gait = fixedpoint.run(only(loaded, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return tune.run(only(loaded, PIPELINE["tune"].takes), {"fixedpoint": gait}, Silent())
 
 
 def small(config, *sets, cells=5):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from walkerlab.config.canonical import only
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages import stability_maps
 from walkerlab.stages.graph import PIPELINE
@@ -40,7 +40,7 @@ class CutOff(Silent):
 
 
 def run(folder, progress=None, jobs=1):
-    config = only(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].reads)
+    config = only(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].takes)
     parts = Parts(folder / "maps.parts", "key")
     return stability_maps.run(config, {}, progress or Silent(), parts=parts, jobs=jobs)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
+from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import STANCE, kinetic_energy
@@ -147,6 +148,6 @@ def test_known_problems_are_answered_once_for_all_scenes():
 def test_only_other_walkers_read_their_scene():
     stage = PIPELINE["stability"]
     assert config_slice(config_of("slope-3deg"), stage) == config_slice(config_of("paper"), stage)
-    assert {"walker", "contact", "solver", "stability.cases"} <= set(stage.reads_under(config_of("kneed")))
+    assert {"walker", "contact", "solver", "stability.cases"} <= set(dotted_keys(stage.takes_under(config_of("kneed"))))
     assert stage.inputs(config_of("slope-3deg")) == ("known-problems",)
     assert stage.inputs(config_of("kneed")) == ("known-problems", "fixedpoint")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from walkerlab.benchmarks.trials import ContactTrial
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.walker import ContactWalker
@@ -15,13 +15,15 @@ from walkerlab.scene.rigid import rigid_walker
 STIFFER, SLOWER = 100.0, 0.01  # the near-rigid contact: stiffness and damping times, creep velocities times
 
 
-def contact_trial(config: Config, state: tuple[float, ...], length_m: float | None, steps: int) -> ContactTrial:
+def contact_trial(config: ContactConfig, state: tuple[float, ...], length_m: float | None, steps: int) -> ContactTrial:
     """Steps with the config's own contact."""
     scene = scene_for(config, state, length_m)
     return trial_of(scene, scene.walker, state, steps, "contact")
 
 
-def near_rigid_trial(config: Config, state: tuple[float, ...], length_m: float | None, steps: int) -> ContactTrial:
+def near_rigid_trial(
+    config: ContactConfig, state: tuple[float, ...], length_m: float | None, steps: int
+) -> ContactTrial:
     """Steps on stiffer ground that creeps less, where integrators have a harder life."""
     scene = scene_for(config, state, length_m)
     walker = scene.walker
@@ -38,7 +40,7 @@ def near_rigid_trial(config: Config, state: tuple[float, ...], length_m: float |
     return trial_of(scene, stiffer, state, steps, "contact-near-rigid")
 
 
-def scene_for(config: Config, state: tuple[float, ...], length_m: float | None) -> ContactScene:
+def scene_for(config: ContactConfig, state: tuple[float, ...], length_m: float | None) -> ContactScene:
     """The config's scene on pads of the rigid step length, or of the start's own if there is no gait."""
     rigid = rigid_walker(config, config.equations)
     length = length_m or abs(swing_foot(rigid, state)[1])

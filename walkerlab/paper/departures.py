@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, Final
 
+from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.config.schema import CompassWalker, Config, Contact
 from walkerlab.paper.measured import Departures
 from walkerlab.paper.printed import X_P, slope_of
@@ -18,7 +19,7 @@ LAWS: Final = ("friction", "terrain", "pad_pitch")
 """Keys of the contact block besides its force laws. A pinned first stance is the paper's too (section 4)."""
 
 
-def departures(config: Config, start_moved: bool) -> Departures:
+def departures(config: ContactConfig, start_moved: bool) -> Departures:
     """What differs from the paper's scene, in words.
 
     start_moved  the walk did not start from the rigid model's fixed point
@@ -32,7 +33,7 @@ def departures(config: Config, start_moved: bool) -> Departures:
     return Departures(of_rigid, (*of_rigid, *of_contact, *moved))
 
 
-def of_the_rigid_model(config: Config) -> Iterator[str]:
+def of_the_rigid_model(config: RigidConfig) -> Iterator[str]:
     """Walker, gravity and slope; the slope is known to the digits of x_p."""
     if not isinstance(config.walker, CompassWalker):
         yield said("walker.type", config.walker.type, CompassWalker().type)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.report.numbers import count, length, number, quantity
 from walkerlab.report.results import Results
@@ -52,7 +53,7 @@ def walker_in_words(walker: Any) -> str:
     return f"{WALKERS[walker.type]} with legs of {length(walker.leg_length_m)}, {feet}, {whole} in all{torso}"
 
 
-def equations(config: Config) -> str:
+def equations(config: RigidConfig) -> str:
     """Which equations of motion, where there is more than one set of them."""
     if config.walker.type != "compass":
         return ""

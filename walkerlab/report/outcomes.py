@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import RigidConfig
 from walkerlab.report.blocks import Finding, Tone
 from walkerlab.report.numbers import count, length, number, quantity, span, whole
 from walkerlab.report.results import Results
@@ -74,7 +74,7 @@ def end_sentence(results: Results, stage: str) -> str:
     return f"The walk ended at {quantity(end, 's', 4)}{where}."
 
 
-def fall(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+def fall(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """Whether the ground threw it."""
     ratio = summary.get("damping_ratio")
     if ratio is None or ratio >= 1.0:
@@ -82,7 +82,7 @@ def fall(_config: Config, summary: Mapping[str, Any]) -> list[str]:
     return [f"The contact is under-damped, with a damping ratio of {number(ratio, 2)}: feet bounce on it."]
 
 
-def lift(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+def lift(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """The force that the ground would have to pull with."""
     least = summary.get("min_normal_force_N")
     if least is None or least >= 0.0:
@@ -90,7 +90,7 @@ def lift(_config: Config, summary: Mapping[str, Any]) -> list[str]:
     return [f"The ground would have to pull with {quantity(-least, 'N', 3)}, which the rigid model assumes away."]
 
 
-def slide(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+def slide(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """How far it slid, and how far it may."""
     pitch = summary.get("pitch_m")
     slips = summary.get("slips_m") or [summary.get("slip_per_step_m", 0.0)]
@@ -99,7 +99,7 @@ def slide(_config: Config, summary: Mapping[str, Any]) -> list[str]:
     return [f"The largest net slip of a completed step was {length(worst)}{allowed}."]
 
 
-def trip(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+def trip(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """How steps and pads differ."""
     pitch, lengths = summary.get("pitch_m"), summary["step_lengths_m"]
     if pitch is None or not lengths:
@@ -109,19 +109,19 @@ def trip(_config: Config, summary: Mapping[str, Any]) -> list[str]:
     return [f"Pads lie {length(pitch)} apart; by then its steps were {length(abs(gap))} {way} them."]
 
 
-def wait(config: Config, _summary: Mapping[str, Any]) -> list[str]:
+def wait(config: RigidConfig, _summary: Mapping[str, Any]) -> list[str]:
     """How long a step may take."""
     longest = 10.0 * math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
     return [f"A step that takes longer than {quantity(longest, 's', 3)} is none."]
 
 
-def spent(_config: Config, summary: Mapping[str, Any]) -> list[str]:
+def spent(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """What it had cost by then."""
     evaluations = summary.get("rhs_evaluations")
     return [] if evaluations is None else [f"By then it had cost {whole(evaluations)} right-hand sides."]
 
 
-def no_evidence(_config: Config, _summary: Mapping[str, Any]) -> list[str]:
+def no_evidence(_config: RigidConfig, _summary: Mapping[str, Any]) -> list[str]:
     """Nothing."""
     return []
 

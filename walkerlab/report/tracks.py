@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import RigidConfig
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
 
@@ -67,13 +67,13 @@ class Track:
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
-def track_of(config: Config, result: Stored) -> Track | None:
+def track_of(config: RigidConfig, result: Stored) -> Track | None:
     """The motion that a stage stored; None if it stored none, or none that tells where the joints are."""
     trajectory = result.groups.get("trajectory")
     return None if trajectory is None else track_in(config, result.summary, trajectory)
 
 
-def track_in(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Track | None:
+def track_in(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Track | None:
     """The motion in a stored trajectory; None if it does not tell where the joints are."""
     if "angle" not in trajectory.variables or trajectory["time"].size < 2:
         return None
@@ -87,7 +87,7 @@ def track_in(config: Config, summary: Mapping[str, Any], trajectory: Group) -> T
     return Track({name: np.asarray(values, dtype=np.float64) for name, values in channels.items()})
 
 
-def joints(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Channels:
+def joints(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Channels:
     """Hip, feet and knees as they were stored, or of a walker on points from its angles; nothing if unknown."""
     if "hip_along_m" in trajectory.variables:
         names = {"foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky"}
@@ -97,7 +97,7 @@ def joints(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Cha
     return {}
 
 
-def from_angles(config: Config, summary: Mapping[str, Any], trajectory: Group) -> Channels:
+def from_angles(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Channels:
     """Hip and feet of legs that stand on points, from their angles and the steps' lengths (eqs. A.1 to A.3)."""
     length = config.walker.leg_length_m
     footholds: Any = np.concatenate(([0.0], np.cumsum(summary["step_lengths_m"])))
@@ -159,6 +159,6 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
     return np.where(touching, way - way[last_begin], 0.0)
 
 
-def sampling_gap(config: Config) -> float:
+def sampling_gap(config: RigidConfig) -> float:
     """Time between samples (s): as many a pendulum time for every size of walker."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

@@ -32,7 +32,8 @@ from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import Config, Contact
+    from walkerlab.config.reads import ContactConfig, RigidConfig
+    from walkerlab.config.schema import Contact
 
 GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
@@ -56,7 +57,7 @@ class ContactScene:
         return Ground(self.terrain, self.frame)
 
 
-def contact_scene(config: Config, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
+def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
     """The scene of a config with a contact block.
 
     rigid_step_length_m  step length of the rigid gait: what pads and steps are measured by
@@ -134,19 +135,19 @@ TERRAINS: dict[str, Callable[[float], Checkerboard | AfterMidSwing | Plane]] = {
 }
 
 
-def with_contact(config: Config) -> Contact:
+def with_contact(config: ContactConfig) -> Contact:
     """The contact block; ValueError if there is none."""
     if config.contact is None:
         raise ValueError("this config has no contact block")
     return config.contact
 
 
-def hinged_walker(config: Config, walker: ContactWalker) -> Pinned:
+def hinged_walker(config: RigidConfig, walker: ContactWalker) -> Pinned:
     """The walker with a revolute joint at its first stance foot."""
     return pinned_walker(assembly_of(config.walker), walker, STANCE_FOOT, 0.0)
 
 
-def contact_gait(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """The contact model's own gait on pads of its own step length, searched for from a rigid start state.
 
     rigid_step_length_m  what the pads are laid for to begin with

@@ -12,14 +12,14 @@ from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import Config
+    from walkerlab.config.reads import ContactConfig
     from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
 
 CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET = 1e-10, 1e-12, 60_000
 """Of one step of the contact model; right-hand sides."""
 
 
-def rigid_walkers(config: Config, parameter: Parameter) -> Callable[[float], Standing | None]:
+def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
     """The rigid walker at a value of the parameter; None where the config refuses the value."""
 
     def walker_at(value: float) -> Standing | None:
@@ -29,13 +29,13 @@ def rigid_walkers(config: Config, parameter: Parameter) -> Callable[[float], Sta
     return walker_at
 
 
-def rigid_map(config: Config, parameter: Parameter, scale: float) -> RigidMap:
+def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
     """The rigid model's step map over the parameter."""
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
 
 
 def walkers_on_ground(
-    config: Config, parameter: Parameter, step_length_m: float
+    config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
     """The contact model at a value of the parameter; None where the config refuses the value."""
     from walkerlab.orbits.contact_map import WalkerOnGround
@@ -51,7 +51,7 @@ def walkers_on_ground(
     return walker_at
 
 
-def contact_map(config: Config, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
+def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
     from walkerlab.hybrid.contact_run import MethodSettings
     from walkerlab.orbits.contact_map import ContactMap

@@ -10,7 +10,14 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import Config, Output
+    from walkerlab.config.reads import (
+        CompassCasesConfig,
+        ContactSimConfig,
+        RigidConfig,
+        SceneCasesConfig,
+        SimulateConfig,
+    )
+    from walkerlab.config.schema import Output
 
 LeftOut = dict[str, str]
 PAPERS = "it is the paper's procedure with its compass"
@@ -19,16 +26,16 @@ CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 
 """How many numbers a sample each output takes, model by model."""
 
 
-def of_rigid_walk(config: Config) -> tuple[LeftOut, ...]:
+def of_rigid_walk(config: SimulateConfig) -> tuple[LeftOut, ...]:
     """What the rigid model's walk does without."""
     return (
         of_stance(config),
         *of_legs(config),
-        *of_outputs(config, "rigid", RIGID_NUMBERS),
+        *of_outputs(config.outputs, "rigid", RIGID_NUMBERS),
     )
 
 
-def of_stance(config: Config) -> LeftOut:
+def of_stance(config: RigidConfig) -> LeftOut:
     """What the rigid model's stance foot does without: a compass stands on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return left_out(
@@ -43,7 +50,7 @@ def of_stance(config: Config) -> LeftOut:
     )
 
 
-def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
+def of_contact_walk(config: ContactSimConfig) -> tuple[LeftOut, ...]:
     """What the contact model's walk does without."""
     contact = config.contact
     found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
@@ -56,12 +63,12 @@ def of_contact_walk(config: Config) -> tuple[LeftOut, ...]:
     if config.walker.foot_radius_m == 0.0:
         saved = "nothing: a zero in their place takes no longer"
         found.append(left_out("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
-    return (*found, *of_legs(config), *of_outputs(config, "contact", CONTACT_NUMBERS))
+    return (*found, *of_legs(config), *of_outputs(config.outputs, "contact", CONTACT_NUMBERS))
 
 
-def of_adjustment(config: Config) -> tuple[LeftOut, ...]:
+def of_adjustment(config: RigidConfig) -> tuple[LeftOut, ...]:
     """What the adjustment of another walker than the paper's compass does without."""
-    if of_the_compass(config):
+    if of_the_compass(config.walker):
         return ()
     return (
         left_out("the first step with a hinged stance foot", PAPERS, "compiling the hinged walker and two walks"),
@@ -69,9 +76,9 @@ def of_adjustment(config: Config) -> tuple[LeftOut, ...]:
     )
 
 
-def of_verification(config: Config) -> tuple[LeftOut, ...]:
+def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[LeftOut, ...]:
     """What the verification of another walker than the paper's compass does without."""
-    if of_the_compass(config):
+    if of_the_compass(config.walker):
         return ()
     return (
         left_out(
@@ -83,27 +90,27 @@ def of_verification(config: Config) -> tuple[LeftOut, ...]:
     )
 
 
-def of_the_compass(config: Config) -> bool:
-    """Whether the walker is the one of Appendix A."""
+def of_the_compass(walker: object) -> bool:
+    """Whether a walker is the one of Appendix A."""
     from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
 
-    return is_plain_compass(config.walker)
+    return is_plain_compass(walker)
 
 
-def of_legs(config: Config) -> Iterator[LeftOut]:
+def of_legs(config: RigidConfig) -> Iterator[LeftOut]:
     """What legs without inertia do without."""
     if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
         saved = "nothing: it is summed into constants before anything runs"
         yield left_out("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
-def of_outputs(config: Config, model: str, numbers: Mapping[Output, int]) -> Iterator[LeftOut]:
+def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[LeftOut]:
     """What is not computed along the walk since nobody asks for it."""
     for output, count in numbers.items():
-        if output not in config.outputs:
+        if output not in wanted:
             what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
             yield left_out(what, why, f"{count} of {sum(numbers.values())} numbers a sample")
-    if not config.outputs:
+    if not wanted:
         yield left_out(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
 
 

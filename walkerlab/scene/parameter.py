@@ -10,11 +10,12 @@ from pydantic import ValidationError
 
 from walkerlab.config.fields import Block, block_of, extra, kind, leaves
 from walkerlab.config.problems import nearest, shown
+from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
-PHYSICAL = ("walker", "gravity_m_s2", SLOPE_RAD, "equations", "contact")
+PHYSICAL = tuple(keys_of(ContactConfig))
 """The keys that a model is made of."""
 
 
@@ -30,14 +31,14 @@ class Parameter:
     unit: str
     path: tuple[str, ...]
 
-    def value_in(self, config: Config) -> float:
+    def value_in(self, config: ContactConfig) -> float:
         """What the config has there."""
         found: Any = config
         for name in self.path:
             found = getattr(found, name)
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
-    def config_at(self, config: Config, value: float) -> Config | None:
+    def config_at(self, config: ContactConfig, value: float) -> Config | None:
         """The config with another value there and all that follows from it; None if the schema refuses it."""
         data = {name: _as_given(getattr(config, name)) for name in PHYSICAL}
         block = data
@@ -58,7 +59,7 @@ def _as_given(value: Any) -> Any:
     return {**given, "type": value.type} if hasattr(value, "type") else given
 
 
-def parameter_of(key: str, config: Config) -> Parameter:
+def parameter_of(key: str, config: ContactConfig) -> Parameter:
     """The parameter of a key; ConfigError if it is no number that a walker is made of."""
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))

@@ -15,7 +15,8 @@ from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import Config, Equations
+    from walkerlab.config.reads import RigidConfig, SimulateConfig
+    from walkerlab.config.schema import Equations
 
 REMEMBERED = 16  # walkers: over a slope the same one is asked for again and again
 ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
@@ -39,7 +40,7 @@ class RigidScene:
         return self.states or self.energies or self.forces
 
 
-def rigid_scene(config: Config) -> RigidScene:
+def rigid_scene(config: SimulateConfig) -> RigidScene:
     """The scene of a config: its equations, its method, and of the outputs those that it asks for."""
     settings = config.solver.rigid
     walker = rigid_walker(config, config.equations)
@@ -55,7 +56,7 @@ def rigid_scene(config: Config) -> RigidScene:
     )
 
 
-def rigid_walker(config: Config, equations: Equations) -> Standing:
+def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
     model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     return as_printed(model) if equations == "as-printed" else model
@@ -70,7 +71,7 @@ def level_walker(walker: Walker, gravity: float) -> Standing:
         raise ConfigError(f"walker: {error}", SHOWN_IN) from None
 
 
-def compass(config: Config, equations: Equations) -> RigidWalker:
+def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
     """The walker of Appendix A that a plain compass of a config is; ValueError for another walker."""
     walker = config.walker
     if not isinstance(walker, CompassWalker) or walker.torso is not None:
@@ -87,17 +88,17 @@ def compass(config: Config, equations: Equations) -> RigidWalker:
     )
 
 
-def compass_or_none(config: Config, equations: Equations) -> RigidWalker | None:
+def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
     """`compass`, or None for another walker."""
     return compass(config, equations) if is_plain_compass(config.walker) else None
 
 
-def coordinates(config: Config) -> tuple[str, ...]:
+def coordinates(config: RigidConfig) -> tuple[str, ...]:
     """Names of the numbers of the rigid model's state."""
     angles = tuple(f"theta_{name}" for name in places_of(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
 
 
-def equation_sets(config: Config) -> tuple[Equations, ...]:
+def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
     """The sets of equations that a config's walker has: Appendix A is a compass's."""
     return ("corrected", "as-printed") if is_plain_compass(config.walker) else ("corrected",)

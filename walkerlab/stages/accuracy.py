@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import RigidTrial, Trial
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.hybrid.recorded_walk import as_state, with_scaled_rates
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
@@ -31,7 +31,7 @@ LESS = (
 OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats the one before
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every method on every scene.
 
     jobs  processes for what takes long: first ends of references, and runs of libraries that do not get on. All other
@@ -69,7 +69,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
 
 
-def hinge_left_out(config: Config) -> list[dict[str, Any]]:
+def hinge_left_out(config: ContactConfig) -> list[dict[str, Any]]:
     """That no hinge holds the first step here, if the config has one."""
     if config.contact is None or config.contact.stance != "pinned":
         return []
@@ -81,7 +81,7 @@ def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
     return {"what": f"accuracy of the scene {trial.name}", "why": str(why)}
 
 
-def scenes(config: Config, inputs: Mapping[str, Content]) -> Iterator[Trial]:
+def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     """The walks to measure by: rigid, with a contact block on its ground, and a compass also near the rigid limit."""
     state = inputs["fixedpoint"].summary["state"] if config.start == "fixed-point" else config.start
     walker = rigid_walker(config, config.equations)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.basin import COORDINATES, Basin
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import BasinConfig, RigidConfig
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
@@ -47,7 +47,9 @@ UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1) -> Content:
+def run(
+    config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+) -> Content:
     """Walk from every cell that is not there yet, then from the parts of those at edges.
 
     parts  cells that an earlier run has left, and where new ones are kept
@@ -79,7 +81,8 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, *, pa
         walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
     group = group_of(config.basin, window, found, walking)
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
-    said = summary(config, window, found, walking.reshape(window.cells), attractors_of(question, rigid), aperiodic)
+    reached = attractors_of(question, rigid)
+    said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
     said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
     return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
 
@@ -110,7 +113,7 @@ def finish(pieces: list[Piece], label: str, progress: Progress, parts: Parts, jo
         progress.advance(piece.walks)
 
 
-def window_of(config: Config, z: list[float]) -> Window:
+def window_of(config: BasinConfig, z: list[float]) -> Window:
     """The grid of a config around the gait's section coordinates z (3)."""
     settings = config.basin
     axes = tuple(COORDINATES.index(name) for name in settings.plane)
@@ -123,7 +126,7 @@ def window_of(config: Config, z: list[float]) -> Window:
     return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
-def question_of(config: Config, inputs: Mapping[str, Content], window: Window, rigid: Standing) -> Question:
+def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: Standing) -> Question:
     """What is walked."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
@@ -139,7 +142,7 @@ def question_of(config: Config, inputs: Mapping[str, Content], window: Window, r
     return question if legs is not None else one_by_one
 
 
-def contact_question(config: Config, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
+def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
     """The contact model at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise ConfigError("basin.model: contact needs a contact block, and the config has none.", "Add one.")
@@ -197,10 +200,9 @@ def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> 
 
 
 def summary(
-    config: Config, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
+    settings: Basin, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
     """What the command prints."""
-    settings = config.basin
     numbers, counts = np.unique(found.outcome, return_counts=True)
     walked = found.outcome == Outcome.WALKED
     for number, row in enumerate(attractors):
@@ -236,7 +238,7 @@ def gaussian(window: Window) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def margin_of(config: Config, window: Window, found: Found, gait: Mapping[str, Any]) -> dict[str, Any]:
+def margin_of(config: RigidConfig, window: Window, found: Found, gait: Mapping[str, Any]) -> dict[str, Any]:
     """Distance from a stable gait to the nearest cell that does not walk: a measure that no window enters.
 
     In rad and sqrt(g/L). Left out if the gait is unstable, or the window holds no such cell.

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config, Equations
+from walkerlab.config.reads import ContactConfig, RigidConfig
+from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
@@ -49,7 +50,7 @@ MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another 
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
     if not is_plain_compass(config.walker):
         return models_compared(config, inputs, progress)
@@ -78,7 +79,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     )
 
 
-def models_compared(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """The walks of both models against each other alone, and of a walker with knees both instants of their release."""
     progress.start("compare", 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
@@ -155,7 +156,7 @@ def step_ends(walk: Content) -> Any:
     return steps["heel_strike_time_s" if "heel_strike_time_s" in steps.variables else "touch_time_s"]
 
 
-def measure(config: Config, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
+def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
     """Everything that the paper's numbers are held against."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
@@ -172,7 +173,7 @@ def measure(config: Config, inputs: Mapping[str, Content], motion: Comparison) -
     )
 
 
-def walk_gait(config: Config, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
+def walk_gait(config: RigidConfig, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
     """The rigid model walked from a stored fixed point."""
     return rigid_model(compass(config, equations), as_state(gait["state"]))
 
@@ -184,7 +185,7 @@ def start_moved(model: RigidModel | None, start: State | None) -> bool:
     return model is None or max(abs(x - y) for x, y in zip(start, model.state, strict=True)) > MOVED
 
 
-def contact_model(config: Config, walk: Content) -> ContactModel:
+def contact_model(config: ContactConfig, walk: Content) -> ContactModel:
     """What is held against the paper's ADAMS model."""
     contact = config.contact
     if contact is None:
@@ -215,7 +216,7 @@ def contact_model(config: Config, walk: Content) -> ContactModel:
     )
 
 
-def walk_from_x_p(config: Config, pitch_m: float) -> ContactWalkResult:
+def walk_from_x_p(config: ContactConfig, pitch_m: float) -> ContactWalkResult:
     """The contact model's walk from x_p with its printed digits, both feet on the config's slope."""
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch_m, pitch_m)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Knees
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, by_channel, walk_contact
@@ -42,7 +42,7 @@ class KneedStart(NamedTuple):
     pitch_m: float
 
 
-def compare_releases(config: Config, start: KneedStart) -> dict[str, Any] | None:
+def compare_releases(config: ContactConfig, start: KneedStart) -> dict[str, Any] | None:
     """Up to 20 steps with each instant of release; None for a walker without knees."""
     scene = contact_scene(config, start.pitch_m, start.pitch_m)
     if not isinstance(scene.walker.knees, Knees):
@@ -56,7 +56,7 @@ def compare_releases(config: Config, start: KneedStart) -> dict[str, Any] | None
     }
 
 
-def rigid_counterpart(config: Config, state: State, free: bool) -> dict[str, Any]:
+def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str, Any]:
     """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
     own = rigid_walker(config, "corrected")
     ruled = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)

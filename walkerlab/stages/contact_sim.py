@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, ContactSimConfig, SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
@@ -49,7 +49,7 @@ TIME, LEG = "time", "leg"
 Floats = NDArray[np.float64]
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Walk `config.strides` strides on compliant ground; raises NoAnswer if the solver gives none."""
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = contact_scene(config, rigid_step, own_pitch(config, rigid_step, rigid_state))
@@ -85,7 +85,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     return content
 
 
-def compile_kernels(config: Config) -> None:
+def compile_kernels(config: ContactSimConfig) -> None:
     """Have everything compiled that `run` calls, by walks that may evaluate next to nothing: hinged and free."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
     y = start_state(scene, standing(scene))
@@ -114,7 +114,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
         )
 
 
-def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, tuple[float, ...]]:
+def rigid_start(config: SceneConfig, inputs: Mapping[str, Content]) -> tuple[float, tuple[float, ...]]:
     """Step length (m) that pads and steps are measured by, and the rigid start state."""
     given = config.start if config.start != "fixed-point" else None
     if "fixedpoint" in inputs:
@@ -127,7 +127,7 @@ def rigid_start(config: Config, inputs: Mapping[str, Content]) -> tuple[float, t
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
 
 
-def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
+def own_pitch(config: ContactConfig, rigid_step: float, rigid_state: tuple[float, ...]) -> float | None:
     """Step length (m) of the contact gait, if the pads are laid for it; raises NoAnswer if there is no such gait."""
     contact = config.contact
     if contact is None or not wants_own_pitch(contact):
@@ -138,7 +138,7 @@ def own_pitch(config: Config, rigid_step: float, rigid_state: tuple[float, ...])
     return answer.gait.step.length_m
 
 
-def summary(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
+def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
     """What the command prints."""
     slips = result.slip_m
     return {
@@ -171,7 +171,7 @@ def knee_times(result: ContactWalkResult) -> dict[str, Any]:
     return {"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}
 
 
-def groups(config: Config, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
+def groups(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored = {"steps": steps_group(result)}
     if isinstance(scene.terrain, Checkerboard):
@@ -212,7 +212,7 @@ def pads_group(terrain: Checkerboard, result: ContactWalkResult) -> Group:
     )
 
 
-def trajectory_group(config: Config, scene: ContactScene, samples: ContactSamples) -> Group:
+def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: ContactSamples) -> Group:
     """Samples of the walk: what `outputs` asks for."""
     per_time, per_leg = (TIME,), (TIME, LEG)
     variables = {

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from walkerlab.config.continuation import Continuation
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
@@ -77,7 +77,7 @@ CONTACT_SAMPLES = Samples(24, 40, 16, 4, 100)
 class Question:
     """What is followed: a parameter of a config over a span."""
 
-    config: Config
+    config: ContinuationConfig
     parameter: Parameter
     span: Span
     periods: int
@@ -105,14 +105,14 @@ class Followed:
     model: str
     step_map: StepMap | None
     branches: tuple[Branch, ...]
-    map_of: Callable[[Config], StepMap] | None = None
+    map_of: Callable[[ContactConfig], StepMap] | None = None
     attractors: Attractors = NO_ATTRACTORS
     exponents: tuple[Lyapunov, ...] = ()
     curves: tuple[BifurcationCurve, ...] = ()
     regions: Regions | None = None
 
 
-def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Follow the families that the config asks for.
 
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
@@ -168,7 +168,7 @@ def wanted_models(block: Continuation) -> tuple[str, ...]:
     return (RIGID, CONTACT) if block.model == "both" else (block.model,)
 
 
-def models_of(block: Continuation, config: Config, asked: Question) -> tuple[str, ...]:
+def models_of(block: Continuation, config: ContinuationConfig, asked: Question) -> tuple[str, ...]:
     """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
     if block.model != RIGID and config.contact is None:
         raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")

@@ -21,7 +21,7 @@ from walkerlab.stages.simulate import trajectory_group
 from walkerlab.store.content import Group
 
 if TYPE_CHECKING:
-    from walkerlab.config.schema import Config
+    from walkerlab.config.reads import ContactConfig
 
 MOST_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
 STRIDE = 2  # steps, after which each leg is where it was
@@ -29,7 +29,7 @@ RTOL, ATOL = 1e-9, 1e-11
 EVERY = 3  # which samples are kept beside those at heel strikes
 
 
-def motions(branches: Sequence[Branch], config: Config, parameter: Parameter) -> dict[str, Group]:
+def motions(branches: Sequence[Branch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
     """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
     return {
         f"branch_{number}/motion_{place}": group
@@ -45,7 +45,7 @@ def spread(count: int) -> list[int]:
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, MOST_OF_BRANCH))})
 
 
-def motion(point: GaitPoint, period: int, config: Config, parameter: Parameter) -> Iterator[Group]:
+def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
     """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:

@@ -38,7 +38,7 @@ from walkerlab.benchmarks.engines.experiments import (
 from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
 from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -65,7 +65,7 @@ class Findings:
         self.left_out += other.left_out
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
     engines = installed()
     found = Findings(left_out=[*not_installed(), *hinge_left_out(config)])
@@ -114,7 +114,7 @@ def not_installed() -> list[dict[str, str]]:
     ]
 
 
-def hinge_left_out(config: Config) -> list[dict[str, str]]:
+def hinge_left_out(config: ContactConfig) -> list[dict[str, str]]:
     """That no hinge holds the first step here, if the config has one."""
     if config.contact is None or config.contact.stance != "pinned":
         return []

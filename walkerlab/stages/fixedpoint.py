@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.orbits.gait import Gait
@@ -31,7 +31,7 @@ COLUMNS = (
 )
 
 
-def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Find the gaits of both sets of equations; raises NoAnswer if those of the config have none to walk."""
     sets = equation_sets(config)
     progress.start("fixedpoint", len(sets))
@@ -49,7 +49,7 @@ def run(config: Config, _inputs: Mapping[str, Content], progress: Progress) -> C
     return content
 
 
-def advice(config: Config) -> str:
+def advice(config: RigidConfig) -> str:
     """What to do about a slope without a gait."""
     walk_anyway = (
         f"to walk there all the same, give a start state (start: [{', '.join(coordinates(config))}]), and the "
@@ -60,7 +60,7 @@ def advice(config: Config) -> str:
     return f"Try a gentler slope, or a walker with more of its mass at the hip; {walk_anyway}."
 
 
-def summary(config: Config, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
+def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
     """What the command prints: the chosen gait of the config's equations, and both sets side by side."""
     sets = {name: set_summary(name, config.slope_rad, search) for name, search in searches.items()}
     return {**sets[config.equations], "state_names": list(coordinates(config)), "equation_sets": sets}
@@ -101,7 +101,7 @@ def gait_summary(gait: Gait) -> dict[str, Any]:
     }
 
 
-def gaits_group(search: GaitSearch, config: Config) -> Group:
+def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     """Every gait found, one row each."""
     gaits = search.gaits
     states = np.array([gait.state for gait in gaits])

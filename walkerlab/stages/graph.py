@@ -6,6 +6,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from walkerlab.config.reads import (
+    BasinConfig,
+    CompassCasesConfig,
+    ContactConfig,
+    ContactSimConfig,
+    ContinuationConfig,
+    FixedPointConfig,
+    MapsConfig,
+    NamedConfig,
+    RigidConfig,
+    SceneCasesConfig,
+    SceneConfig,
+    SimulateConfig,
+    StartConfig,
+    TuneConfig,
+    WalksConfig,
+    dotted_keys,
+)
 from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_compass, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
@@ -16,7 +34,7 @@ Inputs = Callable[["Config"], tuple[str, ...]]
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
-def nothing(_config: Config) -> tuple[Any, ...]:
+def nothing(_config: object) -> tuple[Any, ...]:
     """No results of other stages, or nothing that is left out."""
     return ()
 
@@ -26,20 +44,20 @@ def results_of(*names: str) -> Inputs:
     return lambda _config: names
 
 
-def gait_unless_start_is_given(config: Config) -> tuple[str, ...]:
+def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
     """The fixed point, unless the config has a start state: so a slope without a gait can be walked too."""
     return ("fixedpoint",) if config.start == "fixed-point" else ()
 
 
-def gait_for_start_or_pads(config: Config) -> tuple[str, ...]:
+def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
     """The fixed point, if the start state or the pads' pitch is taken from it."""
     pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
-def known_and_start(config: Config) -> tuple[str, ...]:
+def known_and_start(config: SceneConfig) -> tuple[str, ...]:
     """The known problems, and for other walkers than the paper's compass, judged in their own scene, its start."""
-    return ("known-problems", *(() if of_the_compass(config) else gait_for_start_or_pads(config)))
+    return ("known-problems", *(() if of_the_compass(config.walker) else gait_for_start_or_pads(config)))
 
 
 def engines_installed() -> Mapping[str, str]:
@@ -56,13 +74,13 @@ class Stage:
     name           as on the command line, and of its artifact
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
-    reads          keys of the config that its result depends on; it is shown no others
+    takes          type of the config that its `run` takes, and so what its result depends on; None for all of it
+    takes_of_scene the same for another walker than the paper's compass, where it is another type
+    takes_of_paper what its own cases stand on of the built-in paper config
     programs       the versions of other programs that its result depends on, by name
-    reads_of_paper keys of the built-in paper config on which its own cases stand
     inputs         the stages whose results it needs under a config, earlier in the table
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
-    reads_of_scene keys that it reads besides for another walker than the paper's compass
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
     has_cells      whether it has independent cells for `--jobs`
@@ -79,7 +97,7 @@ class Stage:
     name: str
     module: str
     purpose: str
-    reads: tuple[str, ...]
+    takes: type | None
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
     needs_contact: bool = False
@@ -94,15 +112,22 @@ class Stage:
     early_with: tuple[str, ...] = ()
     follows: bool = False
     does_without: Lacks = nothing
-    reads_of_paper: tuple[str, ...] = ()
-    reads_of_scene: tuple[str, ...] = ()
+    takes_of_scene: type | None = None
+    takes_of_paper: type | None = None
     programs: Callable[[], Mapping[str, str]] | None = None
 
-    def reads_under(self, config: Config) -> tuple[str, ...]:
-        """The keys that its result depends on under a config."""
-        if not self.reads_of_scene or of_the_compass(config):
-            return self.reads
-        return (*(key for key in self.reads if key.split(".")[0] not in self.reads_of_scene), *self.reads_of_scene)
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The keys of the config that its result depends on, dotted."""
+        if self.takes is not None:
+            return tuple(dotted_keys(self.takes))
+        from walkerlab.config.schema import Config  # not for the help of the command line
+
+        return tuple(Config.model_fields)
+
+    def takes_under(self, config: RigidConfig) -> type | None:
+        """What its result depends on under a config."""
+        return self.takes if self.takes_of_scene is None or of_the_compass(config.walker) else self.takes_of_scene
 
     @property
     def optional(self) -> bool:
@@ -137,34 +162,18 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.campaign_of == target)
 
 
-MODEL = ("walker", "gravity", "slope", "equations", "start", "strides", "outputs")
-PAPERS_WALK = (*MODEL, "contact", "solver", "seed")
-EVERYTHING = (
-    "name",
-    "source",
-    *MODEL,
-    "contact",
-    "solver",
-    "tune",
-    "stability",
-    "continuation",
-    "basin",
-    "sweep",
-    "seed",
-)
-
 PIPELINE = Graph(
     Stage(
         "fixedpoint",
         "walkerlab.stages.fixedpoint",
         "Find the periodic gait of the rigid model and its multipliers.",
-        reads=("walker", "gravity", "slope", "equations", "seed"),
+        takes=FixedPointConfig,
     ),
     Stage(
         "simulate",
         "walkerlab.stages.simulate",
         "Walk the rigid model.",
-        reads=(*MODEL, "solver.rigid"),
+        takes=SimulateConfig,
         inputs=gait_unless_start_is_given,
         walks=True,
         does_without=of_rigid_walk,
@@ -173,7 +182,7 @@ PIPELINE = Graph(
         "contact-sim",
         "walkerlab.stages.contact_sim",
         "Walk the contact model, its contact forces as in ADAMS.",
-        reads=(*MODEL, "contact", "solver.contact"),
+        takes=ContactSimConfig,
         inputs=gait_for_start_or_pads,
         needs_contact=True,
         walks=True,
@@ -184,7 +193,7 @@ PIPELINE = Graph(
         "tune",
         "walkerlab.stages.tune",
         "Adjust the initial velocities until the contact model walks: whether, how much, and why.",
-        reads=("walker", "gravity", "slope", "equations", "start", "strides", "contact", "solver.contact", "tune"),
+        takes=TuneConfig,
         inputs=results_of("fixedpoint"),
         needs_contact=True,
         has_cells=True,
@@ -194,7 +203,7 @@ PIPELINE = Graph(
         "compare",
         "walkerlab.stages.compare",
         "Compare both models with each other and with every number of the paper.",
-        reads=("walker", "gravity", "slope", "equations", "contact"),
+        takes=ContactConfig,
         inputs=results_of("fixedpoint", "simulate", "contact-sim"),
         needs_contact=True,
     ),
@@ -202,7 +211,7 @@ PIPELINE = Graph(
         "accuracy",
         "walkerlab.stages.accuracy",
         "Measure error against run time, method by method.",
-        reads=("walker", "gravity", "slope", "equations", "start", "contact"),
+        takes=SceneConfig,
         inputs=gait_for_start_or_pads,
         has_cells=True,
         alone=True,
@@ -211,7 +220,7 @@ PIPELINE = Graph(
         "engines",
         "walkerlab.stages.engines",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our law in their integrators, and their own contact.",
-        reads=("walker", "gravity", "slope", "equations", "start", "contact"),
+        takes=SceneConfig,
         inputs=gait_for_start_or_pads,
         needs_contact=True,
         has_cells=True,
@@ -222,15 +231,15 @@ PIPELINE = Graph(
         "known-problems",
         "walkerlab.stages.known_problems",
         "Answer problems with known answers through the contact code, once for every scene.",
-        reads=(),
+        takes=object,
     ),
     Stage(
         "stability",
         "walkerlab.stages.stability",
         "Judge extreme cases and problems with known answers.",
-        reads=("walker.type", "walker.torso", "stability.cases"),
-        reads_of_paper=PAPERS_WALK,
-        reads_of_scene=PAPERS_WALK,
+        takes=CompassCasesConfig,
+        takes_of_scene=SceneCasesConfig,
+        takes_of_paper=WalksConfig,
         inputs=known_and_start,
         has_cells=True,
         does_without=of_verification,
@@ -239,8 +248,8 @@ PIPELINE = Graph(
         "stability-maps",
         "walkerlab.stages.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; goes on where it was interrupted.",
-        reads=("stability.map_cells",),
-        reads_of_paper=PAPERS_WALK,
+        takes=MapsConfig,
+        takes_of_paper=WalksConfig,
         has_cells=True,
         campaign_of="stability",
         keeps_parts=True,
@@ -249,7 +258,7 @@ PIPELINE = Graph(
         "continuation",
         "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
-        reads=("walker", "gravity", "slope", "equations", "contact", "seed", "continuation"),
+        takes=ContinuationConfig,
         on_demand=True,
         follows=True,
     ),
@@ -257,7 +266,7 @@ PIPELINE = Graph(
         "basin",
         "walkerlab.stages.basin",
         "Map which starts come to which attractor, and which fall; goes on where it was interrupted.",
-        reads=("walker", "gravity", "slope", "equations", "start", "contact", "solver.contact", "basin", "seed"),
+        takes=BasinConfig,
         inputs=results_of("fixedpoint"),
         has_cells=True,
         on_demand=True,
@@ -267,7 +276,7 @@ PIPELINE = Graph(
         "plot",
         "walkerlab.stages.plot",
         "Draw the paper's figures from the stored results.",
-        reads=("name",),
+        takes=NamedConfig,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
         draws=True,
@@ -276,7 +285,7 @@ PIPELINE = Graph(
         "report",
         "walkerlab.stages.report",
         "Write the report, one HTML file.",
-        reads=EVERYTHING,
+        takes=None,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
         if_current=("engines", "stability-maps", "continuation", "basin"),
         draws=True,

@@ -7,7 +7,8 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
-from walkerlab.config.canonical import only, slice_of
+from walkerlab.config.canonical import slice_of
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
@@ -70,7 +71,7 @@ class Keys:
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}
-            part = slice_of(config, stage.reads_under(config))
+            part = slice_of(config, stage.takes_under(config))
             keys[stage.name] = Identity(stage.name, part, given, self.code_digest(stage)).key
         return keys
 
@@ -128,7 +129,7 @@ class InMemory:
         if stage.keeps_parts:
             extra["parts"] = PartsInMemory()
         try:
-            return Answer(run(only(config, stage.reads_under(config)), inputs, progress, **extra))
+            return Answer(run(only(config, stage.takes_under(config)), inputs, progress, **extra))
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             return Answer(partial, error)

@@ -215,13 +215,13 @@ class Planner:
 
 
 def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
-    """What a stage reads of its config and, as `paper`, of the built-in one that its own cases stand on.
+    """What a stage takes of its config and, as `paper`, of the built-in one that its own cases stand on.
 
     And, as `programs`, the versions of other programs that it drives.
     """
-    own = slice_of(config, stage.reads_under(config))
-    if stage.reads_of_paper:
-        own["paper"] = slice_of(paper_config(), stage.reads_of_paper)
+    own = slice_of(config, stage.takes_under(config))
+    if stage.takes_of_paper is not None:
+        own["paper"] = slice_of(paper_config(), stage.takes_of_paper)
     if stage.programs is not None:
         own["programs"] = dict(stage.programs())
     return own

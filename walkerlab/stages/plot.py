@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import NamedConfig
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
 from walkerlab.stages.graph import PIPELINE
@@ -20,7 +20,7 @@ FOLDER = "figures"
 
 
 def run(
-    _config: Config,
+    _config: NamedConfig,
     inputs: Mapping[str, Stored],
     progress: Progress,
     folder: Path,

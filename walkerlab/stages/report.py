@@ -38,7 +38,7 @@ def run(
     """
     progress.start("report", 1)
     pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
-    written, results = write_pages(whole(config), inputs, folder, left_out, pending)
+    written, results = write_pages(config, inputs, folder, left_out, pending)
     progress.advance()
     tables = [block for page in written for block in blocks_of(page.sections) if isinstance(block, Table)]
     return Content(
@@ -77,11 +77,6 @@ def write_pages(
         with storing(folder / file):
             (folder / file).unlink(missing_ok=True)
     return pages, results
-
-
-def whole(config: Config) -> Config:
-    """The config itself, all keys of which this stage declares, instead of the view on it."""
-    return Config.model_construct(**{name: getattr(config, name) for name in Config.model_fields})
 
 
 def absent(config: Config, left_out: Sequence[LeftOut]) -> tuple[Absent, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import SimulateConfig, StartConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state, take_walk
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
@@ -22,7 +22,7 @@ from walkerlab.store.content import Content, Group, Variable
 STEP, TIME, LEG = "step", "time", "leg"
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Walk `config.strides` strides; raises NoAnswer if the integrator gives none."""
     scene = rigid_scene(config)
     steps = 2 * config.strides
@@ -36,13 +36,13 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress) -> Co
     return content
 
 
-def start_state(config: Config, inputs: Mapping[str, Content]) -> State:
+def start_state(config: StartConfig, inputs: Mapping[str, Content]) -> State:
     """The config's start, or the fixed point."""
     given = inputs["fixedpoint"].summary["state"] if config.start == "fixed-point" else config.start
     return as_state(given)
 
 
-def summary(config: Config, walk: RecordedWalk) -> dict[str, Any]:
+def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
     """What the command prints."""
     return {
         "outcome": walk.outcome.label,

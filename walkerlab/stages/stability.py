@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
+from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.scene.contact import pads_pitch
@@ -20,11 +21,10 @@ from walkerlab.verification.ordinary import CAP, FINE, Choice
 from walkerlab.verification.scene_catalogue import scene_cases
 from walkerlab.verification.verdict import CaseResult
 
-OF_THE_SCENE = ("walker", "gravity_m_s2", "slope_rad", "equations", "contact", "solver", "seed")
-"""Keys that a scene's own cases keep where they change nothing else."""
 
-
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+def run(
+    config: CompassCasesConfig | SceneCasesConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1
+) -> Content:
     """Judge the catalogue and the config's own cases, try ordinary methods, and tell of the known problems.
 
     The paper's compass has a catalogue of named cases; of any other walker it is the scene's own extremes.
@@ -33,12 +33,12 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
 
     Raises ConfigError if a case has the name of another.
     """
-    if is_plain_compass(config.walker):
-        cells = cells_of(judged(config.stability.cases))
-    else:
+    if judged_in_its_scene(config):
         own = scene_cases(spelled_out(config, inputs))
         judged(config.stability.cases, [case for case, _ in own])
         cells = cells_of(config.stability.cases, own)
+    else:
+        cells = cells_of(judged(config.stability.cases))
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
     ordinary: list[Choice] = []
@@ -52,10 +52,15 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
     return Content({"cases": cases_group(cases), "known": known_group(known)}, summary | verdict(cases, known))
 
 
-def spelled_out(config: Config, inputs: Mapping[str, Content]) -> Config:
+def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
+    """Whether the walker is another one than the paper's compass."""
+    return not is_plain_compass(config.walker)
+
+
+def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     """The scene with the start, and the pitch of pads, in numbers, so that its cases share them."""
     step, start = rigid_start(config, inputs)
-    scene = Config().model_copy(update={key: getattr(config, key) for key in OF_THE_SCENE} | {"start": start})
+    scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
         return scene

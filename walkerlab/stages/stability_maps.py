@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import MapsConfig
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
@@ -30,7 +30,9 @@ STIFFNESS_DIM, VELOCITY_DIM, STEP_DIM = "stiffness", "stiction_velocity", "step_
 OF_STICTION = ("outcome", "steps", "sharper_outcome", "error", "rhs_evaluations")
 
 
-def run(config: Config, _inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1) -> Content:
+def run(
+    config: MapsConfig, _inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+) -> Content:
     """Compute what is not there yet of both maps.
 
     parts  cells that an earlier run has left, and where new ones are kept

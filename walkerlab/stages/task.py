@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from walkerlab.config.canonical import only
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.stages.graph import Stage
 from walkerlab.stages.plan import LeftOut
@@ -25,7 +25,7 @@ from walkerlab.store.runfolder import RunFolder
 class Task:
     """A stage with all that it is given.
 
-    reads     the keys of the config that it is shown
+    config    what it takes of the config
     inputs    the results that it gets
     jobs      processes for independent cells, None if it has none
     key       of its result, if it keeps parts of it; parts of another key are not used
@@ -34,8 +34,7 @@ class Task:
 
     name: str
     module: str
-    config: Config
-    reads: tuple[str, ...]
+    config: Any
     inputs: Mapping[str, Stored]
     folder: RunFolder
     jobs: int | None = None
@@ -49,13 +48,12 @@ class Task:
         extra: dict[str, Any] = {} if self.jobs is None else {"jobs": self.jobs}
         if self.key is not None:
             extra["parts"] = Parts(self.folder.parts(self.name), self.key)
-        config = only(self.config, self.reads)
         if self.left_out is not None:
             extra |= {"folder": self.folder.path, "left_out": self.left_out}
             with drawing_into(self.folder.path):
-                content = run(config, self.inputs, progress, **extra)
+                content = run(self.config, self.inputs, progress, **extra)
         else:
-            content = run(config, self.inputs, progress, **extra)
+            content = run(self.config, self.inputs, progress, **extra)
         if not isinstance(content, Content):
             raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
         return content
@@ -90,8 +88,7 @@ def task_of(
     return Task(
         stage.name,
         stage.module,
-        config,
-        stage.reads_under(config),
+        only(config, stage.takes_under(config)),
         inputs,
         folder,
         jobs if stage.has_cells else None,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, TuneConfig
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
@@ -86,7 +86,7 @@ class Findings:
     gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
 
-def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Adjust the start; that none walks is an answer. Raises NoAnswer if the pads are to fit a gait there is not."""
     rigid_step, rigid_state = rigid_start(config, inputs)
     near = tuple(float(x) for x in inputs["fixedpoint"].summary["state"])  # the start itself may be far from any gait
@@ -101,7 +101,7 @@ def run(config: Config, inputs: Mapping[str, Content], progress: Progress, jobs:
     return Content(stored, said)
 
 
-def free_scene(config: Config, rigid_step: float, gait: GaitAnswer) -> ContactScene:
+def free_scene(config: ContactConfig, rigid_step: float, gait: GaitAnswer) -> ContactScene:
     """The config's scene without a hinge; raises NoAnswer if its pads are to fit a gait that there is not."""
     contact = config.contact
     wants_own = contact is not None and contact.pad_pitch == "own" and contact.terrain == "checkerboard"
@@ -112,7 +112,7 @@ def free_scene(config: Config, rigid_step: float, gait: GaitAnswer) -> ContactSc
 
 
 def rigid_limit(
-    config: Config, found: Findings, inputs: Mapping[str, Content], progress: Progress
+    config: TuneConfig, found: Findings, inputs: Mapping[str, Content], progress: Progress
 ) -> LimitFindings | None:
     """What the rigid limit takes; None if it is not asked for or there is no gait to follow."""
     if found.gait.gait is None or not config.tune.rigid_limit:
@@ -124,7 +124,7 @@ def rigid_limit(
 class Stage:
     """What the parts of the stage share."""
 
-    def __init__(self, config: Config, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
+    def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
         """Nothing is walked yet."""
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.steps = 2 * config.strides

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
@@ -81,7 +81,7 @@ class LimitFindings:
 
 
 def limit_findings(
-    config: Config,
+    config: RigidConfig,
     scene: ContactScene,
     gait: ContactGait,
     rigid_gait: Mapping[str, Any],
@@ -122,7 +122,7 @@ def limit_findings(
     return LimitFindings(walked, limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
 
 
-def point_footed(config: Config, walker: ContactWalker) -> ContactWalker:
+def point_footed(config: RigidConfig, walker: ContactWalker) -> ContactWalker:
     """The same walker on the same ground, with points for feet as the rigid model has them."""
     parts = assembly_of(config.walker, rigid=True)
     return contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad)

@@ -7,6 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.ground.compliant import STANCE_FOOT
@@ -26,7 +27,7 @@ SAMPLES_PER_PENDULUM_TIME = 40
 NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
 
 
-def walked(ready: Prepared, config: Config, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
+def walked(ready: Prepared, config: WalksConfig, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
     """Walk a case with the tolerances of its config times `sharper`."""
     settings, scene = config.solver.contact, ready.scene
     methods = MethodSettings(
@@ -46,7 +47,7 @@ def walked_with(
     )
 
 
-def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[ContactWalkResult]:
+def walked_otherwise(ready: Prepared, config: WalksConfig, case: Case) -> Second[ContactWalkResult]:
     """Walk a case by another method than its config's, at the same tolerance."""
     settings = config.solver.contact
 
@@ -92,7 +93,7 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
     )
 
 
-def momentum_of(result: ContactWalkResult, ready: Prepared, config: Config, case: Case) -> Finding | NotMeasured:
+def momentum_of(result: ContactWalkResult, ready: Prepared, config: WalksConfig, case: Case) -> Finding | NotMeasured:
     """The momentum's balance of a walk that has an outcome and a length."""
     if not result.outcome.answered or result.end_time_s <= 0.0:
         return NotMeasured(MEASURE, f"the walk ended as {result.outcome.label}")
@@ -153,7 +154,7 @@ def time_difference(
     other: ContactWalkResult,
     other_unit: float,
     case: Case,
-    config: Config,
+    config: WalksConfig,
 ) -> Finding:
     """How far two runs' touches are apart, each in its own pendulum time; their ends if there are none."""
     touches, others = one.touch_time_s / unit, other.touch_time_s / other_unit

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import find_gaits
@@ -34,7 +34,7 @@ class Prepared:
     energy: float  # J, m g L and the energy of the start: what residuals are measured by
 
 
-def prepared(config: Config, case: Case) -> Prepared | None:
+def prepared(config: WalksConfig, case: Case) -> Prepared | None:
     """The scene and start of a case; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
@@ -60,7 +60,7 @@ def prepared(config: Config, case: Case) -> Prepared | None:
     return Prepared(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)
 
 
-def own_pitch(config: Config, rigid_step_m: float, rigid_state: State) -> float | None:
+def own_pitch(config: ContactConfig, rigid_step_m: float, rigid_state: State) -> float | None:
     """What pads of the contact gait's own pitch are laid for (m), if the case wants them; None if there is no gait."""
     contact = config.contact
     if contact is None or not wants_own_pitch(contact):

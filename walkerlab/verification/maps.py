@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
@@ -83,7 +84,7 @@ class StictionCell:
         ]
 
 
-def apart(one: ContactWalkResult, other: ContactWalkResult, config: Config) -> float:
+def apart(one: ContactWalkResult, other: ContactWalkResult, config: RigidConfig) -> float:
     """How far two walks' touches and ends are apart, in legs, radians and pendulum times; 0 if not to be compared."""
     if one.outcome is not other.outcome or one.touch_time_s.size != other.touch_time_s.size:
         return 0.0

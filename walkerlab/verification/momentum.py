@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
@@ -64,7 +64,7 @@ class Balance:
     steps: int
 
 
-def momentum_finding(ready: Prepared, config: Config, case: Case) -> Finding | NotMeasured:
+def momentum_finding(ready: Prepared, config: WalksConfig, case: Case) -> Finding | NotMeasured:
     """Momentum against impulse, or why it cannot be judged.
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
@@ -88,7 +88,7 @@ def why_unknown(found: Balance) -> str:
     return " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
 
 
-def momentum_balance(ready: Prepared, config: Config, case: Case) -> Balance:
+def momentum_balance(ready: Prepared, config: WalksConfig, case: Case) -> Balance:
     """Momentum against impulse over the first steps of a case."""
     short = case.model_copy(update={"steps": min(case.steps, STEPS)})
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
@@ -130,7 +130,7 @@ def samples_of(walk: ContactWalkResult) -> ContactSamples:
     return walk.samples
 
 
-def looked_at(ready: Prepared, config: Config, case: Case, times: Array) -> ContactWalkResult:
+def looked_at(ready: Prepared, config: WalksConfig, case: Case, times: Array) -> ContactWalkResult:
     """Walk a case and keep its states at these times (s); sampling does not change the walk."""
     settings, scene = config.solver.contact, ready.scene
     methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, case.budget)
@@ -166,7 +166,7 @@ def unsettled(times: Array, rate: Array) -> Array:
     return np.asarray(np.abs(change).max(axis=1))
 
 
-def impulse_rate(samples: ContactSamples, ready: Prepared, config: Config) -> Array:
+def impulse_rate(samples: ContactSamples, ready: Prepared, config: RigidConfig) -> Array:
     """Force along and up from the slope (N), and torque about a point of the slope (N m), of ground and gravity."""
     walker = ready.scene.walker
     feet = np.zeros((samples.time_s.size, 2, 5))
@@ -185,7 +185,7 @@ def impulse_rate(samples: ContactSamples, ready: Prepared, config: Config) -> Ar
     )
 
 
-def momentum(samples: ContactSamples, config: Config) -> Array:
+def momentum(samples: ContactSamples, config: RigidConfig) -> Array:
     """Momentum along and up from the slope (kg m/s) and about a point of the slope (kg m^2/s), at intervals' ends."""
     parts = assembly_of(config.walker)
     n = len(parts.bodies)

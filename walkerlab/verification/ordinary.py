@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
@@ -65,7 +65,7 @@ class CapReachedError(Exception):
     """The evaluations are used up."""
 
 
-def choices(case: Case, config: Config) -> tuple[Choice, ...]:
+def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Every ordinary method on a case; none if it has no start or moves nowhere, or is another walker than a compass.
 
     A script without events describes no knee that locks, and Appendix A no other walker than the compass.
@@ -76,7 +76,7 @@ def choices(case: Case, config: Config) -> tuple[Choice, ...]:
     return rigid_choices(short, config) if case.model == "rigid" else contact_choices(short, config)
 
 
-def contact_choices(case: Case, config: Config) -> tuple[Choice, ...]:
+def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
     ready = prepared(config, case)
     if ready is None or ready.scene.pinned is not None or isinstance(ready.scene.terrain, AfterMidSwing):
@@ -92,7 +92,7 @@ def contact_choices(case: Case, config: Config) -> tuple[Choice, ...]:
     return tuple(found)
 
 
-def rigid_choices(case: Case, config: Config) -> tuple[Choice, ...]:
+def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """SciPy's methods in a script that walks a case of the rigid model, after as many steps as it takes."""
     ready = rigid_prepared(config)
     if ready is None or ready.compass is None:
@@ -120,7 +120,7 @@ def script(case: str, method: str, compass: RigidWalker, walk: RecordedWalk, uni
     return judged(case, f"SciPy {method}", y, np.array(walk.final_state), units, count, wall_s)
 
 
-def natural_units(config: Config) -> NDArray[np.float64]:
+def natural_units(config: RigidConfig) -> NDArray[np.float64]:
     """What each number of the state is measured in: legs, radians, and these in pendulum times."""
     lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
     return np.concatenate([lengths, lengths / pendulum_time(config)])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
@@ -37,7 +38,7 @@ class Prepared:
     energy: float  # J, m g L and the kinetic energy of the start
 
 
-def prepared(config: Config) -> Prepared | None:
+def prepared(config: WalksConfig) -> Prepared | None:
     """Walker and start of a config; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
@@ -54,7 +55,7 @@ def prepared(config: Config) -> Prepared | None:
     return Prepared(walker, masses, compass_or_none(config, config.equations), start, energy)
 
 
-def walked(ready: Prepared, config: Config, case: Case, sharper: float) -> RecordedWalk:
+def walked(ready: Prepared, config: WalksConfig, case: Case, sharper: float) -> RecordedWalk:
     """Walk a case with the tolerances of its config times `sharper`."""
     settings = config.solver.rigid
     return walked_with(method_named(settings.method), settings.rtol * sharper, settings.atol * sharper, ready, case)
@@ -66,7 +67,7 @@ def walked_with(method: Method, rtol: float, atol: float, ready: Prepared, case:
     return take_walk(ready.walker, solver, ready.start, case.steps, budget=case.budget)
 
 
-def walked_otherwise(ready: Prepared, config: Config, case: Case) -> Second[RecordedWalk]:
+def walked_otherwise(ready: Prepared, config: WalksConfig, case: Case) -> Second[RecordedWalk]:
     """Walk a case by another method than its config's, at the same tolerance."""
     settings = config.solver.rigid
 
@@ -149,7 +150,13 @@ def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding
 
 
 def time_difference(
-    what: str, one: RecordedWalk, unit: float, other: RecordedWalk, other_unit: float, case: Case, config: Config
+    what: str,
+    one: RecordedWalk,
+    unit: float,
+    other: RecordedWalk,
+    other_unit: float,
+    case: Case,
+    config: WalksConfig,
 ) -> Finding:
     """How far two walks' heel strikes are apart, each in its own pendulum time."""
     strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 
 B = TypeVar("B", bound=Block)
@@ -39,12 +40,12 @@ class Scale:
         return self.mass * self.gravity
 
 
-def pendulum_time(config: Config) -> float:
+def pendulum_time(config: RigidConfig) -> float:
     """sqrt(L/g) of a config's walker (s)."""
     return math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
 
 
-def to_twin(config: Config) -> Scale:
+def to_twin(config: RigidConfig) -> Scale:
     """The scale that leads from a config's walker to its twin of ordinary size."""
     walker = config.walker
     return Scale(TWIN_LEG / walker.leg_length_m, TWIN_MASS / walker.total_mass_kg, TWIN_GRAVITY / config.gravity_m_s2)

@@ -3,21 +3,27 @@
 from walkerlab.stages.graph import Graph, Stage, results_of
 
 
+def keys(*names):
+    """A type that names these keys of a config."""
+    return type("Keys", (), dict.fromkeys(names, property(lambda _config: None)))
+
+
 def drop_unless_start_is_given(config):
     return ("drop",) if config.start == "fixed-point" else ()
 
 
+ROLLS = keys("gravity_m_s2", "start", "strides")
 GRAPH = Graph(
-    Stage("drop", "toy.drop", "Drop a stone.", reads=("gravity", "slope")),
-    Stage("roll", "toy.roll", "Roll on.", ("gravity", "start", "strides"), drop_unless_start_is_given, walks=True),
-    Stage("bounce", "toy.bounce", "Bounce.", ("contact",), results_of("drop"), needs_contact=True),
-    Stage("survey", "toy.survey", "Time it.", ("seed",), has_cells=True),
-    Stage("census", "toy.census", "Count the stones.", ("seed",), campaign_of="survey", keeps_parts=True),
+    Stage("drop", "toy.drop", "Drop a stone.", keys("gravity_m_s2", "slope_rad")),
+    Stage("roll", "toy.roll", "Roll on.", ROLLS, drop_unless_start_is_given, walks=True),
+    Stage("bounce", "toy.bounce", "Bounce.", keys("contact"), results_of("drop"), needs_contact=True),
+    Stage("survey", "toy.survey", "Time it.", keys("seed"), has_cells=True),
+    Stage("census", "toy.census", "Count the stones.", keys("seed"), campaign_of="survey", keeps_parts=True),
     Stage(
         "picture",
         "toy.picture",
         "Draw it.",
-        ("name",),
+        keys("name"),
         results_of("drop", "roll", "bounce"),
         if_current=("survey",),
         draws=True,
@@ -26,7 +32,7 @@ GRAPH = Graph(
         "page",
         "toy.page",
         "Write it up.",
-        ("name",),
+        keys("name"),
         results_of("drop", "roll", "bounce", "survey", "picture"),
         if_current=("census",),
         draws=True,

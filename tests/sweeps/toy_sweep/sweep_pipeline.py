@@ -2,10 +2,16 @@
 
 from walkerlab.stages.graph import Graph, Stage, results_of
 
+
+def keys(*names):
+    """A type that names these keys of a config."""
+    return type("Keys", (), dict.fromkeys(names, property(lambda _config: None)))
+
+
 GRAPH = Graph(
-    Stage("drop", "toy_sweep.falling_stone", "Drop a stone.", ("gravity", "slope", "walker")),
-    Stage("roll", "toy_sweep.rolling_stone", "Roll on.", ("strides",), results_of("drop")),
-    Stage("deadly", "toy_sweep.deadly", "End the worker.", ("seed",)),
-    Stage("count", "toy_sweep.counting", "Count in parts.", ("seed",), has_cells=True, keeps_parts=True),
-    Stage("picture", "toy_sweep.falling_stone", "Draw it.", ("name",), draws=True),
+    Stage("drop", "toy_sweep.falling_stone", "Drop a stone.", keys("gravity_m_s2", "slope_rad", "walker")),
+    Stage("roll", "toy_sweep.rolling_stone", "Roll on.", keys("strides"), results_of("drop")),
+    Stage("deadly", "toy_sweep.deadly", "End the worker.", keys("seed")),
+    Stage("count", "toy_sweep.counting", "Count in parts.", keys("seed"), has_cells=True, keeps_parts=True),
+    Stage("picture", "toy_sweep.falling_stone", "Draw it.", keys("name"), draws=True),
 )

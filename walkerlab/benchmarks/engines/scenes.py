@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, levers_from, planar_model, skeleton
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import IdealLock
@@ -121,7 +121,7 @@ class EngineScene:
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
-def scene_of(config: Config, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
+def scene_of(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
     """The config's walker on its own ground, free from its start."""
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
     assembly = scene.assembly
@@ -156,7 +156,7 @@ def engine_scene(
     return scene.with_knees_locked(held_at_start(ours, STANCE_FOOT, start)[0])
 
 
-def scenes(config: Config, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
+def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
     """The walks of a config."""
     assembly = assembly_of(config.walker)
     if assembly.couplings:
