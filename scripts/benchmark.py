@@ -143,9 +143,7 @@ def at_most(work: str, value: float, unit: str, bar: float, stretch: float) -> L
 
 def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
     """Ten rigid steps, and how exact they can be."""
-    walker = rigid_walker(ONE_DEGREE, "corrected")
-    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
-    trial = RigidTrial(walker, start, STEPS, compass(ONE_DEGREE, "corrected"))
+    trial = printed_trial()
     reference = reference_for(trial)
     ours = cheapest(trial, reference, "dop853", 1e-9, watch, LADDER)
     for name, peer, bar, stretch in (
@@ -185,6 +183,13 @@ def kneed_lines(watch: Stopwatch) -> Iterator[Line]:
             continue
         line = at_most(f"{work}, kneed against compass", other.seconds / one.seconds, "x", bar, 0.5 * (1.0 + bar))
         yield replace(line, measured=f"{line.measured}: {spoken(other)} against {spoken(one)}, ten steps each")
+
+
+def printed_trial() -> RigidTrial:
+    """Ten steps of the paper's compass at one degree from the start that eq. 11 prints."""
+    walker = rigid_walker(ONE_DEGREE, "corrected")
+    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    return RigidTrial(walker, start, STEPS, compass(ONE_DEGREE, "corrected"))
 
 
 def rigid_trial_of(config: Config) -> RigidTrial:
@@ -242,14 +247,12 @@ def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
 
 def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
     """Walks in lanes on one core, and basins of attraction on two."""
-    walker = rigid_walker(ONE_DEGREE, "corrected")
-    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
-    trial = RigidTrial(walker, start, STEPS)
+    trial = printed_trial()
     reference = reference_for(trial)
     many = 2_000
     strikes, fates = Strikes(np.zeros((many, STEPS)), np.zeros((many, STEPS, 4))), new_fates(many)
-    memory, legs = new_lane_memory(RTOL, ATOL), two_legs(walker)
-    seconds = watch(lambda: walk_lanes(legs, memory, strikes, np.array([start] * many), fates))
+    memory, legs = new_lane_memory(RTOL, ATOL), two_legs(trial.walker)
+    seconds = watch(lambda: walk_lanes(legs, memory, strikes, np.array([trial.start] * many), fates))
     error = float(np.max(np.abs(strikes.after[:, -1] - reference.state)))
     alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
     script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)
@@ -302,12 +305,11 @@ def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
 
 def memory_line() -> Line:
     """What 10,000 strides take more than 100."""
-    walker = rigid_walker(ONE_DEGREE, "corrected")
-    start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
+    trial = printed_trial()
     peaks = []
     for strides in (100, 10_000):
         tracemalloc.start()
-        RigidTrial(walker, start, 2 * strides).prepare("dop853", 1e-8, 10**9)()
+        replace(trial, steps=2 * strides).prepare("dop853", 1e-8, 10**9)()
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     a_step = (peaks[1] - peaks[0]) / (2 * 9_900)
@@ -363,6 +365,21 @@ def conclusion(lines: Sequence[Line]) -> str:
     return f"{said}." if not missed else f"{said}; missed: {'; '.join(missed)}."
 
 
+def all_lines(
+    watch: Stopwatch, trial: ContactTrial, reference: Reference, sides: dict[str, float], repeats: int, quick: bool
+) -> Iterator[Line]:
+    """Every claim, as it is measured."""
+    yield from rigid_lines(watch)
+    yield from kneed_lines(watch)
+    yield from newton_lines(watch)
+    yield from contact_lines(trial, reference, watch)
+    yield from rhs_lines(sides)
+    yield memory_line()
+    yield process_line(repeats)
+    yield from family_lines(Stopwatch(3, 10.0))
+    yield from batch_lines(watch, quick)
+
+
 def main() -> None:
     """Measure, print, and write if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -371,14 +388,14 @@ def main() -> None:
     options = parser.parse_args()
     watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
 
-    lines = [*rigid_lines(watch), *kneed_lines(watch), *newton_lines(watch), *family_lines(Stopwatch(3, 10.0))]
+    repeats = 5 if options.quick else 15
     trial = contact_trial_of(ONE_DEGREE)
     reference = reference_for(trial)
-    lines += contact_lines(trial, reference, watch)
-    lines += batch_lines(watch, options.quick)
-    repeats = 5 if options.quick else 15
     sides = times_ns(repeats)
-    lines += [*rhs_lines(sides), memory_line(), process_line(repeats)]
+    lines: list[Line] = []
+    for line in all_lines(watch, trial, reference, sides, repeats, options.quick):
+        print(f"{line.work}: {line.measured}; {line.verdict}", flush=True)
+        lines.append(line)
     parts = {
         "environment": f"{environment()}.{FEW if options.quick else ''}\n\n{conclusion(lines)}\n",
         "speed": markdown(

@@ -2,6 +2,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -16,6 +17,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.store import artifact
 from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.provenance import begin
 
@@ -146,6 +148,44 @@ import sys
 from conftest import full_content
 print(full_content().digest())
 """
+
+
+def in_turn(content, size):
+    """A content's first group with arrays, at the root, as one whose variables come one by one."""
+    group = content["corrected/walk"]
+    coordinates = {name: one for name, one in group.variables.items() if one.dims == (name,)}
+    summary = {key: value for key, value in content.summary.items() if key != "best"}
+    return artifact.InTurn(summary, group.attrs, coordinates, sorted(group.variables.items()), size)
+
+
+def test_variables_that_come_one_by_one_make_the_same_artifact(tmp_path, content, identity, origin):
+    path, turn = tmp_path / "a.h5", in_turn(content, 10_000)
+    artifact.write_in_turn(path, turn, identity, origin)
+    whole = Content({"": content["corrected/walk"]}, turn.summary)
+    found = artifact.read(path)
+    assert found.digest() == whole.digest()
+    assert found[""].attrs == whole[""].attrs
+    with xarray.open_dataset(path, engine="h5netcdf") as dataset:
+        assert set(dataset.coords) == {"time", "component", "event"}
+    on_disk = GroupOnDisk(path)
+    assert sorted(on_disk.variables) == sorted(found[""].variables)
+    for name, variable in on_disk.variables.items():
+        assert variable.dims == found[""].variables[name].dims
+        np.testing.assert_array_equal(variable.values, found[""][name])
+
+
+def test_a_writer_in_turn_that_fails_leaves_the_old_artifact(tmp_path, content, identity, origin):
+    path = tmp_path / "a.h5"
+    artifact.write(path, Content({}, {"x": 1}), identity, origin)
+    before = path.read_bytes()
+    with pytest.raises(StorageError, match="could not be stored"):
+        artifact.write_in_turn(path, in_turn(content, 1 << 60), identity, origin)
+    turn = in_turn(content, 10_000)
+    broken = replace(turn, variables=iter([turn.variables[0], ("late", None)]))
+    with pytest.raises(AttributeError):
+        artifact.write_in_turn(path, broken, identity, origin)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_identical_content_has_an_identical_digest_in_another_process(content):

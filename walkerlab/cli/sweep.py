@@ -199,7 +199,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
     from walkerlab.sweeps.result import as_csv as table_of
 
     drawn = draw(swept, request.folder, names)
-    summary = swept.content.summary
+    summary = swept.summary
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
@@ -226,7 +226,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
 
 def printed(swept: Swept, page: Path) -> list[str]:
     """The result for people."""
-    summary = swept.content.summary
+    summary = swept.summary
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from walkerlab.mechanics.assembly import Anchor, levers, tree_about
 from walkerlab.mechanics.links import Independent, Links
 from walkerlab.mechanics.parts import Assembly, Revolute
-from walkerlab.mechanics.standing import STANCE, SWING, NoKnee, Standing, SwingKnee
+from walkerlab.mechanics.standing import STANCE, SWING, NoKnee, Standing, SwingKnee, on_slope
 from walkerlab.mechanics.tree import Tree
 
 Floats = NDArray[np.float64]
@@ -28,13 +28,13 @@ class Places:
     shared: tuple[int, ...]  # places of bodies that belong to both legs
 
 
-def standing(
-    assembly: Assembly,
-    gravity: float,
-    slope: float,
-    knee_locked_at_strike: bool = True,
-) -> Standing:
-    """The rigid model of an assembly; gravity in m/s^2, slope in rad.
+def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> Standing:
+    """The rigid model of an assembly on a slope (rad), as `on_level_ground` makes it."""
+    return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
+
+
+def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> Standing:
+    """The rigid model of an assembly; gravity in m/s^2.
 
     knee_locked_at_strike  whether the trailing knee is rigid during the heel strike and released just after it
 
@@ -71,9 +71,9 @@ def standing(
         lean=math.atan2(hanging[0], -hanging[1]),
         leg_length=float(foot.radius_m - hanging[1]),
         gravity=gravity,
-        gravity_along=gravity * math.sin(slope),
-        gravity_down=gravity * math.cos(slope),
-        slope=slope,
+        gravity_along=0.0,
+        gravity_down=gravity,
+        slope=0.0,
         blank=(0.0,) * (2 * n),
     )
 

@@ -131,9 +131,9 @@ def traced(
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
     scales = np.array(equations.scales)
-    values, last, length = [start.x[-2:] * scales], start, control.first
+    values, before, last, length = [start.x[-2:] * scales], None, start, control.first
     while len(values) < points:
-        following = stepped(equations, last, length, control)
+        following = stepped(equations, last, length, control, before=before)
         if isinstance(following, Lost):
             return np.array(values), BranchEnd(float(values[-1][1]), why_lost(following))
         solved, _, length = following
@@ -143,7 +143,7 @@ def traced(
             values.append(clipped(values[-1], value, spans))
             return np.array(values), BranchEnd(float(values[-1][1]), "end of the plane")
         values.append(value)
-        last = solved
+        before, last = last, solved
     return np.array(values), BranchEnd(float(values[-1][1]), f"{points} points are used up")
 
 

@@ -123,16 +123,20 @@ def stepped(
     length: float,
     control: StepControl,
     acceptable: Callable[[Solved[D]], bool] = lambda _: True,
+    before: Solved[D] | None = None,
 ) -> tuple[Solved[D], float, float] | Lost:
     """The next point of a curve after `last`, how far it was sought, and how far to look for the one after it.
 
     acceptable  a caller's own wish for smaller steps
+    before      the point before the last, if there is one: it tells how the curve bends
     """
     lost = Lost(Outcome.WALKED)
+    bend = np.zeros_like(last.x) if before is None else bend_between(before, last)
     while length >= control.shortest:
-        found = corrected(equations, last.x + length * last.tangent, last.tangent, control.tolerance)
+        guess = last.x + length * last.tangent + 0.5 * length**2 * bend
+        found = corrected(equations, guess, last.tangent, control.tolerance)
         if isinstance(found, Solved):
-            gone = float(np.linalg.norm(found.x - last.x - length * last.tangent))
+            gone = float(np.linalg.norm(found.x - guess))
             if found.tangent @ last.tangent > control.turn and gone < 0.5 * length and acceptable(found):
                 longer = 1.6 if found.corrections <= FEW_CORRECTIONS else 1.0
                 return found, length, min(control.longest, longer * length)
@@ -140,6 +144,11 @@ def stepped(
             lost = found
         length *= 0.5
     return lost
+
+
+def bend_between(one: Solved[D], other: Solved[D]) -> Floats:
+    """How fast the tangent turns from one neighbour to the other, per unit of arclength."""
+    return np.asarray((other.tangent - one.tangent) / np.linalg.norm(other.x - one.x))
 
 
 @dataclass(frozen=True)

@@ -272,12 +272,12 @@ class Follower:
         points, bifurcations, segments = [self.point(start, period)], [], []
         crossings: list[Crossing] = []
         step = min(self.control.first, 0.5 * period_amplitude(start, period))
-        last, end = start, None
+        before, last, end = None, start, None
         while end is None:
             if len(points) >= self.limits.points:
                 end = BranchEnd(points[-1].value, f"{self.limits.points} points are used up")
                 break
-            following = stepped(equations, last, step, self.control, self.near_enough(last))
+            following = stepped(equations, last, step, self.control, self.near_enough(last), before)
             if isinstance(following, Lost):
                 end = BranchEnd(points[-1].value, why_lost(following))
                 break
@@ -297,7 +297,7 @@ class Follower:
             crossings += crossings_between(self.step_map.monitors, points[-2], points[-1])
             if end is None and abs(points[-1].multipliers[0]) > self.limits.growth:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {self.limits.growth:g}-fold a cycle")
-            last = solved
+            before, last = last, solved
         first = BranchEnd(points[0].value, "start")
         return Branch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
 

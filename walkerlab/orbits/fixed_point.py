@@ -44,7 +44,7 @@ class SearchSettings:
     rtol: float = 1e-8
     atol: float = 1e-11
     solved_rtol: float = 1e-13
-    solved_atol: float = 1e-16
+    solved_atol: float = 1e-13
     solved_residual: float = 1e-14
     residual: float = 1e-11
     budget: int = 20_000

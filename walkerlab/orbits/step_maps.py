@@ -31,7 +31,7 @@ from walkerlab.solvers.stepping import clear_counts
 Floats = NDArray[np.float64]
 W = TypeVar("W")
 
-RTOL, ATOL, BUDGET = 1e-13, 1e-16, 20_000
+RTOL, ATOL, BUDGET = 1e-13, 1e-13, 20_000
 QUICK_RTOL, QUICK_ATOL, ENDLESS = 1e-9, 1e-11, 2**62  # of long walks
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far
@@ -134,8 +134,8 @@ SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
 class RigidMap:
     """The rigid model: its coordinates just after the heel strike, of the similar walker of unit size.
 
-    The derivative along the section is exact (`step_map`); that along the parameter is a fourth-order difference of
-    exact steps, which only steers predictors and Newton's method and enters no result.
+    The derivative along the section is exact (`step_map`); that along the parameter is a central difference of exact
+    steps, which only steers predictors and Newton's method and enters no result.
     """
 
     monitors = (
@@ -167,7 +167,7 @@ class RigidMap:
 
     def _formula(self, p: float) -> tuple[tuple[Standing, ...], Floats] | None:
         scale = min(self._scale, abs(p)) if p != 0.0 else self._scale
-        found = difference_formula(self._unit_at, p, scale)
+        found = difference_formula(self._unit_at, p, scale, few=True)
         return None if found is None else (tuple(walker for walker, _ in found[0]), found[1])
 
     def similar(self, p: float) -> tuple[Standing, Units] | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.config.walkers import CompassWalker, is_plain_compass
+from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
-from walkerlab.mechanics.rigid import knee_of, places_of, standing
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
+from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
 from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
@@ -16,6 +17,7 @@ from walkerlab.solvers.registry import method_named
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config, Equations
 
+REMEMBERED = 16  # walkers: over a slope the same one is asked for again and again
 ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
 
 
@@ -55,13 +57,17 @@ def rigid_scene(config: Config) -> RigidScene:
 
 def rigid_walker(config: Config, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
-    parts = assembly_of(config.walker, rigid=True)
-    locked = knee_locked_at_strike(config.walker)
+    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
+    return as_printed(model) if equations == "as-printed" else model
+
+
+@lru_cache(REMEMBERED)
+def level_walker(walker: Walker, gravity: float) -> Standing:
+    """A described walker on level ground; gravity in m/s^2. ConfigError for parts that make no walker."""
     try:
-        model = standing(parts, config.gravity_m_s2, config.slope_rad, locked)
+        return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:
         raise ConfigError(f"walker: {error}", SHOWN_IN) from None
-    return as_printed(model) if equations == "as-printed" else model
 
 
 def compass(config: Config, equations: Equations) -> RigidWalker:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from walkerlab.config.canonical import canonical_json
 from walkerlab.store import hdf5
-from walkerlab.store.content import Content, Group
-from walkerlab.store.files import read_bounded, write_atomically
+from walkerlab.store.content import Attribute, Content, Digest, Group, Variable
+from walkerlab.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
 from walkerlab.store.key import SCHEMA_VERSION, Identity
 from walkerlab.store.provenance import Provenance
 
@@ -78,7 +78,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
     Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
     """
-    root = root_attributes(content, identity, provenance, complete)
+    root = root_attributes(content, identity, provenance, complete, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
     if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
         raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
@@ -94,6 +94,53 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
         complete=complete,
         seal=seal,
     )
+
+
+@dataclass(frozen=True)
+class InTurn:
+    """A content with one group whose variables are made one by one, so that they are never in memory together.
+
+    coordinates  those of the variables that are dimensions' coordinates
+    variables    all of them in the order of their names
+    size         about how many bytes they take
+    """
+
+    summary: Mapping[str, Any]
+    attrs: Mapping[str, Attribute]
+    coordinates: Mapping[str, Variable]
+    variables: Iterable[tuple[str, Variable]]
+    size: int
+
+
+def write_in_turn(
+    path: Path, content: InTurn, identity: Identity, provenance: Provenance, complete: bool = True
+) -> None:
+    """Store what `write` would, but for the order of things in the file, with the memory that one variable takes.
+
+    Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
+    """
+    labelled = Content({}, content.summary)
+    digest = Digest(labelled.summary, labelled.timed)
+    digest.enter("", content.attrs)
+
+    def told() -> Iterator[tuple[str, Variable]]:
+        yield from content.coordinates.items()
+        for name, variable in content.variables:
+            digest.add(name, variable)
+            if name not in content.coordinates:
+                yield name, variable
+
+    with replacing(path) as temporary:
+        # Where the disk is full an ordinary call has to say so: the HDF5 library cannot close what it cannot write.
+        refuse_full_disk(temporary, content.size)
+        hdf5.write_in_turn(
+            temporary,
+            told(),
+            lambda: {**root_attributes(labelled, identity, provenance, complete, digest.hex()), **content.attrs},
+        )
+        seal = file_digest(temporary)
+        with temporary.open("ab") as file:
+            file.write(f"\nwalkerlab sha256 {seal}\n".encode())
 
 
 def read(path: Path) -> Stored:
@@ -130,7 +177,7 @@ def check(path: Path, key: str) -> Verdict:
 
 
 def root_attributes(
-    content: Content, identity: Identity, provenance: Provenance, complete: bool
+    content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
 ) -> dict[str, str | int | bool]:
     """What stands at the root of the file: all but the arrays."""
     root: dict[str, str | int | bool] = {
@@ -151,7 +198,7 @@ def root_attributes(
         "input_digests": canonical_json(dict(provenance.input_digests)),
         "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
         "summary_timed": canonical_json(content.timed),
-        "content_digest": content.digest(),
+        "content_digest": digest,
         "complete": complete,
     }
     if provenance.git_commit is not None:

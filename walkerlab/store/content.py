@@ -122,19 +122,39 @@ class Content:
 
     def digest(self) -> str:
         """The sha256 of all that is determined by the inputs: timings are left out."""
-        digest = hashlib.sha256()
-        for part in self._parts():
-            digest.update(len(part).to_bytes(8, "little"))
-            digest.update(part)
-        return digest.hexdigest()
-
-    def _parts(self) -> Iterator[bytes]:
-        yield canonical_json([untimed(self.summary, self.timed), self.timed]).encode()
+        digest = Digest(self.summary, self.timed)
         for path, group in sorted(self.groups.items()):
-            yield canonical_json([path, dict(group.attrs)]).encode()
+            digest.enter(path, group.attrs)
             for name, variable in sorted(group.variables.items()):
-                if not variable.timing:
-                    yield from variable_parts(name, variable)
+                digest.add(name, variable)
+        return digest.hex()
+
+
+class Digest:
+    """The digest of a content whose groups, and in each the variables, come one by one, in the order of their names."""
+
+    def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
+        """Begin with the summary."""
+        self._sha256 = hashlib.sha256()
+        self._take(canonical_json([untimed(summary, timed), timed]).encode())
+
+    def enter(self, path: str, attrs: Mapping[str, Attribute]) -> None:
+        """Go on with a group."""
+        self._take(canonical_json([path, dict(attrs)]).encode())
+
+    def add(self, name: str, variable: Variable) -> None:
+        """Take a variable of the group."""
+        if not variable.timing:
+            for part in variable_parts(name, variable):
+                self._take(part)
+
+    def hex(self) -> str:
+        """The digest of what has come."""
+        return self._sha256.hexdigest()
+
+    def _take(self, part: bytes) -> None:
+        self._sha256.update(len(part).to_bytes(8, "little"))
+        self._sha256.update(part)
 
 
 def with_parents(groups: Mapping[str, Group]) -> dict[str, Group]:

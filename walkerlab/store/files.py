@@ -65,14 +65,23 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
     Raises StorageError if the system refuses (full disk, read-only folder, ...).
     """
+    with replacing(path) as temporary, temporary.open("xb") as file:
+        file.writelines(parts)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file to be written, then put in place, complete and on the disk; if that fails nothing is changed.
+
+    Raises StorageError if the system refuses.
+    """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     with storing(path):
         if not path.parent.is_dir():
             raise StorageError(f"{path} could not be stored: its folder is not there any more.")
         try:
-            with temporary.open("xb") as file:
-                file.writelines(parts)
-                file.flush()
+            yield temporary
+            with temporary.open("rb") as file:
                 os.fsync(file.fileno())
             temporary.replace(path)
         except BaseException:
@@ -80,6 +89,16 @@ def write_atomically(path: Path, *parts: bytes) -> None:
                 temporary.unlink()
             raise
         sync_folder(path.parent)
+
+
+def refuse_full_disk(path: Path, size: int) -> None:
+    """Raise OSError if the system has no room for a new file of so many bytes; none is left."""
+    with path.open("xb") as file:
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+        finally:
+            path.unlink()
 
 
 def make_folder(path: Path) -> None:

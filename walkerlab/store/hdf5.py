@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -35,27 +37,76 @@ def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
         return bytes(file.id.get_file_image())
 
 
+def write_in_turn(
+    path: Path, variables: Iterable[tuple[str, Variable]], root: Callable[[], Mapping[str, Attribute]]
+) -> None:
+    """Write a file whose variables at the root come one by one, coordinates first, and after them its attributes.
+
+    Raises OSError if the system refuses.
+    """
+    with h5py.File(path, "w") as file:
+        write_variables(file, variables)
+        for name, value in root().items():
+            file.attrs[name] = value
+
+
+class GroupOnDisk(Group):
+    """The group at a path in an intact file; each variable is read when it is asked for."""
+
+    def __init__(self, file: Path, path: str = "/") -> None:
+        """Read nothing yet but the names."""
+        object.__setattr__(self, "variables", VariablesOnDisk(file, path))
+        object.__setattr__(self, "attrs", {})
+
+
+class VariablesOnDisk(Mapping[str, Variable]):
+    """Variables of a group in a file, by name."""
+
+    def __init__(self, file: Path, path: str) -> None:
+        """Read the names."""
+        self.file, self.path = file, path
+        with h5py.File(file) as opened:
+            members = opened[path].items()
+            self._names = [
+                name for name, one in members if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
+            ]
+        self._read = lru_cache(maxsize=8)(self._read_anew)
+
+    def __getitem__(self, name: str) -> Variable:
+        """A variable; KeyError if there is none of that name."""
+        return self._read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._names)
+
+    def _read_anew(self, name: str) -> Variable:
+        with h5py.File(self.file) as opened:
+            return read_variable(name, opened[self.path][name], Budget(self.file.stat().st_size))
+
+
 def write_group(target: Any, group: Group) -> None:
     """Write variables, the dimensions they share, and attributes into an open HDF5 group."""
     for name, value in group.attrs.items():
         target.attrs[name] = value
-    scales = {dim: write_dimension(target, dim, size, group) for dim, size in group.sizes.items()}
-    for name, variable in group.variables.items():
-        dataset = scales[name] if name in scales else write_variable(target, name, variable)
-        if name not in scales:
-            for axis, dim in enumerate(variable.dims):
-                dataset.dims[axis].attach_scale(scales[dim])
+    write_variables(target, sorted(group.variables.items(), key=lambda item: item[1].dims != (item[0],)))
 
 
-def write_dimension(target: Any, name: str, size: int, group: Group) -> Any:
-    """Write a dimension, with its coordinate if there is one."""
-    if name in group.variables:
-        dataset = write_variable(target, name, group.variables[name])
-        dataset.make_scale(name)
-    else:
-        dataset = target.create_dataset(name, shape=(size,), dtype="i1")
-        dataset.make_scale(f"{BARE_DIMENSION}{size:10d}")
-    return dataset
+def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
+    """Write variables one by one, coordinates first; a dimension that has none stands for its length only."""
+    for name, variable in variables:
+        dataset = write_variable(target, name, variable)
+        if variable.dims == (name,):
+            dataset.make_scale(name)
+            continue
+        for axis, (dim, size) in enumerate(zip(variable.dims, variable.values.shape, strict=True)):
+            if dim not in target:
+                target.create_dataset(dim, shape=(size,), dtype="i1").make_scale(f"{BARE_DIMENSION}{size:10d}")
+            dataset.dims[axis].attach_scale(target[dim])
 
 
 def write_variable(target: Any, name: str, variable: Variable) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import json
 import os
 import platform
 import time
@@ -23,12 +22,13 @@ from walkerlab.store.content import Content, Group, Variable, untimed
 from walkerlab.store.key import Identity
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.flat import flat_text
 
 Status = Literal["answered", "no-answer", "failed"]
 Labels = Mapping[str, tuple[str, str]]
 
 FOLDER: Final = "sweep-chunks"
-TEXTS: Final = ("key", "status", "said", "summary")
+TEXTS: Final = ("key", "status", "said", "numbers")
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class Row:
     key      of the stage's result, hex
     status   answered; no-answer: the stage found none and says why; failed: the computation was not completed
     said     why there is no answer; empty if there is one
-    summary  the stage's, without run times; partial or empty if there is no answer
+    numbers  of the stage's summary, flat, as JSON and without run times; some or none if there is no answer
     wall_s   time it took, s
     """
 
     key: str
     status: Status
     said: str
-    summary: Mapping[str, Any]
+    numbers: str = "{}"
     wall_s: float = 0.0
 
 
@@ -132,12 +132,12 @@ def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tu
         answer = worker.answer(without_outputs(config, target, worker.graph), target, keys)
     except Exception as error:
         # A point that meets a bug is told as such; the others are there.
-        return Row(key, "failed", f"{type(error).__name__}: {error}", {}), Content()
+        return Row(key, "failed", f"{type(error).__name__}: {error}"), Content()
     content, no_answer = answer.content, answer.no_answer
-    summary = untimed(content.summary, content.timed)
+    numbers = flat_text(untimed(content.summary, content.timed))
     if no_answer is None:
-        return Row(key, "answered", "", summary), content
-    return Row(key, "no-answer", no_answer.message, summary), content
+        return Row(key, "answered", "", numbers), content
+    return Row(key, "no-answer", no_answer.message, numbers), content
 
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
@@ -175,7 +175,7 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: 
         "key": [row.key for row in rows],
         "status": [row.status for row in rows],
         "said": [row.said for row in rows],
-        "summary": [json.dumps(row.summary, allow_nan=False, separators=(",", ":")) for row in rows],
+        "numbers": [row.numbers for row in rows],
     }
     variables = {name: Variable(np.array(texts[name], object), ("point",), "", name) for name in TEXTS}
     walls = np.array([row.wall_s for row in rows])
@@ -198,10 +198,7 @@ def stored_chunk(path: Path) -> Chunk | None:
         columns = [points[name].tolist() for name in (*TEXTS, "wall_s")]
     except (OSError, Damaged, KeyError):
         return None
-    rows = tuple(
-        Row(key, status, said, json.loads(summary), wall)
-        for key, status, said, summary, wall in zip(*columns, strict=True)
-    )
+    rows = tuple(Row(*row) for row in zip(*columns, strict=True))
     return Chunk(rows, {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()})
 
 
@@ -228,7 +225,7 @@ def row_of_artifact(stored: artifact.Stored) -> Row:
     summary = untimed(stored.summary, stored.timed)
     said = summary.pop("no_answer", None)
     status: Status = "answered" if stored.complete else "no-answer"
-    return Row(stored.identity.key, status, "" if said is None else str(said["message"]), summary)
+    return Row(stored.identity.key, status, "" if said is None else str(said["message"]), flat_text(summary))
 
 
 def median_wall_s(rows: Sequence[Row]) -> float | None:

@@ -37,7 +37,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
 
     Raises ConfigError for a number that is not there, StorageError if the system refuses.
     """
-    group, question = swept.content[""], swept.question
+    group, question = swept.group, swept.question
     refuse_unknown(group, question.dims, names)
     shown = list(names) or choose(group, question.dims, question.names)
     figure = drawn_figure(group, question.stage, question.names, question.dims, shown) if shown else None
@@ -49,7 +49,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
             paths.append(folder.figures / f"{stem}.{kind}")
             write_atomically(paths[-1], data)
     page = folder.path / PAGE
-    write_atomically(page, render(page_of(swept, figure, shown)).encode())
+    write_atomically(page, render(page_of(swept, group, figure, shown)).encode())
     return Files(page, tuple(paths))
 
 
@@ -61,9 +61,9 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) ->
             raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
 
 
-def page_of(swept: Swept, figure: Drawn | None, shown: Sequence[str]) -> SweepPage:
+def page_of(swept: Swept, group: Group, figure: Drawn | None, shown: Sequence[str]) -> SweepPage:
     """What the page says."""
-    summary, group, question = swept.content.summary, swept.content[""], swept.question
+    summary, question = swept.summary, swept.question
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     return SweepPage(
         title=f"{question.stage} over {', '.join(question.names)}",

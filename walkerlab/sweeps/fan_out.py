@@ -149,7 +149,7 @@ class FanOut:
         else:
             self.point_s = self.point_s or 1.0
             key = one.task.keys[0][self.target]
-            self.keep(Chunk((Row(key, "failed", f"its worker died: {said}", {}),), {}))
+            self.keep(Chunk((Row(key, "failed", f"its worker died: {said}"),), {}))
 
 
 def failed_future(error: BaseException) -> Future[Chunk]:

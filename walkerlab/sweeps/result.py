@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.canonical import canonical_json
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.artifact import InTurn
+from walkerlab.store.content import Content, Variable
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, Row
-from walkerlab.sweeps.columns import OWN, Columns
+from walkerlab.sweeps.chunk import Chunk
+from walkerlab.sweeps.columns import OWN, TEXT_BYTES, Columns
 from walkerlab.sweeps.question import Question, described
 
 OUTCOMES = {"answered": "answered", "no-answer": "no-answer", "failed": "failed"}
@@ -39,36 +41,26 @@ class Merge:
         self.own = {name: np.full(size, "", object) for name in OWN}
         self.there = np.zeros(size, bool)
 
-    def put(self, place: int, row: Row) -> None:
-        """Take one result's row."""
-        self.there[place] = True
-        summary = dict(row.summary)
-        outcome = summary.pop("outcome", None) or OUTCOMES[row.status]
-        for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
-            self.own[name][place] = sys.intern(text)
-        self.columns.put(place, summary)
-
-    def put_all(self, chunk: Chunk, places: Mapping[str, int]) -> None:
+    def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
         """Take the rows of a chunk that have a place."""
         self.columns.label(chunk.labels)
-        for row in chunk.rows:
-            if row.key in places:
-                self.put(places[row.key], row)
+        wanted = [row for row in chunk.rows if row.key in places]
+        at = [places[row.key] for row in wanted]
+        said = [json.loads(row.numbers) for row in wanted]
+        for place, row, numbers in zip(at, wanted, said, strict=True):
+            outcome = numbers.pop("outcome", None) or OUTCOMES[row.status]
+            for name, text in (("outcome", outcome), ("status", row.status), ("said", row.said)):
+                self.own[name][place] = sys.intern(text)
+        self.there[at] = True
+        self.columns.put(at, said)
 
-    def content(self, question: Question, points: Any, inverse: NDArray[np.int64]) -> Content:
-        """What is stored of the sweep.
+    def content(self, question: Question, points: Any, inverse: NDArray[np.int64]) -> InTurn:
+        """What is stored of the sweep; to be asked for once.
 
         points   the sweep's `Points`
         inverse  which result each point has
         """
-        shape, dims = question.shape, question.dims
-        variables = dict(coordinates(question, points.template.base.config))
-        for name in OWN:
-            variables[name] = Variable(self.own[name][inverse].reshape(shape), dims, "", MEANINGS[name])
-        for name, variable in self.columns.variables(inverse, shape, dims):
-            # A number that is a parameter as well is its coordinate.
-            variables.setdefault(name, variable)
-        attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
+        parameters = dict(coordinates(question, points.template.base.config))
         statuses = self.own["status"][inverse]
         summary = {
             "of": question.stage,
@@ -79,7 +71,23 @@ class Merge:
             "failed": int(np.sum(statuses == "failed")),
             "outcomes": counted(self.own["outcome"][inverse]),
         }
-        return Content({"": Group(variables, attrs)}, summary)
+        attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
+        scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
+        size = self.columns.size_bytes + 8 * TEXT_BYTES * len(OWN) * len(question)
+        return InTurn(summary, attrs, scales, self._variables(question, parameters, inverse), size)
+
+    def _variables(
+        self, question: Question, parameters: Mapping[str, Variable], inverse: NDArray[np.int64]
+    ) -> Iterator[tuple[str, Variable]]:
+        """Every variable by name; a number that is a parameter as well is its coordinate."""
+        shape, dims = question.shape, question.dims
+        for name in sorted({*parameters, *OWN, *self.columns.names}):
+            if name in parameters:
+                yield name, parameters[name]
+            elif name in OWN:
+                yield name, Variable(self.own[name][inverse].reshape(shape), dims, "", MEANINGS[name])
+            else:
+                yield name, self.columns.variable(name, inverse, shape, dims)
 
 
 def coordinates(question: Question, config: Any) -> Iterable[tuple[str, Variable]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,9 @@ from walkerlab.errors import ConfigError
 from walkerlab.stages.graph import PIPELINE, Graph
 from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.store import artifact, provenance
-from walkerlab.store.content import Content
+from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
+from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.chunk import (
@@ -63,26 +64,36 @@ class Swept:
     """How a sweep went.
 
     path     its file
-    content  of the file
+    summary  of the file
     reused   points whose result was there
     wall_s   time of the whole
     """
 
     question: Question
     path: Path
-    content: Content
+    summary: Mapping[str, Any]
     reused: int
     wall_s: float
 
     @property
+    def content(self) -> Content:
+        """All that is in the file."""
+        return artifact.read(self.path)
+
+    @property
+    def group(self) -> Group:
+        """The points' numbers, read from the file as they are asked for."""
+        return GroupOnDisk(self.path)
+
+    @property
     def done(self) -> int:
         """Points with a result, be it that there is no answer."""
-        return int(self.content.summary["done"])
+        return int(self.summary["done"])
 
     @property
     def failed(self) -> int:
         """Points whose computation was not completed."""
-        return int(self.content.summary["failed"])
+        return int(self.summary["failed"])
 
 
 @dataclass(frozen=True)
@@ -167,8 +178,8 @@ class Sweep:
             content = merge.content(self.question, self.points, self.inverse)
             identity = Identity("sweep", self.slice, {}, self.points.code_digest)
             complete = content.summary["failed"] == 0
-            artifact.write(self.path, content, identity, begun.until_now(), complete)
-        return Swept(self.question, self.path, content, reused, time.perf_counter() - started)
+            artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
+        return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started)
 
     def _stored(self) -> Iterator[Chunk]:
         """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
@@ -182,7 +193,7 @@ class Sweep:
 
     def _take_over(self, merge: Merge) -> None:
         for chunk in self._stored():
-            merge.put_all(chunk, self.places)
+            merge.put(chunk, self.places)
 
     def _compute(self, merge: Merge, work: Work, progress: Progress, begun: provenance.Provenance) -> None:
         missing = np.sort(self.first[~merge.there])
@@ -193,7 +204,7 @@ class Sweep:
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
-            merge.put_all(chunk, self.places)
+            merge.put(chunk, self.places)
             progress.advance(len(chunk.rows))
 
         chunk_s = work.chunk_s or work.engine.chunk_s
