@@ -18,7 +18,7 @@ UNITS: Final = {
 class Label:
     """Unit and meaning of a field or property of a row, to be put into `Annotated`; without one it is not stored.
 
-    unit    "1" for a pure number
+    unit    "1" for a pure number, "" for text
     text    what it is, in words
     dims    of a row's values; () where there is one
     timing  a measured run time, or what shows one
