@@ -86,6 +86,11 @@ def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, A
     }
 
 
+def numbers_of(gait: Gait) -> dict[str, Label]:
+    """What is stored and printed of a gait, with or without knees."""
+    return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
+
+
 def listed(search: GaitSearch, index: int) -> dict[str, Any]:
     """One of the gaits found, and why it was or was not chosen."""
     gait = search.gaits[index]
@@ -101,11 +106,6 @@ def gait_summary(gait: Gait) -> dict[str, Any]:
         **printed(gait, numbers_of(gait)),
         "found_by": list(gait.found_by),
     }
-
-
-def numbers_of(gait: Gait) -> dict[str, Label]:
-    """What is stored and printed of a gait, with or without knees."""
-    return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
 
 
 def gaits_group(search: GaitSearch, config: Config) -> Group:
