@@ -31,6 +31,7 @@ LAYERS = (
     "solvers",
     "config",
     "kernels",
+    "labels",
     "errors",
 )
 SOURCES = sorted(PACKAGE.rglob("*.py"))

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from walkerlab.benchmarks.engines.experiments import Row, SwingRow, Truth, TuningRow
+from walkerlab.benchmarks.engines.experiments import Truth
+from walkerlab.benchmarks.engines.rows import Row, SwingRow, TuningRow
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages import engines

@@ -10,8 +10,10 @@ from walkerlab.benchmarks.ladder import Climb, Row, Run, climb, finished, left_o
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
+from walkerlab.labels import labels_of
 from walkerlab.scene.rigid import compass, rigid_walker
-from walkerlab.stages.accuracy import best_methods, conclusion, rows_group, summary_of
+from walkerlab.stages.accuracy import best_methods, conclusion, summary_of
+from walkerlab.store.columns import rows_group
 
 CONFIG = load(None, ("contact=null",)).config
 START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)
@@ -72,7 +74,7 @@ def test_content_is_the_same_each_time_apart_from_timings(reference, rows):
 
 
 def test_timings_are_marked_as_such(rows):
-    variables = rows_group(rows).variables
+    variables = rows_group(rows, labels_of(Row)).variables
     assert {name for name, variable in variables.items() if variable.timing} == {"wall_s", "least_wall_s", "repeats"}
 
 

@@ -10,7 +10,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.stages import contact_sim
+from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store import artifact
@@ -155,6 +155,15 @@ def test_the_ground_carries_the_walker_and_never_pulls(paper):
     assert np.all((trajectory["penetration_m"] > 0.0) | (normal == 0.0))
     assert np.median(normal.sum(axis=1)) == pytest.approx(WEIGHT * math.cos(SLOPE), rel=0.05)
     assert trajectory["penetration_m"].max() <= paper.summary["max_penetration_m"] * (1.0 + 1e-9)
+
+
+def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
+    rigid = simulate.run(only(load().config, PIPELINE["simulate"].reads), {"fixedpoint": GAIT}, Silent())
+    ours, theirs = (walk["trajectory"].variables for walk in (paper, rigid))
+    shared = {name for name in ours.keys() & theirs if ours[name].dims == theirs[name].dims} - {"stance_leg"}
+    assert shared >= {"time", "leg", "angle", "velocity", "hip_along_m", "foot_height_m", "mechanical_J"}
+    for name in shared:
+        assert (ours[name].units, ours[name].long_name) == (theirs[name].units, theirs[name].long_name)
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):

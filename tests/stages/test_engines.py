@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
 from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
@@ -14,7 +13,7 @@ from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.stages import engines
-from walkerlab.stages.engines import closest, column, ratios, three_digits
+from walkerlab.stages.engines import closest, ratios, three_digits
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import config_slice
 from walkerlab.stages.progress import Silent
@@ -136,12 +135,6 @@ def test_the_stored_result_is_the_same_whatever_the_run_times():
 def test_rows_have_the_keys_that_readers_rely_on():
     keys = {"engine", "version", "experiment", "step_s", "error", "wall_s", "period_s", "step_length_m", "outcome"}
     assert all(keys <= set(one) for one in content().summary["rows"])
-
-
-def test_numbers_that_are_absent_are_gaps():
-    values = column([1.0, None], "s", "number", timing=False).values
-    assert values[0] == 1.0
-    assert np.isnan(values[1])
 
 
 def test_tables_are_stored_whole():

@@ -5,9 +5,11 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_engines import PERIOD, ROWS, content
 
+from walkerlab.benchmarks.engines.rows import Row
 from walkerlab.config.loader import load
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.engines import COLOURS, FIGURES, series_of
+from walkerlab.labels import labels_of
 from walkerlab.report.blocks import Findings, Table
 from walkerlab.report.results import Results
 from walkerlab.report.sections.engines import section
@@ -85,6 +87,26 @@ def test_every_run_has_its_row(made):
     ):
         (body,) = tables[caption].bodies
         assert len(body.rows) == more + sum(row.experiment == experiment for row in ROWS)
+
+
+def test_a_column_is_stored_printed_and_shown_by_the_label_of_its_field(results, made):
+    label = labels_of(Row)["step_s"]
+    steps = [row.step_s for row in ROWS]
+    stored = results["engines"]["rows"].variables["step_s"]
+    assert (stored.units, stored.long_name, stored.values.tolist()) == (label.unit, label.text, steps)
+    assert [row["step_s"] for row in results["engines"].summary["rows"]] == steps
+    table = next(block for block in made.blocks if isinstance(block, Table) and block.caption.startswith("ADAMS"))
+    place = [column.title for column in table.columns].index(f"step (µ{label.unit})")
+    shown = [float(row[place].text) for row in table.bodies[0].rows]
+    assert shown == pytest.approx([1e6 * row.step_s for row in ROWS if row.experiment == "same-law"])
+
+
+def test_every_number_of_a_run_is_stored_with_its_gaps(results):
+    group = results["engines"]["rows"]
+    for name in labels_of(Row):
+        told = [None if value != value else value for value in group[name].tolist()]
+        assert told == [getattr(row, name) for row in ROWS]
+    assert {name for name in group.variables if group.variables[name].timing} == {"wall_s"}
 
 
 def test_the_residual_of_tuning_is_shown(made):

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 from statistics import median
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, first_end
 from walkerlab.benchmarks.trials import Trial, TrialRun
+from walkerlab.labels import Label
 from walkerlab.solvers.registry import METHODS
 
 BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
@@ -24,6 +25,7 @@ WARM_UP = 2_000  # after which everything is compiled and loaded
 REPEATS, REPEAT_TIME_S = 7, 0.3
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+ERROR = Label("1", "largest difference of the end state from the reference, SI units", absent=0.0)
 
 
 @dataclass(frozen=True)
@@ -56,18 +58,23 @@ class Row:
     """One method at one tolerance."""
 
     scene: str
-    method: str
-    tolerance: float
-    outcome: str
-    error: float | None  # largest difference of the end state from the reference; None if the end was not reached
-    against: str  # the method of that reference, which is another one
+    method: Annotated[str, Label("1", "method")]
+    tolerance: Annotated[float, Label("1", "relative tolerance")]
+    outcome: Annotated[str, Label("1", "outcome")]
+    error: Annotated[float | None, ERROR]
+    against: Annotated[str, Label("1", "method of the end that it is measured by")]  # another one
     within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
-    wall_s: float  # median of the repeats
-    least_wall_s: float
-    repeats_of_wall_s: int  # how many the median is of
-    rhs_evaluations: int
-    accepted: int
-    rejected: int
+    wall_s: Annotated[float, Label("s", "median run time", timing=True)]
+    least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
+    repeats_of_wall_s: Annotated[int, Label("1", "timed repeats", timing=True, name="repeats")]
+    rhs_evaluations: Annotated[int, Label("1", "right-hand sides")]
+    accepted: Annotated[int, Label("1", "accepted steps")]
+    rejected: Annotated[int, Label("1", "rejected steps")]
+
+    @property
+    def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
+        """1 if there is an error, else 0."""
+        return int(self.error is not None)
 
 
 def climb(trial: Trial, method: str) -> Climb:

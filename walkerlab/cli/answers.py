@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.cli.text import aligned, described_summary
+from walkerlab.labels import unit_by_name
 from walkerlab.report.numbers import MINUS, count, fixed, length, listed, number, quantity
 
 Summary = Mapping[str, Any]
@@ -62,15 +63,15 @@ def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
         for place in range(most)
     ]
     rows += [
-        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit]
-        for key, words, written, unit in (
-            ("period_s", "step period", partial(fixed, decimals=5), "s"),
-            ("step_length_m", "step length", partial(fixed, decimals=5), "m"),
-            ("energy_J", "mean energy", partial(fixed, decimals=3), "J"),
-            ("energy_drift_J", "energy drift", partial(number, digits=2), "J"),
-            ("min_normal_force_N", "least normal force", partial(fixed, decimals=1), "N"),
-            ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4), "1"),
-            ("max_scuff_depth_m", "scuffing depth", partial(number, digits=4), "m"),
+        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_by_name(key)]
+        for key, words, written in (
+            ("period_s", "step period", partial(fixed, decimals=5)),
+            ("step_length_m", "step length", partial(fixed, decimals=5)),
+            ("energy_J", "mean energy", partial(fixed, decimals=3)),
+            ("energy_drift_J", "energy drift", partial(number, digits=2)),
+            ("min_normal_force_N", "least normal force", partial(fixed, decimals=1)),
+            ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4)),
+            ("max_scuff_depth_m", "scuffing depth", partial(number, digits=4)),
         )
         if any(key in gait for gait in gaits)
     ]
@@ -116,21 +117,21 @@ def walk_measures(summary: Summary) -> list[tuple[str, str]]:
     dissipated = summary.get("dissipated_J") or {}
     lost = listed(f"{quantity(value, 'J', 3)} by {name}" for name, value in dissipated.items())
     return [
-        ("mean energy", told(summary, "mean_energy_J", "J", 7)),
-        ("energy drift", told(summary, "energy_drift_J", "J", 2)),
-        ("energy balance off by", told(summary, "energy_balance_residual_J", "J", 2)),
+        ("mean energy", told(summary, "mean_energy_J", 7)),
+        ("energy drift", told(summary, "energy_drift_J", 2)),
+        ("energy balance off by", told(summary, "energy_balance_residual_J", 2)),
         ("energy lost", lost),
-        ("least normal force", told(summary, "min_normal_force_N", "N")),
-        ("largest friction ratio", told(summary, "max_friction_ratio", "")),
+        ("least normal force", told(summary, "min_normal_force_N")),
+        ("largest friction ratio", told(summary, "max_friction_ratio")),
         ("largest penetration", length(summary["max_penetration_m"]) if "max_penetration_m" in summary else ""),
         ("scuffing depth", length(summary["max_scuff_depth_m"]) if "max_scuff_depth_m" in summary else ""),
-        ("right-hand sides", told(summary, "rhs_evaluations", "", 9)),
+        ("right-hand sides", told(summary, "rhs_evaluations", 9)),
     ]
 
 
-def told(summary: Summary, key: str, unit: str, digits: int = 4) -> str:
+def told(summary: Summary, key: str, digits: int = 4) -> str:
     """A number of a summary with its unit; nothing if it is not there."""
-    return quantity(summary[key], unit, digits) if key in summary else ""
+    return quantity(summary[key], unit_by_name(key), digits) if key in summary else ""
 
 
 def shown_places(total: int) -> list[Any]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from walkerlab.config.problems import nearest
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.labels import with_unit
 from walkerlab.store.artifact import Damaged, Stored, read
 from walkerlab.store.content import Group
 from walkerlab.store.files import write_atomically
@@ -128,12 +129,11 @@ def columns_of(group: Group) -> tuple[list[str], list[list[Any]]]:
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims[:1] != ("time",):
             continue
-        unit = f" ({variable.units})" if variable.units not in ("", "1") else ""
         if len(variable.dims) == 1:
-            names.append(name + unit)
+            names.append(with_unit(name, variable.units))
             values.append(variable.values.tolist())
         else:
             for place in range(variable.values.shape[1]):
-                names.append(f"{name} {place}{unit}")
+                names.append(with_unit(f"{name} {place}", variable.units))
                 values.append(variable.values[:, place].tolist())
     return names, values

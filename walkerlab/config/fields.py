@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, Tag
 from pydantic.fields import FieldInfo
 
 from walkerlab.config.numbers import short
+from walkerlab.labels import with_unit
 
 
 class Block(BaseModel):
@@ -143,4 +144,4 @@ def allowed(field: FieldInfo) -> str:
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds else what
-    return f"{bounds} ({unit})" if unit not in ("", "1") else bounds
+    return with_unit(bounds, unit)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION
+from walkerlab.labels import with_unit
 from walkerlab.store.content import Group
 
 if TYPE_CHECKING:
@@ -62,9 +63,8 @@ def branches_of(results: Results) -> Iterator[Drawn]:
 def label_of(results: Results) -> str:
     """The parameter with its unit, as an axis says it."""
     summary = results[STAGE].summary
-    name, unit = str(summary["over"]), str(summary["unit"])
-    words = {"slope_deg": "slope", "slope_rad": "slope"}.get(name, name)
-    return f"{words} ({unit})" if unit not in ("", "1") else words
+    name = str(summary["over"])
+    return with_unit({"slope_deg": "slope", "slope_rad": "slope"}.get(name, name), str(summary["unit"]))
 
 
 @dataclass(frozen=True)

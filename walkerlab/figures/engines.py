@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
 from walkerlab.figures.canvas import blank, legend_above
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.needs import Need, Results
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 HEIGHT = 4.2  # in
 STAGE, GROUP = "engines", "rows"
 VARIABLES = ("scene", "engine", "experiment", "integrator", "start", "step_s", "error", "wall_s", "period_s", "outcome")
-OURS, SAME_LAW, OWN_LAW = "walkerlab", "same-law", "own-law"
 COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
 OTHERS = (ORANGE, PURPLE, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
+from walkerlab.labels import Label
 from walkerlab.paper.arithmetic import (
     MM,
     PercentOf,
@@ -34,19 +36,13 @@ from walkerlab.solvers.system import State
 
 @dataclass(frozen=True)
 class Erratum:
-    """An error of the paper.
+    """An error of the paper."""
 
-    printed   what it has
-    right     what it should have
-    evidence  by which argument
-    measured  the numbers of that argument, from this run
-    """
-
-    where: str
-    printed: str
-    right: str
-    evidence: str
-    measured: str
+    where: Annotated[str, Label("", "where the paper errs")]
+    printed: Annotated[str, Label("", "as printed")]
+    right: Annotated[str, Label("", "as it should be")]
+    evidence: Annotated[str, Label("", "by which argument")]
+    measured: Annotated[str, Label("", "numbers of that argument, from this run")]
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:

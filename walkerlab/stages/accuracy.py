@@ -8,18 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.hybrid.recorded_walk import as_state, with_scaled_rates
+from walkerlab.labels import labels_of
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
 from walkerlab.stages.progress import Progress
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.columns import rows_group
+from walkerlab.store.content import Content
 
 LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
@@ -65,7 +64,9 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     rows = [row_of(one, run, references[one.trial.name]) for one in climbs for run in one.runs]
     not_run = [entry for one in climbs for entry in left_of(one)]
     summary = {**summary_of(rows, not_run, references, jobs), "left_out": left_out}
-    groups = {f"{scene}/rows": rows_group([row for row in rows if row.scene == scene]) for scene in references}
+    groups = {
+        f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(Row)) for scene in references
+    }
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
 
 
@@ -168,34 +169,3 @@ def conclusion(rows: Sequence[Row], scene: str) -> str:
             text += f", {library[0].wall_s / first.wall_s:.3g} times faster than {library[0].method}"
         parts.append(text)
     return f"{scene}: " + "; ".join(parts) + "."
-
-
-def rows_group(rows: Sequence[Row]) -> Group:
-    """The rows of one scene; the error is masked where the end was not reached."""
-
-    def numbers(name: str) -> NDArray[Any]:
-        return np.array([getattr(row, name) for row in rows])
-
-    def texts(name: str) -> NDArray[Any]:
-        return np.array([getattr(row, name) for row in rows], dtype=object)
-
-    reached = np.array([row.error is not None for row in rows], np.int8)
-    error = np.array([0.0 if row.error is None else row.error for row in rows])
-    row_axis = ("row",)
-    return Group(
-        {
-            "row": Variable(np.arange(len(rows)), row_axis, "1", "row"),
-            "method": Variable(texts("method"), row_axis, "1", "method"),
-            "outcome": Variable(texts("outcome"), row_axis, "1", "outcome"),
-            "tolerance": Variable(numbers("tolerance"), row_axis, "1", "relative tolerance"),
-            "reached": Variable(reached, row_axis, "1", "whether the end state was reached"),
-            "error": Variable(error, row_axis, "1", "largest difference of the end state from the reference, SI units"),
-            "against": Variable(texts("against"), row_axis, "1", "method of the end that it is measured by"),
-            "wall_s": Variable(numbers("wall_s"), row_axis, "s", "median run time", timing=True),
-            "least_wall_s": Variable(numbers("least_wall_s"), row_axis, "s", "least run time", timing=True),
-            "repeats": Variable(numbers("repeats_of_wall_s"), row_axis, "1", "timed repeats", timing=True),
-            "rhs_evaluations": Variable(numbers("rhs_evaluations"), row_axis, "1", "right-hand sides"),
-            "accepted": Variable(numbers("accepted"), row_axis, "1", "accepted steps"),
-            "rejected": Variable(numbers("rejected"), row_axis, "1", "rejected steps"),
-        }
-    )

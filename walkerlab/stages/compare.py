@@ -15,8 +15,9 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import as_state
+from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
-from walkerlab.paper.errata import errata
+from walkerlab.paper.errata import Erratum, errata
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -39,8 +40,9 @@ from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
 from walkerlab.stages.compared_releases import LEFT_OUT, KneedStart, compare_releases
-from walkerlab.stages.compared_tables import errata_group, numbers_group, table_group
+from walkerlab.stages.compared_tables import numbers_group, table_group
 from walkerlab.stages.progress import Progress
+from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
 STEPS_OF_A_STRIDE = 2
@@ -65,10 +67,11 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
     found = errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: table_group(table) for name, table in tables.items()}
+    numbers, stored = [row_summary(row) for row in rows], rows_group(found, labels_of(Erratum))
     return Content(
-        {"paper_numbers": numbers_group(rows), "errata": errata_group(found), **groups, **motion.groups},
+        {"paper_numbers": numbers_group(numbers), "errata": stored, **groups, **motion.groups},
         {
-            "paper_numbers": [row_summary(row) for row in rows],
+            "paper_numbers": numbers,
             "verdicts": verdicts(rows),
             **tables,
             **motion.summary,

@@ -10,7 +10,6 @@ import numpy as np
 
 from walkerlab.hybrid.comparison import (
     IMPACT_PHASE,
-    LEGS,
     PHASES,
     Array,
     Difference,
@@ -20,9 +19,11 @@ from walkerlab.hybrid.comparison import (
     orbit_distances,
 )
 from walkerlab.paper.measured import Errors, LegErrors
+from walkerlab.stages.walk_columns import LEG, STEP, TIME, legs, over_time
+from walkerlab.store.columns import numbered
 from walkerlab.store.content import Group, Variable
 
-LEG, TIME, STEP, PHASE = "leg", "time", "step", "phase"
+PHASE = "phase"
 LAST_STRIDE = 2  # steps
 SENSE = "contact less rigid model"
 
@@ -103,18 +104,13 @@ def of_legs(difference: Difference) -> LegErrors:
     return LegErrors(tuple(difference.largest_angle.tolist()), tuple(difference.largest_velocity.tolist()))
 
 
-def legs() -> Variable:
-    """The legs' coordinate."""
-    return Variable(np.arange(LEGS), (LEG,), "1", "leg: 0 swings first, 1 stands first")
-
-
 def in_time(time: Array, raw: Difference) -> Group:
     """Differences at the same time."""
     dims = (TIME, LEG)
     return Group(
         {
-            TIME: Variable(time, (TIME,), "s", "time"),
-            LEG: legs(),
+            **over_time(time=time),
+            **legs(),
             "raw_angle_error_rad": Variable(raw.angle, dims, "rad", f"angle, {SENSE}, at the same time"),
             "raw_velocity_error_rad_s": Variable(raw.velocity, dims, "rad/s", f"velocity, {SENSE}, at the same time"),
         }
@@ -126,9 +122,9 @@ def in_phase(phases: Array, aligned: Difference) -> Group:
     dims = (STEP, PHASE, LEG)
     return Group(
         {
-            STEP: Variable(np.arange(len(aligned.angle)), (STEP,), "1", "step number"),
+            **numbered(len(aligned.angle), STEP, "step number"),
             PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
-            LEG: legs(),
+            **legs(),
             "aligned_angle_error_rad": Variable(aligned.angle, dims, "rad", f"angle, {SENSE}, at the same phase"),
             "aligned_velocity_error_rad_s": Variable(
                 aligned.velocity, dims, "rad/s", f"velocity, {SENSE}, at the same phase"
@@ -141,4 +137,4 @@ def in_phase(phases: Array, aligned: Difference) -> Group:
 def orbit_group(orbit: Array) -> Group:
     """Distances of the orbits."""
     text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's ranges"
-    return Group({LEG: legs(), "orbit_distance": Variable(orbit, (LEG,), "1", text)})
+    return Group({**legs(), "orbit_distance": Variable(orbit, (LEG,), "1", text)})

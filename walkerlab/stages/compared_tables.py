@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.paper.errata import Erratum
-from walkerlab.paper.verdict import Row
+from walkerlab.store.columns import numbered
 from walkerlab.store.content import Group, Variable
 
 ROW = "row"
@@ -33,6 +32,9 @@ MEANINGS = {
     "paper_percent": "difference rate as printed",
     "percent_of_matlab": "difference in percent of the MATLAB value",
     "percent_of_adams": "difference in percent of the ADAMS value",
+    "printed": "as printed",
+    "verdict": "reproduced, explained or refuted",
+    "evidence": "why",
 }
 """Columns of the tables."""
 BY_ROW = "see the column of units"
@@ -56,44 +58,15 @@ def numbers(name: str, values: Sequence[float | None], long_name: str) -> dict[s
     return column
 
 
-def row_numbers(count: int) -> Variable:
-    """The rows' coordinate."""
-    return Variable(np.arange(count), (ROW,), "1", "row")
-
-
-def numbers_group(rows: Sequence[Row]) -> Group:
-    """Every number of the paper."""
-    variables = {
-        ROW: row_numbers(len(rows)),
-        "where": texts((row.printed.where for row in rows), "where the paper has it"),
-        "quantity": texts((row.printed.quantity for row in rows), "what it is"),
-        "unit": texts((row.printed.unit for row in rows), "unit of the row's numbers"),
-        "printed": texts((row.printed.text for row in rows), "as printed"),
-        "verdict": texts((row.verdict.value for row in rows), "reproduced, explained or refuted"),
-        "evidence": texts((row.evidence for row in rows), "why"),
-    }
-    for name, long_name in MODELS.items():
-        variables |= numbers(name, [getattr(row, name) for row in rows], long_name)
-    return Group(variables)
-
-
-def errata_group(found: Sequence[Erratum]) -> Group:
-    """The errata."""
-    columns = {
-        "where": "where the paper errs",
-        "printed": "as printed",
-        "right": "as it should be",
-        "evidence": "by which argument",
-        "measured": "numbers of that argument, from this run",
-    }
-    variables = {name: texts((getattr(erratum, name) for erratum in found), text) for name, text in columns.items()}
-    return Group({ROW: row_numbers(len(found)), **variables})
-
-
 def table_group(table: Mapping[str, Mapping[str, Any]]) -> Group:
     """One of the paper's tables."""
-    rows = list(table.values())
-    variables = {ROW: row_numbers(len(rows)), "name": texts(table, "symbol of the row")}
+    group = numbers_group(list(table.values()))
+    return Group({**group.variables, "name": texts(table, "symbol of the row")})
+
+
+def numbers_group(rows: Sequence[Mapping[str, Any]]) -> Group:
+    """Numbers of the paper beside those of the models, as the command prints them."""
+    variables = numbered(len(rows), ROW, "row")
     for name in rows[0]:
         values = [row[name] for row in rows]
         if name in MODELS:

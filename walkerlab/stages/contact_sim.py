@@ -39,13 +39,13 @@ from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
+from walkerlab.stages.walk_columns import LEG, NORMAL_FORCE, STEP, TIME, at_samples, legs, of_body, over_time, touches
 from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
 SAMPLES_PER_PENDULUM_TIME = 200
 RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
-TIME, LEG = "time", "leg"
 Floats = NDArray[np.float64]
 
 
@@ -186,14 +186,12 @@ def steps_group(result: ContactWalkResult) -> Group:
     rows = (
         ("period_s", result.periods_s, "s", "time from touch to touch"),
         ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
-        ("touch_time_s", result.touch_time_s, "s", "time of the touch that ends the step"),
         ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
         ("slip_m", result.slip_m, "m", "net slip of the stance foot's material from its touch to its lift"),
         ("rolling_m", result.rolling_m, "m", "how far the stance foot rolled from its touch to its lift"),
     )
-    variables = {"step": Variable(np.arange(result.touch_time_s.size), ("step",), "1", "step number")}
-    variables |= {name: Variable(values, ("step",), units, text) for name, values, units, text in rows}
-    return Group(variables)
+    variables = {name: Variable(values, (STEP,), units, text) for name, values, units, text in rows}
+    return Group(touches(result.touch_time_s) | variables)
 
 
 def pads_group(terrain: Checkerboard, result: ContactWalkResult) -> Group:
@@ -214,11 +212,11 @@ def pads_group(terrain: Checkerboard, result: ContactWalkResult) -> Group:
 
 def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: ContactSamples) -> Group:
     """Samples of the walk: what `outputs` asks for."""
-    per_time, per_leg = (TIME,), (TIME, LEG)
+    per_leg = (TIME, LEG)
     variables = {
-        TIME: Variable(samples.time_s, per_time, "s", "time"),
-        LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
-        "stance_leg": Variable(samples.stance, per_time, "1", "leg of the last step's touch"),
+        **over_time(time=samples.time_s),
+        **legs(),
+        "stance_leg": Variable(samples.stance, (TIME,), "1", "leg of the last step's touch"),
     }
     feet = np.zeros((samples.time_s.size, 2, 5))
     sampled_feet(scene.walker, samples.states, samples.carried, feet)
@@ -230,7 +228,7 @@ def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: Con
         depth = np.where(samples.carried > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
         variables |= {
             "penetration_m": Variable(depth, per_leg, "m", "depth of the foot in the ground that carries it"),
-            "normal_force_N": Variable(feet[:, :, 2], per_leg, "N", "normal force of the ground on the foot"),
+            "normal_force_N": at_samples(feet[:, :, 2], NORMAL_FORCE),
             "friction_force_N": Variable(feet[:, :, 3], per_leg, "N", "friction on the foot, positive downhill"),
             "slip_velocity_m_s": Variable(
                 feet[:, :, 4], per_leg, "m/s", "velocity of the foot's lowest material point"
@@ -248,15 +246,15 @@ def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> 
     hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
     along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
     height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
-    legs = {
-        "angle": Variable(y[:, 2 : 2 + n][:, upper], (TIME, LEG), "rad", "angle of the leg from the vertical"),
-        "velocity": Variable(y[:, 4 + n :][:, upper], (TIME, LEG), "rad/s", "angular velocity of the leg"),
-        "hip_along_m": Variable(along, (TIME,), "m", "position of the hip along the slope"),
-        "hip_height_m": Variable(height, (TIME,), "m", "height of the hip over the slope"),
-        "foot_along_m": Variable(feet[:, :, 0], (TIME, LEG), "m", "position of the foot along the slope"),
-        "foot_height_m": Variable(feet[:, :, 1], (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
-    }
-    return legs | knee_variables(scene, y, along, height) | torso_variables(scene, y)
+    of_legs = over_time(
+        angle=y[:, 2 : 2 + n][:, upper],
+        velocity=y[:, 4 + n :][:, upper],
+        hip_along_m=along,
+        hip_height_m=height,
+        foot_along_m=feet[:, :, 0],
+        foot_height_m=feet[:, :, 1],
+    )
+    return of_legs | knee_variables(scene, y, along, height) | torso_variables(scene, y)
 
 
 def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height: Floats) -> dict[str, Variable]:
@@ -265,7 +263,7 @@ def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height
     if not isinstance(knees, Knees):
         return {}
     n, names = len(scene.frame.hip_x), [body.name for body in scene.assembly.bodies]
-    shanks, per_leg = list(knees.shanks), (TIME, LEG)
+    shanks = list(knees.shanks)
     along, height = np.zeros((y.shape[0], 2)), np.zeros((y.shape[0], 2))
     for leg, (thigh, shank) in enumerate(zip(knees.thighs, knees.shanks, strict=True)):
         hip = hinge_of(scene.assembly, names[thigh], names[knees.thighs[1 - leg]])
@@ -273,12 +271,8 @@ def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height
         ahead, up = knee[0] - hip[0], knee[1] - hip[1]
         s, c = np.sin(y[:, 2 + thigh] + scene.walker.slope), np.cos(y[:, 2 + thigh] + scene.walker.slope)
         along[:, leg], height[:, leg] = hip_along + c * ahead - s * up, hip_height + s * ahead + c * up
-    return {
-        "shank_angle": Variable(y[:, 2 : 2 + n][:, shanks], per_leg, "rad", "angle of the shank from the vertical"),
-        "shank_velocity": Variable(y[:, 4 + n :][:, shanks], per_leg, "rad/s", "angular velocity of the shank"),
-        "knee_along_m": Variable(along, per_leg, "m", "position of the knee along the slope"),
-        "knee_height_m": Variable(height, per_leg, "m", "height of the knee over the slope"),
-    }
+    angle, velocity = y[:, 2 : 2 + n][:, shanks], y[:, 4 + n :][:, shanks]
+    return of_body("shank", angle, velocity) | over_time(knee_along_m=along, knee_height_m=height)
 
 
 def torso_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
@@ -287,10 +281,7 @@ def torso_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     if TORSO not in names:
         return {}
     n, torso = len(names), names.index(TORSO)
-    return {
-        "torso_angle": Variable(y[:, 2 + torso], (TIME,), "rad", "angle of the torso from the vertical"),
-        "torso_velocity": Variable(y[:, 4 + n + torso], (TIME,), "rad/s", "angular velocity of the torso"),
-    }
+    return of_body(TORSO, y[:, 2 + torso], y[:, 4 + n + torso])
 
 
 def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
@@ -304,14 +295,12 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) ->
     potential = energies[:, 1] - of_foot
     lost = samples.dissipated_J
     residual = energies[:, 2] + lost.sum(axis=1) - energies[:1, 2]
+    plotted = over_time(kinetic_J=energies[:, 0], potential_J=potential, mechanical_J=energies[:, 0] + potential)
     rows = (
-        ("kinetic_J", energies[:, 0], "kinetic energy"),
-        ("potential_J", potential, "potential energy from the current stance foot"),
-        ("mechanical_J", energies[:, 0] + potential, "kinetic and potential energy from the current stance foot"),
         ("book_mechanical_J", energies[:, 2], "kinetic, potential from a fixed origin, and elastic energy"),
         ("dissipated_damping_J", lost[:, 0], "dissipated in normal direction so far"),
         ("dissipated_friction_J", lost[:, 1], "dissipated in friction so far"),
         ("lost_at_edges_J", lost[:, 2], "elastic energy lost at pads' edges so far"),
         ("residual_J", residual, "book energy plus what was lost, less the start's"),
     )
-    return {name: Variable(values, (TIME,), "J", text) for name, values, text in rows}
+    return plotted | {name: Variable(values, (TIME,), "J", text) for name, values, text in rows}

@@ -3,25 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
+from walkerlab.labels import Label
 from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.families import Branch, strike_to_strike
 from walkerlab.orbits.regions import Regions
 from walkerlab.orbits.step_maps import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
+from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
 
 if TYPE_CHECKING:
     from walkerlab.stages.continuation import Followed
 
-POINT, STEP = ("point",), ("point", "step")
+MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
+PERIOD = Label("1", "steps of the gait")
+STANCE = Label("rad", "stance leg just after each heel strike", name="stance_angle")
+CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
+BIFURCATIONS = {"kind": KIND, "period": PERIOD, "branch": Label("1", "number of the branch")}
+EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "its standard error")}
+POINTS = {
+    "stable": Label("1", "whether disturbances die out"),
+    "periods_s": Label("s", "durations of the steps", ("step",), name="step_period"),
+    "lengths_m": Label("m", "lengths of the steps", ("step",), name="step_length"),
+    "angles": replace(STANCE, dims=("step",)),
+    "z": Label("1", "section coordinates", ("coordinate",), name="section"),
+}
+ATTRACTORS = {
+    "period": Label("1", "steps after which it repeats; 0: never"),
+    "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
+    "angles": replace(STANCE, dims=("visit",)),
+}
 
 
 def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation) -> dict[str, Any]:
@@ -33,11 +52,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "to": asked.most,
         "branches": [branch_summary(one.model, branch) for one in found for branch in one.branches],
         "bifurcations": [row for one in found for row in bifurcation_rows(one)],
-        "lyapunov": [
-            {"model": one.model, "value": e.value, "exponent": e.exponent, "uncertainty": e.uncertainty}
-            for one in found
-            for e in one.exponents
-        ],
+        "lyapunov": [{"model": one.model, **asdict(exponent)} for one in found for exponent in one.exponents],
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
         "attractors": [attractor_summary(one.model, one.attractors) for one in found if one.attractors.found],
@@ -151,18 +166,6 @@ def curve_group(curve: BifurcationCurve, parameter: Parameter, second: Span) -> 
     )
 
 
-def curve_overview(rows: Sequence[dict[str, Any]]) -> Group:
-    """Every curve of every model in a row."""
-    along = ("curve",)
-    return Group(
-        {
-            "model": Variable(np.array([row["model"] for row in rows]), along, "", "model"),
-            "kind": Variable(np.array([row["kind"] for row in rows]), along, "", "fold or flip"),
-            "period": Variable(np.array([row["period"] for row in rows]), along, "1", "steps of the gait"),
-        }
-    )
-
-
 def regions_group(regions: Regions, parameter: Parameter, second: Span) -> Group:
     """What walks settle on over the plane of both parameters."""
     periods = "steps after which walks repeat themselves; 0: never, -1: none goes on"
@@ -189,7 +192,7 @@ def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation)
     stored: dict[str, Group] = {"branches": overview(branches, parameter)} if branches else {}
     curves = [row for one in found for row in curve_rows(one)]
     if curves:
-        stored["curves"] = curve_overview(curves)
+        stored["curves"] = Group(columns(curves, CURVES, "curve"))
     for one in found:
         if one.step_map is None:
             continue
@@ -205,24 +208,22 @@ def groups(found: Sequence[Followed], parameter: Parameter, block: Continuation)
         if rows:
             stored[f"{one.model}/bifurcations"] = bifurcation_group(rows, parameter)
         if one.exponents:
-            stored[f"{one.model}/lyapunov"] = lyapunov_group(one, parameter)
+            stored[f"{one.model}/lyapunov"] = Group(columns(one.exponents, value_of(parameter) | EXPONENTS, "sample"))
         if one.attractors.found:
-            stored[f"{one.model}/attractor"] = attractor_group(one.attractors, parameter)
+            found_on = columns(one.attractors.found, value_of(parameter) | ATTRACTORS, "sample")
+            stored[f"{one.model}/attractor"] = Group(found_on)
     return stored
 
 
 def overview(rows: Sequence[dict[str, Any]], parameter: Parameter) -> Group:
     """Every branch of every model in a row."""
-    along = ("branch",)
-    return Group(
-        {
-            "model": Variable(np.array([row["model"] for row in rows]), along, "", "model"),
-            "period": Variable(np.array([row["period"] for row in rows]), along, "1", "steps of the gait"),
-            "from": Variable(np.array([row["from"] for row in rows]), along, parameter.unit, "where it begins"),
-            "to": Variable(np.array([row["to"] for row in rows]), along, parameter.unit, "where it ends"),
-        },
-        {"over": parameter.key},
-    )
+    ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
+    return Group(columns(rows, {"model": MODEL, "period": PERIOD, **ends}, "branch"), {"over": parameter.key})
+
+
+def value_of(parameter: Parameter) -> dict[str, Label]:
+    """The column of the parameter's values."""
+    return {"value": Label(parameter.unit, parameter.key)}
 
 
 class Mark(NamedTuple):
@@ -257,13 +258,16 @@ def birth_of(branch: Branch, branches: Sequence[Branch]) -> list[Mark]:
 
 def mark_variables(marks: Sequence[Mark], parameter: Parameter) -> dict[str, Variable]:
     """Where on a branch its bifurcations are."""
-    along, steps = ("mark",), ("mark", "step")
+    steps = ("mark", "step")
     periods = np.array([strike_to_strike(mark.cycle) for mark in marks])
     angles = np.array([[step.angle for step in mark.cycle.steps] for mark in marks])
+    labels = {
+        "after": Label("1", "point before a bifurcation; -1: none", name="mark_after"),
+        "kind": replace(KIND, name="mark_kind"),
+        "value": Label(parameter.unit, "where it is", name="mark_value"),
+    }
     return {
-        "mark_after": Variable(np.array([m.after for m in marks]), along, "1", "point before a bifurcation; -1: none"),
-        "mark_kind": Variable(np.array([m.kind for m in marks]), along, "", "fold, flip or torus"),
-        "mark_value": Variable(np.array([m.value for m in marks]), along, parameter.unit, "where it is"),
+        **columns(marks, labels, "mark"),
         "mark_step_period": Variable(periods, steps, "s", "durations of the steps there"),
         "mark_stance_angle": Variable(angles, steps, "rad", "stance leg just after each heel strike there"),
     }
@@ -272,22 +276,14 @@ def mark_variables(marks: Sequence[Mark], parameter: Parameter) -> dict[str, Var
 def branch_group(branch: Branch, marks: Sequence[Mark], monitors: Sequence[Monitor], parameter: Parameter) -> Group:
     """The gaits of a branch in their order along it."""
     points = branch.points
-    multipliers = np.array([point.multipliers for point in points])
+    multipliers = [point.multipliers for point in points]
     variables = {
-        "value": Variable(branch.values, POINT, parameter.unit, parameter.key),
-        "stable": Variable(np.array([point.stable for point in points]), POINT, "1", "whether disturbances die out"),
-        "step_period": Variable(np.array([p.periods_s for p in points]), STEP, "s", "durations of the steps"),
-        "step_length": Variable(np.array([p.lengths_m for p in points]), STEP, "m", "lengths of the steps"),
-        "stance_angle": Variable(
-            np.array([p.angles for p in points]), STEP, "rad", "stance leg just after each heel strike"
-        ),
-        "section": Variable(np.array([p.z for p in points]), ("point", "coordinate"), "1", "section coordinates"),
-        "multiplier_real": Variable(multipliers.real, ("point", "multiplier"), "1", "multiplier, real part"),
-        "multiplier_imag": Variable(multipliers.imag, ("point", "multiplier"), "1", "multiplier, imaginary part"),
+        **columns(points, value_of(parameter) | POINTS, "point"),
+        **real_and_imaginary("multiplier", multipliers, ("point", "multiplier"), "multiplier"),
     }
-    for column, monitor in enumerate(monitors):
-        values = np.array([point.monitors[column] for point in points])
-        variables[monitor.name] = Variable(values, POINT, monitor.unit, monitor.meaning)
+    for place, monitor in enumerate(monitors):
+        label = Label(monitor.unit, monitor.meaning)
+        variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
     if marks:
         variables |= mark_variables(marks, parameter)
     attrs: dict[str, Attribute] = {
@@ -300,44 +296,11 @@ def branch_group(branch: Branch, marks: Sequence[Mark], monitors: Sequence[Monit
 
 def bifurcation_group(rows: Sequence[dict[str, Any]], parameter: Parameter) -> Group:
     """The bifurcations of a model."""
-    along = ("bifurcation",)
-    multipliers = np.array([row["multiplier"] for row in rows])
+    multipliers = [complex(*row["multiplier"]) for row in rows]
+    along = "bifurcation"
     return Group(
         {
-            "kind": Variable(np.array([row["kind"] for row in rows]), along, "", "fold, flip or torus"),
-            "period": Variable(np.array([row["period"] for row in rows]), along, "1", "steps of the gait"),
-            "branch": Variable(np.array([row["branch"] for row in rows]), along, "1", "number of the branch"),
-            "value": Variable(np.array([row["value"] for row in rows]), along, parameter.unit, parameter.key),
-            "multiplier_real": Variable(multipliers[:, 0], along, "1", "critical multiplier, real part"),
-            "multiplier_imag": Variable(multipliers[:, 1], along, "1", "critical multiplier, imaginary part"),
-        }
-    )
-
-
-def lyapunov_group(followed: Followed, parameter: Parameter) -> Group:
-    """The largest Lyapunov exponent over the parameter."""
-    rows, along = followed.exponents, ("sample",)
-    return Group(
-        {
-            "value": Variable(np.array([one.value for one in rows]), along, parameter.unit, parameter.key),
-            "exponent": Variable(np.array([one.exponent for one in rows]), along, "1", "largest exponent per step"),
-            "uncertainty": Variable(np.array([one.uncertainty for one in rows]), along, "1", "its standard error"),
-        }
-    )
-
-
-def attractor_group(attractors: Attractors, parameter: Parameter) -> Group:
-    """Steps on the attractor over the parameter."""
-    rows, along = attractors.found, ("sample", "visit")
-    return Group(
-        {
-            "value": Variable(np.array([one.value for one in rows]), ("sample",), parameter.unit, parameter.key),
-            "period": Variable(
-                np.array([one.period for one in rows]), ("sample",), "1", "steps after which it repeats; 0: never"
-            ),
-            "step_period": Variable(np.array([one.periods_s for one in rows]), along, "s", "durations of steps on it"),
-            "stance_angle": Variable(
-                np.array([one.angles for one in rows]), along, "rad", "stance leg just after each heel strike"
-            ),
+            **columns(rows, value_of(parameter) | BIFURCATIONS, along),
+            **real_and_imaginary("multiplier", multipliers, (along,), "critical multiplier"),
         }
     )

@@ -6,24 +6,17 @@ import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab import __version__
 from walkerlab.benchmarks.engines.experiments import (
     EXACT_ENOUGH,
-    OURS,
-    OWN_LAW,
     OWN_TOUCHES,
-    SAME_LAW,
-    Row,
-    SwingRow,
     Truth,
-    TuningRow,
     adams_rows,
     has_settled,
     least_wall,
@@ -37,11 +30,14 @@ from walkerlab.benchmarks.engines.experiments import (
 )
 from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
+from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, Row, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.errors import NoAnswer
+from walkerlab.labels import labels_of
 from walkerlab.stages.progress import Progress
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.columns import rows_group
+from walkerlab.store.content import Content
 
 LEVELS = (1e-3, 1e-5)
 THREE_DIGITS = 5e-4  # relative
@@ -145,9 +141,8 @@ def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Trut
 
 def content(found: Findings, rigid: Mapping[str, Any] | None) -> Content:
     """What is stored and printed."""
-    groups = {"rows": group_of(found.rows, ROW), "swings": group_of(found.swings, SWING)}
-    if found.tuning:
-        groups["tuning"] = group_of(found.tuning, TUNING)
+    stored = (("rows", Row, found.rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
+    groups = {name: rows_group(rows, labels_of(kind)) for name, kind, rows in stored if rows}
     return Content(groups, summary(found, rigid), timed=("ratios", "conclusions", "environment"))
 
 
@@ -368,67 +363,3 @@ def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
     if told:
         sentences.append(f"Three digits of their own period take steps of at most: {told}.")
     return " ".join(sentences)
-
-
-ROW = {
-    "scene": ("", "scene"),
-    "engine": ("", "engine"),
-    "version": ("", "version of the engine"),
-    "experiment": ("", "experiment"),
-    "integrator": ("", "integrator, or contact model on its own law"),
-    "start": ("1", "velocities of the start over those of the gait"),
-    "step_s": ("s", "step size, the mean one where steps are adapted"),
-    "tolerance": ("1", "relative tolerance where steps are adapted"),
-    "error": ("1", "difference of the end state (SI), or of the last period (s) on its own law, from the reference"),
-    "touch_error_s": ("s", "largest difference of a touch time from the reference"),
-    "wall_s": ("s", "run time"),
-    "period_s": ("s", "period of the last step"),
-    "step_length_m": ("m", "length of the last step"),
-    "slip_m": ("m", "net slip of the last step"),
-    "steps": ("1", "steps walked"),
-    "outcome": ("", "outcome"),
-}
-SWING = {
-    "scene": ("", "scene"),
-    "engine": ("", "engine"),
-    "integrator": ("", "integrator"),
-    "promised_order": ("1", "order that the integrator promises"),
-    "step_s": ("s", "step size, the largest one where steps are adapted"),
-    "tolerance": ("1", "relative tolerance where steps are adapted"),
-    "error": ("1", "largest difference of the end state, rad and rad/s"),
-    "energy_drift_j": ("J", "change of the mechanical energy"),
-    "order": ("1", "order observed against the run with twice the step"),
-    "wall_s": ("s", "run time"),
-}
-TUNING = {
-    "scene": ("", "scene"),
-    "engine": ("", "engine"),
-    "contact": ("", "contact model"),
-    "quantity": ("", "quantity"),
-    "unit": ("", "its unit"),
-    "target": ("1", "what it was tuned to, in the unit named beside it"),
-    "reached": ("1", "what was measured, in the unit named beside it"),
-}
-
-
-def group_of(rows: Sequence[Any], columns: Mapping[str, tuple[str, str]]) -> Group:
-    """Rows as columns; a number that is absent is a gap."""
-    variables = {"row": Variable(np.arange(len(rows)), ("row",), "1", "row")}
-    for name, (units, said) in columns.items():
-        values = [getattr(row, name) for row in rows]
-        variables[name] = column(values, units, said, timing=name == "wall_s")
-    return Group(variables)
-
-
-def column(values: Sequence[Any], units: str, said: str, timing: bool) -> Variable:
-    """One column."""
-    array: NDArray[Any]
-    if units == "":
-        return Variable(np.array(values, dtype=object), ("row",), "1", said)
-    if any(value is None for value in values):
-        array = np.array([np.nan if value is None else float(value) for value in values])
-        return Variable(array, ("row",), units, said, timing=timing, missing=True)
-    return Variable(np.array(values), ("row",), units, said, timing=timing)
-
-
-assert set(ROW) <= {one.name for one in fields(Row)}, "every column is a field of a row"

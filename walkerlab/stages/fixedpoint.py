@@ -9,26 +9,30 @@ import numpy as np
 
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
+from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.orbits.gait import Gait
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 from walkerlab.stages.progress import Progress
+from walkerlab.store.columns import printed, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 
-GAIT = ("gait",)
-# of each gait: key, attribute, unit, meaning
-COLUMNS = (
-    ("period_s", "period", "s", "duration of a step"),
-    ("step_length_m", "step_length", "m", "length of a step along the slope"),
-    ("spectral_radius", "spectral_radius", "1", "largest magnitude of a multiplier"),
-    ("stable", "stable", "1", "whether small disturbances die out"),
-    ("residual", "residual", "rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
-    ("energy_J", "energy", "J", "time mean of the energy from the stance foot"),
-    ("energy_drift_J", "energy_drift", "J", "spread of the energy within the swing"),
-    ("min_normal_force_N", "min_normal_force", "N", "least normal force on the stance foot"),
-    ("max_friction_ratio", "max_friction_ratio", "1", "largest ratio of tangential to normal force"),
-    ("max_scuff_depth_m", "max_scuff_depth", "m", "depth of the swing foot below the slope"),
-)
+GAIT = "gait"
+NUMBERS = {
+    "period": Label("s", "duration of a step", name="period_s"),
+    "step_length": Label("m", "length of a step along the slope", name="step_length_m"),
+    "spectral_radius": Label("1", "largest magnitude of a multiplier"),
+    "stable": Label("1", "whether small disturbances die out"),
+    "residual": Label("rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
+    "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
+    "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
+    "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
+    "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
+    "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
+}
+"""What is stored and printed of a gait, each a field of `Gait`."""
+OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
+STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -82,6 +86,11 @@ def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, A
     }
 
 
+def numbers_of(gait: Gait) -> dict[str, Label]:
+    """What is stored and printed of a gait, with or without knees."""
+    return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
+
+
 def listed(search: GaitSearch, index: int) -> dict[str, Any]:
     """One of the gaits found, and why it was or was not chosen."""
     gait = search.gaits[index]
@@ -91,12 +100,10 @@ def listed(search: GaitSearch, index: int) -> dict[str, Any]:
 
 def gait_summary(gait: Gait) -> dict[str, Any]:
     """One gait in SI units."""
-    knee = {} if gait.knee_strike is None else {"knee_strike_s": gait.knee_strike}
     return {
-        **knee,
         "state": list(gait.state),
         "multipliers": [[value.real, value.imag] for value in gait.multipliers],
-        **{key: getattr(gait, attribute) for key, attribute, _, _ in COLUMNS},
+        **printed(gait, numbers_of(gait)),
         "found_by": list(gait.found_by),
     }
 
@@ -104,28 +111,20 @@ def gait_summary(gait: Gait) -> dict[str, Any]:
 def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     """Every gait found, one row each."""
     gaits = search.gaits
-    states = np.array([gait.state for gait in gaits])
-    multipliers = np.array([gait.multipliers for gait in gaits])
+    multipliers = [gait.multipliers for gait in gaits]
     found_by = np.array(["; ".join(gait.found_by) for gait in gaits])
     objections = np.array(["; ".join(gait.objections) for gait in gaits])
     variables = {
-        "gait": Variable(np.arange(len(gaits)), GAIT, "1", "gait, shortest period first"),
+        **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
+        **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), "multiplier"),
         "coordinate": Variable(np.array(coordinates(config)), ("coordinate",), "", "coordinate of the state"),
-        "state": Variable(states, ("gait", "coordinate"), "rad, rad/s", "state just after heel strike"),
-        "multiplier_real": Variable(multipliers.real, ("gait", "multiplier"), "1", "multiplier, real part"),
-        "multiplier_imag": Variable(multipliers.imag, ("gait", "multiplier"), "1", "multiplier, imaginary part"),
-        "random_hits": Variable(np.array(search.random_hits), GAIT, "1", "random starting values that led here"),
-        "found_by": Variable(found_by, GAIT, "", "searches that led here"),
-        "objections": Variable(objections, GAIT, "", "why the gait cannot be walked"),
+        "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starting values that led here"),
+        "found_by": Variable(found_by, (GAIT,), "", "searches that led here"),
+        "objections": Variable(objections, (GAIT,), "", "why the gait cannot be walked"),
     }
-    for key, attribute, units, text in COLUMNS:
-        variables[key] = Variable(np.array([getattr(gait, attribute) for gait in gaits]), GAIT, units, text)
     attrs: dict[str, Any] = {
         "slope_rad": config.slope_rad,
         "reason": search.reason,
         "random_starts": search.random_starts,
     }
-    if gaits[0].knee_strike is not None:
-        times = np.array([gait.knee_strike for gait in gaits])
-        variables["knee_strike_s"] = Variable(times, GAIT, "s", "time of the knee strike after the heel strike")
     return Group(variables, attrs if search.chosen is None else {**attrs, "chosen": search.chosen})

@@ -17,9 +17,9 @@ from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
+from walkerlab.stages.walk_columns import STEP, TIME, legs, of_body, over_time
+from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable
-
-STEP, TIME, LEG = "step", "time", "leg"
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -82,7 +82,7 @@ def steps_group(scene: RigidScene, walk: RecordedWalk) -> Group:
     states = (STEP, "coordinate")
     return Group(
         {
-            STEP: Variable(np.arange(walk.steps), (STEP,), "1", "step number"),
+            **numbered(walk.steps, STEP, "step number"),
             "coordinate": Variable(np.array(scene.names), ("coordinate",), "", "coordinate of the state"),
             "period_s": Variable(walk.periods, (STEP,), "s", "time from heel strike to heel strike"),
             "length_m": Variable(walk.lengths, (STEP,), "m", "distance between the feet at heel strike"),
@@ -98,7 +98,7 @@ def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) ->
     # leg 0 swings in even steps, leg 1 in odd ones
     stance = 1 - samples.step % 2
     variables = {
-        TIME: Variable(samples.time, (TIME,), "s", "time"),
+        **over_time(time=samples.time),
         STEP: Variable(samples.step, (TIME,), "1", "step number"),
         "stance_leg": Variable(stance, (TIME,), "1", "leg that stands"),
     }
@@ -107,7 +107,8 @@ def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) ->
         variables |= body_variables(scene, samples, stance)
         variables |= place_variables(scene, walk, samples, stance)
     if scene.energies:
-        variables |= energy_variables(energies(scene.walker, samples.state))
+        kinetic, potential = energies(scene.walker, samples.state).T
+        variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if scene.forces:
         force = reactions(scene.walker, samples.state, samples.bent)
         variables |= {
@@ -122,11 +123,7 @@ def leg_variables(samples: Samples, stance: Any) -> dict[str, Variable]:
     n = samples.state.shape[1] // 2
     angle = of_legs(samples.state[:, :2], stance)
     velocity = of_legs(samples.state[:, n : n + 2], stance)
-    return {
-        LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
-        "angle": Variable(angle, (TIME, LEG), "rad", "angle of the leg from the vertical"),
-        "velocity": Variable(velocity, (TIME, LEG), "rad/s", "angular velocity of the leg"),
-    }
+    return {**legs(), **over_time(angle=angle, velocity=velocity)}
 
 
 def of_legs(by_role: Any, stance: Any) -> Any:
@@ -136,18 +133,14 @@ def of_legs(by_role: Any, stance: Any) -> Any:
 
 def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Angles and velocities of the bodies below and above the legs: shanks, a torso."""
-    n, found = samples.state.shape[1] // 2, {}
+    n = samples.state.shape[1] // 2
+    found: dict[str, Variable] = {}
     for k, name in enumerate(scene.names[2:n], 2):
         angle, rate = samples.state[:, k], samples.state[:, n + k]
-        body = name.split("_")[-1]
         if name.startswith("theta_1_"):  # the stance leg's is in line with it
-            legs = of_legs(np.column_stack((angle, samples.state[:, 1])), stance)
-            rates = of_legs(np.column_stack((rate, samples.state[:, n + 1])), stance)
-            found[f"{body}_angle"] = Variable(legs, (TIME, LEG), "rad", f"angle of the leg's {body} from the vertical")
-            found[f"{body}_velocity"] = Variable(rates, (TIME, LEG), "rad/s", f"angular velocity of the leg's {body}")
-        else:
-            found[f"{body}_angle"] = Variable(angle, (TIME,), "rad", f"angle of the {body} from the vertical")
-            found[f"{body}_velocity"] = Variable(rate, (TIME,), "rad/s", f"angular velocity of the {body}")
+            angle = of_legs(np.column_stack((angle, samples.state[:, 1])), stance)
+            rate = of_legs(np.column_stack((rate, samples.state[:, n + 1])), stance)
+        found |= of_body(name.split("_")[-1], angle, rate)
     return found
 
 
@@ -157,24 +150,10 @@ def place_variables(scene: RigidScene, walk: RecordedWalk, samples: Samples, sta
     ground = np.zeros_like(at.contact)
     foot_along = of_legs(np.column_stack((at.swing_foot[:, 0], at.contact)), stance)
     foot_height = of_legs(np.column_stack((at.swing_foot[:, 1], ground)), stance)
-    found = {
-        "hip_along_m": Variable(at.hip[:, 0], (TIME,), "m", "position of the hip along the slope"),
-        "hip_height_m": Variable(at.hip[:, 1], (TIME,), "m", "height of the hip over the slope"),
-        "foot_along_m": Variable(foot_along, (TIME, LEG), "m", "position of the foot along the slope"),
-        "foot_height_m": Variable(foot_height, (TIME, LEG), "m", "height of the foot's lowest point over the slope"),
-    }
+    found = over_time(
+        hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1], foot_along_m=foot_along, foot_height_m=foot_height
+    )
     if at.knees is not None:
         along, height = (of_legs(at.knees[:, :, axis], stance) for axis in range(2))
-        found["knee_along_m"] = Variable(along, (TIME, LEG), "m", "position of the knee along the slope")
-        found["knee_height_m"] = Variable(height, (TIME, LEG), "m", "height of the knee over the slope")
+        found |= over_time(knee_along_m=along, knee_height_m=height)
     return found
-
-
-def energy_variables(parts: Any) -> dict[str, Variable]:
-    """Energies as the paper plots them, from the current stance foot."""
-    rows = (
-        ("kinetic_J", parts[:, 0], "kinetic energy"),
-        ("potential_J", parts[:, 1], "potential energy from the current stance foot"),
-        ("mechanical_J", parts[:, 0] + parts[:, 1], "kinetic and potential energy from the current stance foot"),
-    )
-    return {name: Variable(values, (TIME,), "J", text) for name, values, text in rows}

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
+from walkerlab.labels import labels_of
 from walkerlab.scene.contact import pads_pitch
 from walkerlab.scene.left_out import of_verification
 from walkerlab.stages.contact_sim import own_pitch, rigid_start
-from walkerlab.stages.known_problems import known_group, known_of, known_row, rows_group
+from walkerlab.stages.known_problems import known_group, known_of, known_row
 from walkerlab.stages.progress import Progress
+from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group
 from walkerlab.verification.catalogue import judged
 from walkerlab.verification.cells import cells_of, run_cells
@@ -93,53 +96,17 @@ def summary_of(cases: Sequence[CaseResult], known: Sequence[Known], ordinary: Se
 
 def case_row(case: CaseResult) -> dict[str, Any]:
     """A case with every measure that was taken."""
+    told = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
+    told |= {name: list(told[name]) for name in ("expected", "not_measured")}
     measures = [{"measure": one.measure, "value": one.value, "limit": one.limit, "ok": one.ok} for one in case.findings]
-    return {
-        "name": case.name,
-        "family": case.family,
-        "model": case.model,
-        "reason": case.reason,
-        "expected": list(case.expected),
-        "outcome": case.outcome,
-        "ok": case.ok,
-        "steps": case.steps,
-        "energy_balance_residual_J": case.residual_J,
-        "rhs_evaluations": case.rhs_evaluations,
-        "wall_s": case.wall_s,
-        "note": "; ".join(case.failures),
-        "measures": measures,
-        "not_measured": [{"measure": one.measure, "why": one.why} for one in case.not_measured],
-        "second_method": case.second_method,
-        "second_tried": case.second_tried,
-    }
+    return {**told, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}
 
 
 def ordinary_row(choice: Choice) -> dict[str, Any]:
     """An ordinary method on a case; without an error if it did not arrive."""
-    row: dict[str, Any] = {
-        "case": choice.case,
-        "method": choice.method,
-        "verdict": choice.verdict,
-        "rhs_evaluations": choice.rhs_evaluations,
-        "wall_s": choice.wall_s,
-    }
-    return row if choice.error is None else row | {"error": choice.error}
+    return {name: value for name, value in asdict(choice).items() if value is not None}
 
 
 def cases_group(cases: Sequence[CaseResult]) -> Group:
     """The table of cases."""
-    columns: list[tuple[str, Any, str, str]] = [
-        ("name", [case.name for case in cases], "", "name of the case"),
-        ("family", [case.family for case in cases], "", "family of the case"),
-        ("outcome", [case.outcome for case in cases], "", "how it ended"),
-        ("ok", [case.ok for case in cases], "1", "whether it ended as expected and passed every measure"),
-        ("steps", [case.steps for case in cases], "1", "steps walked"),
-        (
-            "energy_balance_residual_J",
-            [case.residual_J for case in cases],
-            "J",
-            "largest residual of the energy balance",
-        ),
-        ("rhs_evaluations", [case.rhs_evaluations for case in cases], "1", "right-hand sides evaluated"),
-    ]
-    return rows_group("case", len(cases), columns)
+    return rows_group(cases, labels_of(CaseResult), "case", "number of the row")

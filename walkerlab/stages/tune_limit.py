@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion
 from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait
 from walkerlab.orbits.rigid_limit import (
     ALL,
@@ -36,34 +35,42 @@ from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import leg_variables
-from walkerlab.store.content import Group, Variable
+from walkerlab.store.columns import columns, printed, rows_group
+from walkerlab.store.content import Group
 
 FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
 COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
 OTHERS_EVERY = 3  # of the settings, for other walkers than the compass: their walks take several times as long
-# of each setting: name, unit, meaning, whether it is a run time
-COLUMNS = (
-    ("period", "period_s", "s", "period of the contact gait"),
-    ("length", "step_length_m", "m", "its step length"),
-    ("slip", "slip_m", "m", "its slip a step"),
-    ("period_error", "period_error_s", "s", "its period less the rigid gait's"),
-    ("length_error", "length_error_m", "m", "its step length less the rigid gait's"),
-    ("numerical_period", "numerical_period_s", "s", "change of the period with a tolerance ten times tighter"),
-)
-WALK_COLUMNS = (
-    ("angle", "angle_error_rad", "rad", "largest difference of an angle from the rigid walk in phase, between impacts"),
-    (
-        "velocity",
-        "velocity_error_rad_s",
-        "rad/s",
-        "largest difference of an angular velocity in phase, between impacts",
+SETTING = "setting"
+FACTORS = {
+    "stiffness": Label("1", "factor on the stiffness", name="stiffness_factor"),
+    "damping": Label("1", "factor on the damping", name="damping_factor"),
+    "stiction": Label("1", "factor on the stiction and friction velocity", name="stiction_velocity_factor"),
+}
+DISTANCES = {
+    "period": Label("s", "period of the contact gait", name="period_s"),
+    "length": Label("m", "its step length", name="step_length_m"),
+    "slip": Label("m", "its slip a step", name="slip_m"),
+    "period_error": Label("s", "its period less the rigid gait's", name="period_error_s"),
+    "length_error": Label("m", "its step length less the rigid gait's", name="length_error_m"),
+    "numerical_period": Label(
+        "s", "change of the period with a tolerance ten times tighter", name="numerical_period_s"
     ),
-    ("raw_angle", "raw_angle_error_rad", "rad", "largest difference of an angle at the same time"),
-    ("raw_velocity", "raw_velocity_error_rad_s", "rad/s", "largest difference of an angular velocity at the same time"),
-    ("numerical_time", "numerical_time_s", "s", "change of the last touch with a tolerance a hundred times tighter"),
-    ("evaluations", "rhs_evaluations", "1", "right-hand sides of the walk"),
-    ("wall_s", "wall_s", "s", "processor time of the walk"),
-)
+}
+IN_PHASE = "in phase, between impacts"
+OF_WALKS = {
+    "angle": Label("rad", f"largest difference of an angle from the rigid walk {IN_PHASE}", name="angle_error_rad"),
+    "velocity": Label("rad/s", f"largest difference of an angular velocity {IN_PHASE}", name="velocity_error_rad_s"),
+    "raw_angle": Label("rad", "largest difference of an angle at the same time", name="raw_angle_error_rad"),
+    "raw_velocity": Label(
+        "rad/s", "largest difference of an angular velocity at the same time", name="raw_velocity_error_rad_s"
+    ),
+    "numerical_time": Label(
+        "s", "change of the last touch with a tolerance a hundred times tighter", name="numerical_time_s"
+    ),
+    "evaluations": Label("1", "right-hand sides of the walk", name="rhs_evaluations"),
+    "wall_s": Label("s", "processor time of the walk", timing=True),
+}
 
 
 @dataclass(frozen=True)
@@ -156,17 +163,9 @@ def reached(distances: list[Distance]) -> dict[str, Any]:
 
 def setting(one: Distance) -> dict[str, Any]:
     """A setting and how far it is from the rigid walk."""
-    return {
-        "stiffness_factor": one.setting.stiffness,
-        "damping_factor": one.setting.damping,
-        "stiction_velocity_factor": one.setting.stiction,
-        "period_error_s": one.period_error,
-        "angle_error_rad": one.angle,
-        "velocity_error_rad_s": one.velocity,
-        "raw_angle_error_rad": one.raw_angle,
-        "numerical_time_s": one.numerical_time,
-        "run_wall_s": one.wall_s,
-    }
+    differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
+    labels = {name: label for name, label in (DISTANCES | OF_WALKS).items() if name in differences}
+    return {**printed(one.setting, FACTORS), **printed(one, labels), "run_wall_s": one.wall_s}
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:
@@ -205,20 +204,8 @@ def group_name(series: str) -> str:
 
 def series_group(rows: list[Distance], walked: bool) -> Group:
     """A series' settings and distances, and those of whole walks if any were compared."""
-    dims = ("setting",)
     whole = [one for one in rows if one.angle is not None]
     rows = whole if walked and whole else rows
-    factors = (
-        ("stiffness", "stiffness_factor", "on the stiffness"),
-        ("damping", "damping_factor", "on the damping"),
-        ("stiction", "stiction_velocity_factor", "on the stiction and friction velocity"),
-    )
-    variables = {"setting": Variable(np.arange(len(rows)), dims, "1", "setting, from the config's contact on")}
-    for attribute, column, text in factors:
-        values = np.array([getattr(one.setting, attribute) for one in rows])
-        variables[column] = Variable(values, dims, "1", f"factor {text}")
-    columns = COLUMNS + (WALK_COLUMNS if walked and whole else ())
-    for attribute, column, unit, text in columns:
-        values = np.array([getattr(one, attribute) for one in rows])
-        variables[column] = Variable(values, dims, unit, text, timing=attribute == "wall_s")
-    return Group(variables)
+    labels = DISTANCES | (OF_WALKS if walked and whole else {})
+    settings = rows_group([one.setting for one in rows], FACTORS, SETTING, "setting, from the config's contact on")
+    return Group({**settings.variables, **columns(rows, labels, SETTING)})

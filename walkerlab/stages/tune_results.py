@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
+from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait, angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import Adjustment, Margin
@@ -20,12 +20,13 @@ from walkerlab.paper.adams_start import PaperStart
 from walkerlab.paper.printed import TABLE_2, StartRow
 from walkerlab.scene.contact import ContactScene
 from walkerlab.stages.simulate import leg_variables
+from walkerlab.stages.walk_columns import NORMAL_FORCE, TIME, at_samples, legs, over_time, touches
+from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Group, Variable
 
 if TYPE_CHECKING:
     from walkerlab.stages.tune import Findings
 
-TIME, LEG = "time", "leg"
 WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 SWING, STANCE = "swing_factor", "stance_factor"
 
@@ -254,13 +255,8 @@ def map_group(found: Findings) -> Group:
 
 def margins_group(margins: list[Margin]) -> Group:
     """How far the start may be scaled."""
-    return Group(
-        {
-            "margin": Variable(np.arange(len(margins)), ("margin",), "1", "number"),
-            "name": Variable(np.array([one.name for one in margins], dtype=object), ("margin",), "", "what is scaled"),
-            "factor": Variable(np.array([one.factor for one in margins]), ("margin",), "1", "the last that walks"),
-        }
-    )
+    labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
+    return rows_group(margins, labels, "margin", "number")
 
 
 def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
@@ -274,9 +270,8 @@ def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
             "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
             "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
             "derivative": Variable(gait.step.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
-            "multiplier": Variable(np.arange(gait.z.size), ("multiplier",), "1", "number"),
-            "multiplier_real": Variable(gait.multipliers.real.copy(), ("multiplier",), "1", "real part"),
-            "multiplier_imag": Variable(gait.multipliers.imag.copy(), ("multiplier",), "1", "imaginary part"),
+            **numbered(gait.z.size, "multiplier", "number"),
+            **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
         }
     )
 
@@ -285,8 +280,8 @@ def walk_group(walk: ContactWalkResult, walker: ContactWalker) -> Group | None:
     """Angles and velocities of a walk of the contact model; None if nothing was sampled."""
     if walk.samples is None or walk.samples.time_s.size == 0:
         return None
-    angle, velocity = motion_of_legs(walk.samples.states, walker)
-    return Group({**legs_in_time(walk.samples.time_s, angle, velocity), **touches(walk.touch_time_s)})
+    of_steps = touches(walk.touch_time_s) if walk.touch_time_s.size else {}
+    return Group({**legs_in_time(walk.samples, walker), **of_steps})
 
 
 def rigid_group(walk: RecordedWalk) -> Group | None:
@@ -294,39 +289,23 @@ def rigid_group(walk: RecordedWalk) -> Group | None:
     samples = walk.samples
     if samples is None or samples.time.size == 0:
         return None
-    legs: Mapping[str, Variable] = leg_variables(samples, 1 - samples.step % 2)
-    time = {TIME: Variable(samples.time, (TIME,), "s", "time")}
-    return Group({**time, **legs, **touches(walk.heel_strikes)})
+    of_steps = touches(walk.heel_strikes) if walk.steps else {}
+    return Group({**over_time(time=samples.time), **leg_variables(samples, 1 - samples.step % 2), **of_steps})
 
 
-def legs_in_time(time: Any, angle: Any, velocity: Any) -> dict[str, Variable]:
-    """Angles and velocities."""
-    return {
-        TIME: Variable(time, (TIME,), "s", "time"),
-        LEG: Variable(np.arange(2), (LEG,), "1", "leg: 0 swings first, 1 stands first"),
-        "angle": Variable(angle, (TIME, LEG), "rad", "angle of the leg from the vertical"),
-        "velocity": Variable(velocity, (TIME, LEG), "rad/s", "angular velocity of the leg"),
-    }
-
-
-def touches(times: Any) -> dict[str, Variable]:
-    """When steps ended; none if there was no step."""
-    if not times.size:
-        return {}
-    return {
-        "step": Variable(np.arange(times.size), ("step",), "1", "step number"),
-        "touch_time_s": Variable(times, ("step",), "s", "time at which the step ended"),
-    }
+def legs_in_time(samples: ContactSamples, walker: ContactWalker) -> dict[str, Variable]:
+    """Angles and velocities of the legs."""
+    angle, velocity = motion_of_legs(samples.states, walker)
+    return {**legs(), **over_time(time=samples.time_s, angle=angle, velocity=velocity)}
 
 
 def paper_group(paper: PaperStart, walker: ContactWalker) -> Group:
     """The paper's ADAMS start in the contact model."""
     samples = paper.walk.samples
-    legs = {} if samples is None else legs_in_time(samples.time_s, *motion_of_legs(samples.states, walker))
     return Group(
         {
-            **legs,
-            "normal_force_N": Variable(paper.normal, (TIME, LEG), "N", "normal force of the ground on the foot"),
+            **({} if samples is None else legs_in_time(samples, walker)),
+            "normal_force_N": at_samples(paper.normal, NORMAL_FORCE),
             "mechanical_J": Variable(paper.mechanical, (TIME,), "J", "kinetic and potential energy"),
         }
     )

@@ -10,15 +10,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.labels import unit_by_name, unit_ending
 from walkerlab.store.content import Variable
 from walkerlab.sweeps.chunk import Labels
 
 OWN: Final = ("outcome", "status", "said")
-UNITS: Final = {
-    "rad": "rad", "deg": "deg", "m": "m", "s": "s", "N": "N", "J": "J", "kg": "kg", "m_s": "m/s", "m_s2": "m/s^2",
-    "rad_s": "rad/s", "N_s_m": "N s/m", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
-}  # fmt: skip
-"""By what names of numbers end in."""
 STATES: Final = ("state", "start_state", "final_state")
 TEXT_BYTES: Final = 6
 """What a text of some words takes in a file, in units of what it takes here."""
@@ -136,13 +132,7 @@ class Columns:
         return unit_by_name(last), in_words(name)
 
 
-def unit_by_name(name: str) -> str:
-    """The unit that a name ends in, the longest there is; '1' for none."""
-    endings = [unit for unit in UNITS if name.endswith(f"_{unit}")]
-    return UNITS[max(endings, key=len)] if endings else "1"
-
-
 def in_words(name: str) -> str:
     """A name as words, without its unit."""
-    endings = [unit for unit in UNITS if name.endswith(f"_{unit}")]
-    return name.removesuffix(f"_{max(endings, key=len)}" if endings else "").replace("_", " ")
+    ending = unit_ending(name)
+    return name.removesuffix(f"_{ending}" if ending else "").replace("_", " ")

@@ -82,7 +82,7 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
         expected=case.expected,
         outcome=result.outcome.label,
         steps=int(result.touch_time_s.size),
-        residual_J=finite(result.energy_balance_residual_J),
+        energy_balance_residual_J=finite(result.energy_balance_residual_J),
         rhs_evaluations=int(result.work[RHS]),
         wall_s=wall_s,
         findings=(*findings, momentum) if isinstance(momentum, Finding) else tuple(findings),

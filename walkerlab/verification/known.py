@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.labels import Label
 from walkerlab.verification import references
 from walkerlab.verification.particle_scene import (
     ALONG_RATE,
@@ -39,20 +40,20 @@ class Known:
     """A quantity beside its reference.
 
     error  of the value, relative to the reference
-    limit  up to which it is right; by `why`
+    limit  up to which it is right; by `why_limit`
     """
 
-    name: str
-    quantity: str
-    value: float
-    reference: float
+    name: Annotated[str, Label("", "name of the problem")]
+    quantity: Annotated[str, Label("", "what is compared, with its unit")]
+    value: Annotated[float, Label("1", "by the contact code, in the quantity's unit")]
+    reference: Annotated[float, Label("1", "by another route, in the quantity's unit")]
     source: str
     limit: float
-    why: str
+    why_limit: str
     wall_s: float
 
     @property
-    def error(self) -> float:
+    def error(self) -> Annotated[float, Label("1", "difference over reference")]:
         """Relative to the reference."""
         return abs(self.value - self.reference) / abs(self.reference)
 

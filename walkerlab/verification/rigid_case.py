@@ -104,7 +104,7 @@ def judge_rigid(case: Case, config: Config) -> CaseResult:
         expected=case.expected,
         outcome=walk.outcome.label,
         steps=walk.steps,
-        residual_J=finite(walk.energy_drift),
+        energy_balance_residual_J=finite(walk.energy_drift),
         rhs_evaluations=walk.work.rhs_evaluations,
         wall_s=wall_s,
         findings=tuple(findings),

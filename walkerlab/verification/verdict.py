@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
+
+from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
 """A measure of work, which would hide those of what is right where the largest of all is shown."""
@@ -42,7 +44,6 @@ class NotMeasured:
 class CaseResult:
     """How a case ended and how it is judged.
 
-    residual_J     of the energy balance
     findings       every measure that was taken
     remarks        what is wrong besides, in words
     not_measured   what could not be measured
@@ -50,15 +51,15 @@ class CaseResult:
     second_tried   what became of those asked before, or why none was asked
     """
 
-    name: str
-    family: str
+    name: Annotated[str, Label("", "name of the case")]
+    family: Annotated[str, Label("", "family of the case")]
     model: str
     reason: str
     expected: tuple[str, ...]
-    outcome: str
-    steps: int
-    residual_J: float  # noqa: N815 (a unit's capital)
-    rhs_evaluations: int
+    outcome: Annotated[str, Label("", "how it ended")]
+    steps: Annotated[int, Label("1", "steps walked")]
+    energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")]  # noqa: N815
+    rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")]
     wall_s: float
     findings: tuple[Finding, ...]
     remarks: tuple[str, ...] = ()
@@ -73,7 +74,7 @@ class CaseResult:
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 
     @property
-    def ok(self) -> bool:
+    def ok(self) -> Annotated[bool, Label("1", "whether it ended as expected and passed every measure")]:
         """Whether the case ended as expected and passed every measure."""
         return not self.failures
 

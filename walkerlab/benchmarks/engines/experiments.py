@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.adapter import Contact, Integrator, OwnContact, Stepping
 from walkerlab.benchmarks.engines.process import Lost, OwnProcess
 from walkerlab.benchmarks.engines.registry import Engine
+from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, Row, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.runs import (
     SwingAnswer,
     SwingTask,
@@ -36,8 +37,6 @@ from walkerlab.solvers.system import derivative
 
 Floats = NDArray[np.float64]
 
-OURS = "walkerlab"
-SAME_LAW, OWN_LAW = "same-law", "own-law"
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
@@ -59,77 +58,6 @@ ENDLESS = 100_000_000  # right-hand sides
 ENDLESS_S = 1e9
 LONGER = 2  # times as long as the walk under ADAMS's law another may take
 REPEATS = 3
-
-
-@dataclass(frozen=True)
-class Row:
-    """One run of one engine, or of this project beside it.
-
-    integrator  the engine's own, for the same law; its contact model, for its own law
-    start       the gait's velocities times this
-    step_s      of the engine; the mean one where steps are adapted and the run came to an end
-    tolerance   where steps are adapted, else None
-    error       same law: largest difference of the end state from the reference (SI); own law: difference of the last
-                step's period from that of ADAMS's law (s)
-    touch_error_s  largest difference of a touch time from the reference
-    wall_s      of its loop; an engine has a process of its own, whose processor time it is
-    period_s    of the last step; step_length_m and slip_m likewise
-    steps       walked
-    why         how a run ended that has no outcome of its own
-    """
-
-    scene: str
-    engine: str
-    version: str
-    experiment: str
-    integrator: str
-    start: float
-    step_s: float
-    tolerance: float | None
-    error: float | None
-    touch_error_s: float | None
-    wall_s: float
-    period_s: float | None
-    step_length_m: float | None
-    slip_m: float | None
-    steps: int
-    outcome: str
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class SwingRow:
-    """A swing without ground; `order` is observed against the run with twice the step, None for the first."""
-
-    scene: str
-    engine: str
-    integrator: str
-    promised_order: int
-    step_s: float
-    tolerance: float | None
-    error: float
-    energy_drift_j: float
-    order: float | None
-    wall_s: float
-
-
-@dataclass(frozen=True)
-class TuningRow:
-    """An engine's contact model after tuning, against what it was tuned to."""
-
-    scene: str
-    engine: str
-    contact: str
-    settings: dict[str, float]
-    quantity: str
-    unit: str
-    target: float
-    reached: float
-
-    @property
-    def residual(self) -> float:
-        """Relative difference."""
-        return self.reached / self.target - 1.0
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.report.blocks import COSTS, Block, Cell, Column, Paragraph, Section, Table, table
 from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
@@ -171,29 +172,19 @@ def starts_table(results: Results, summary: Summary) -> Table:
         ]
         heads = [Column("coordinate"), Column("rigid gait", numeric=True), Column("adjusted", numeric=True)]
         return table("The start before and after the adjustment", heads, rows)
-    columns = [
-        Column("row"),
-        Column("paper, MATLAB", numeric=True),
-        Column("paper, ADAMS", numeric=True),
-        Column("% of MATLAB", numeric=True),
-        Column("% of ADAMS", numeric=True),
-        Column("rigid gait", numeric=True),
-        Column("adjusted", numeric=True),
-        Column("change, % of rigid", numeric=True),
-        Column("change, % of adjusted", numeric=True),
-    ]
-    keys = (
-        "paper_matlab",
-        "paper_adams",
-        "paper_percent_of_matlab",
-        "paper_percent_of_adams",
-        "ours_rigid",
-        "ours_adjusted",
-        "ours_percent_of_rigid",
-        "ours_percent_of_adjusted",
-    )
+    shown = {
+        "paper_matlab": "paper, MATLAB",
+        "paper_adams": "paper, ADAMS",
+        "paper_percent_of_matlab": "% of MATLAB",
+        "paper_percent_of_adams": "% of ADAMS",
+        "ours_rigid": "rigid gait",
+        "ours_adjusted": "adjusted",
+        "ours_percent_of_rigid": "change, % of rigid",
+        "ours_percent_of_adjusted": "change, % of adjusted",
+    }
+    columns = [Column("row"), *(Column(head, numeric=True) for head in shown.values())]
     rows = [
-        [in_signs(f"{name} ({row['unit']})"), *(number(row[key], 3 if "percent" in key else 6) for key in keys)]
+        [in_signs(f"{name} ({row['unit']})"), *(number(row[key], 3 if "percent" in key else 6) for key in shown)]
         for name, row in summary["table2"].items()
     ]
     note = "The paper's percentages are those of the ADAMS value, without saying so."
@@ -276,31 +267,21 @@ def walks_table(results: Results, summary: Summary) -> Table:
 
 def limit_table(name: str, found: Summary) -> Table:
     """One way towards the rigid limit."""
-    heads = (
-        "stiffness",
-        "damping",
-        "stiction velocity",
-        "period error (s)",
-        "angle, in phase (rad)",
-        "velocity, in phase (rad/s)",
-        "angle, same time (rad)",
-        "numerical error (s)",
-        "run time (s)",
-    )
-    keys = (
-        "stiffness_factor",
-        "damping_factor",
-        "stiction_velocity_factor",
-        "period_error_s",
-        "angle_error_rad",
-        "velocity_error_rad_s",
-        "raw_angle_error_rad",
-        "numerical_time_s",
-        "run_wall_s",
-    )
-    rows = [[number(row[key], 3) for key in keys] for row in found["settings"]]
+    shown = {
+        "stiffness_factor": "stiffness",
+        "damping_factor": "damping",
+        "stiction_velocity_factor": "stiction velocity",
+        "period_error_s": "period error",
+        "angle_error_rad": "angle, in phase",
+        "velocity_error_rad_s": "velocity, in phase",
+        "raw_angle_error_rad": "angle, same time",
+        "numerical_time_s": "numerical error",
+        "run_wall_s": "run time",
+    }
+    columns = [Column(with_unit(words, unit_by_name(key)), numeric=True) for key, words in shown.items()]
+    rows = [[number(row[key], 3) for key in shown] for row in found["settings"]]
     note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
-    return table(f"Towards the rigid limit: {name}", [Column(head, numeric=True) for head in heads], rows, note=note)
+    return table(f"Towards the rigid limit: {name}", columns, rows, note=note)
 
 
 def orders_table(orders: Mapping[str, Any]) -> Table:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from operator import itemgetter
 from typing import Any
 
+from walkerlab.benchmarks.engines import rows as engines
+from walkerlab.benchmarks.engines.rows import OWN_LAW, SAME_LAW
 from walkerlab.report.blocks import Body, Column, Finding, Findings, Paragraph, Section, Table, body, table
-from walkerlab.report.numbers import fixed, listed, number, power_of_ten
+from walkerlab.report.numbers import NONE, fixed, listed, number, power_of_ten
 from walkerlab.report.results import Results
+from walkerlab.report.shown import Row, Shown, head_of, heads, lines, shown
 
 STAGE = "engines"
-SAME_LAW, OWN_LAW = "same-law", "own-law"
 ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
-
-Row = Mapping[str, Any]
 
 
 def section(results: Results) -> Section | None:
@@ -50,25 +52,27 @@ def introduction(summary: Mapping[str, Any]) -> str:
     )
 
 
+SAME_LAW_COLUMNS = (
+    Shown(Column("integrator"), lambda row: f"{row['engine']} {row['integrator']}"),
+    shown(engines.Row, "step_s", "step", partial(number, digits=3), "µ"),
+    shown(engines.Row, "tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
+    shown(engines.Row, "error", "error", partial(number, digits=2)),
+    shown(engines.Row, "touch_error_s", "of touch times", partial(number, digits=2)),
+    shown(engines.Row, "wall_s", "run time", partial(number, digits=3), "m"),
+    Shown(Column("outcome"), itemgetter("outcome")),
+)
+
+
 def same_law(summary: Mapping[str, Any]) -> Table:
     """Each integrator's runs from coarse to fine."""
-    heads = (
-        Column("integrator"),
-        Column("step (µs)", numeric=True),
-        Column("tolerance", numeric=True),
-        Column("error", numeric=True),
-        Column("of touch times (s)", numeric=True),
-        Column("run time (ms)", numeric=True),
-        Column("outcome"),
-    )
     bodies = tuple(
-        body([same_law_line(row) for row in rows_of(summary, scene, SAME_LAW)], scene) for scene in summary["reference"]
+        body(lines(SAME_LAW_COLUMNS, rows_of(summary, scene, SAME_LAW)), scene) for scene in summary["reference"]
     )
     note = (
         "The error is the largest difference of the end state from the reference, SI; "
         "adapted steps are given by their mean."
     )
-    return Table("ADAMS's law in each engine's integrators", heads, bodies, note=note)
+    return Table("ADAMS's law in each engine's integrators", heads(SAME_LAW_COLUMNS), bodies, note=note)
 
 
 def rows_of(summary: Mapping[str, Any], scene: str, experiment: str) -> list[Row]:
@@ -76,59 +80,42 @@ def rows_of(summary: Mapping[str, Any], scene: str, experiment: str) -> list[Row
     return [row for row in summary["rows"] if row["scene"] == scene and row["experiment"] == experiment]
 
 
-def same_law_line(row: Row) -> list[str]:
-    """One run."""
-    return [
-        f"{row['engine']} {row['integrator']}",
-        number(1e6 * row["step_s"], 3),
-        "–" if row["tolerance"] is None else power_of_ten(row["tolerance"], 1),
-        number(row["error"], 2),
-        number(row["touch_error_s"], 2),
-        number(1e3 * row["wall_s"], 3),
-        row["outcome"],
-    ]
+OWN_LAW_COLUMNS = (
+    Shown(Column("contact"), lambda row: f"{row['engine']} {row['integrator']}"),
+    shown(engines.Row, "start", "start", partial(number, digits=3)),
+    shown(engines.Row, "step_s", "step", partial(number, digits=3), "µ"),
+    shown(engines.Row, "period_s", "period", partial(fixed, decimals=5)),
+    shown(engines.Row, "step_length_m", "length", partial(fixed, decimals=4)),
+    shown(engines.Row, "slip_m", "slip", partial(fixed, decimals=2), "m"),
+    shown(engines.Row, "steps", "steps", number),
+    shown(engines.Row, "wall_s", "run time", partial(number, digits=2)),
+    Shown(Column("outcome"), itemgetter("outcome")),
+)
 
 
 def own_law(summary: Mapping[str, Any]) -> Table:
     """The walks with each engine's own contact, ADAMS's law among them."""
-    heads = (
-        Column("contact"),
-        Column("start", numeric=True),
-        Column("step (µs)", numeric=True),
-        Column("period (s)", numeric=True),
-        Column("length (m)", numeric=True),
-        Column("slip (mm)", numeric=True),
-        Column("steps", numeric=True),
-        Column("run time (s)", numeric=True),
-        Column("outcome"),
-    )
     bodies: list[Body] = []
     for scene, reference in summary["reference"].items():
-        lines = [own_law_line(row) for row in rows_of(summary, scene, OWN_LAW)]
+        found = lines(OWN_LAW_COLUMNS, rows_of(summary, scene, OWN_LAW))
         if "rigid_period_s" in reference:
             period, length = fixed(reference["rigid_period_s"], 5), fixed(reference["rigid_step_length_m"], 4)
-            lines.insert(0, ["rigid gait", "1", "–", period, length, "0", "–", "–", "–"])
-        bodies.append(body(lines, scene))
+            found.insert(0, ["rigid gait", "1", NONE, period, length, "0", NONE, NONE, NONE])
+        bodies.append(body(found, scene))
     note = (
         "Period, length and slip are those of the last step that was walked, of at most ten; the start is the gait's "
         "velocities times the number given. walkerlab impact is ADAMS's law."
     )
-    return Table("The walk on each engine's own contact", heads, tuple(bodies), note=note)
+    return Table("The walk on each engine's own contact", heads(OWN_LAW_COLUMNS), tuple(bodies), note=note)
 
 
-def own_law_line(row: Row) -> list[str]:
-    """One walk."""
-    return [
-        f"{row['engine']} {row['integrator']}",
-        number(row["start"], 3),
-        number(1e6 * row["step_s"], 3),
-        fixed(row["period_s"], 5),
-        fixed(row["step_length_m"], 4),
-        fixed(None if row["slip_m"] is None else 1e3 * row["slip_m"], 2),
-        str(row["steps"]),
-        number(row["wall_s"], 2),
-        row["outcome"],
-    ]
+TUNING_COLUMNS = (
+    Shown(Column("contact"), lambda row: f"{row['engine']} {row['contact']}, {row['scene']}"),
+    Shown(Column("quantity"), lambda row: f"{row['quantity']} ({row['unit']})"),
+    shown(engines.TuningRow, "target", "ADAMS's law", partial(number, digits=4)),
+    shown(engines.TuningRow, "reached", "measured", partial(number, digits=4)),
+    Shown(Column("residual", numeric=True), lambda row: f"{100.0 * row['residual']:+.2g} %"),
+)
 
 
 def tuning(summary: Mapping[str, Any]) -> tuple[Table, ...]:
@@ -136,37 +123,21 @@ def tuning(summary: Mapping[str, Any]) -> tuple[Table, ...]:
     rows: Sequence[Row] = summary["tuning"]
     if not rows:
         return ()
-    heads = [
-        Column("contact"),
-        Column("quantity"),
-        Column("ADAMS's law", numeric=True),
-        Column("measured", numeric=True),
-        Column("residual", numeric=True),
-    ]
-    lines = [
-        [
-            f"{row['engine']} {row['contact']}, {row['scene']}",
-            f"{row['quantity']} ({row['unit']})",
-            number(row["target"], 4),
-            number(row["reached"], 4),
-            f"{100.0 * row['residual']:+.2g} %",
-        ]
-        for row in rows
-    ]
     note = "Measured on a ball of the walker's mass dropped on the ground, and a block of that mass slid on it."
-    return (table("Tuning of the engines' own contact", heads, lines, note=note),)
+    tuned = lines(TUNING_COLUMNS, rows)
+    return (table("Tuning of the engines' own contact", heads(TUNING_COLUMNS), tuned, note=note),)
 
 
 def swings(summary: Mapping[str, Any]) -> Table:
     """The hinged walker's swing, from coarse to fine."""
-    heads = [
+    columns = [
         Column("integrator"),
-        Column("order promised", numeric=True),
+        head_of(engines.SwingRow, "promised_order", "order promised"),
         Column("orders observed"),
-        Column("smallest error", numeric=True),
-        Column("energy drift there (J)", numeric=True),
+        head_of(engines.SwingRow, "error", "smallest error"),
+        head_of(engines.SwingRow, "energy_drift_j", "energy drift there"),
     ]
-    lines = []
+    swung = []
     keys = dict.fromkeys((row["scene"], row["engine"], row["integrator"]) for row in summary["swings"])
     for scene, engine, integrator in keys:
         mine = [
@@ -176,7 +147,7 @@ def swings(summary: Mapping[str, Any]) -> Table:
         ]
         best = min(mine, key=lambda row: float(row["error"]))
         orders = [number(row["order"], 3) for row in mine if row["order"] is not None]
-        lines.append(
+        swung.append(
             [
                 f"{engine} {integrator}, {scene}",
                 str(best["promised_order"]),
@@ -186,11 +157,11 @@ def swings(summary: Mapping[str, Any]) -> Table:
             ]
         )
     note = "The walker hinged at its stance foot, without ground, against this project's equations and SciPy's DOP853."
-    return table("Without contact: a swing in each integrator", heads, lines, note=note)
+    return table("Without contact: a swing in each integrator", columns, swung, note=note)
 
 
 def limits(summary: Mapping[str, Any]) -> Table:
     """What each engine cannot express."""
-    heads = [Column("engine"), Column("cannot express", wide=True)]
-    lines = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
-    return table("What the engines cannot express", heads, lines, wordy=True)
+    columns = [Column("engine"), Column("cannot express", wide=True)]
+    rows = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
+    return table("What the engines cannot express", columns, rows, wordy=True)

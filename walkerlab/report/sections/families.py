@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from walkerlab.labels import with_unit
 from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
 from walkerlab.report.gait_diagram import gait_diagram
 from walkerlab.report.numbers import count, number, quantity
@@ -81,7 +82,6 @@ def first_flip(summary: Mapping[str, Any], model: str) -> float | None:
 
 def bifurcations(summary: Mapping[str, Any]) -> Block:
     """Every bifurcation that was located."""
-    unit = f" ({summary['unit']})" if summary["unit"] not in ("", "1") else ""
     rows = [
         [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), number(one["multiplier"][0], 6)]
         for one in summary["bifurcations"]
@@ -90,7 +90,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Block:
         Column("kind"),
         Column("model"),
         Column("steps of the gait", numeric=True),
-        Column(f"{summary['over']}{unit}", numeric=True),
+        Column(with_unit(summary["over"], summary["unit"]), numeric=True),
         Column("critical multiplier", numeric=True),
     ]
     return table("Bifurcations, as zeros of their test functions", columns, rows)

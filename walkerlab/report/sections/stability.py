@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 from walkerlab.report.blocks import (
     CASES,
     Block,
-    Body,
     Cell,
     Column,
     Gallery,
@@ -21,6 +21,7 @@ from walkerlab.report.blocks import (
 )
 from walkerlab.report.numbers import count, listed, number, whole
 from walkerlab.report.results import Results
+from walkerlab.report.shown import Shown, heads, lines
 from walkerlab.verification.verdict import BUDGET_USED
 
 VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
@@ -92,28 +93,36 @@ def maps(results: Results) -> Paragraph:
     )
 
 
+def worst_measure(row: Mapping[str, Any]) -> str:
+    """The largest of a case's measures but its use of the budget, each over its limit."""
+    judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
+    return number(max((one["value"] / one["limit"] for one in judged), default=None), 2)
+
+
+CASE_COLUMNS = (
+    Shown(Column("case"), itemgetter("name")),
+    Shown(Column("ended as"), lambda row: Cell(row["outcome"], "good" if row["ok"] else "bad")),
+    Shown(Column("steps", numeric=True), lambda row: whole(row["steps"])),
+    Shown(Column("other method"), lambda row: row["second_method"] or "none"),
+    Shown(Column("worst measure over its limit", numeric=True), worst_measure),
+    Shown(Column("right-hand sides", numeric=True), lambda row: whole(row["rhs_evaluations"])),
+    Shown(Column("time (ms)", numeric=True), lambda row: number(1e3 * row["wall_s"], 3)),
+    Shown(Column("why that is to be expected", wide=True), itemgetter("reason")),
+)
+
+
 def case_table(cases: Rows) -> Table:
     """Every case, by family."""
-    columns = (
-        Column("case"),
-        Column("ended as"),
-        Column("steps", numeric=True),
-        Column("other method"),
-        Column("worst measure over its limit", numeric=True),
-        Column("right-hand sides", numeric=True),
-        Column("time (ms)", numeric=True),
-        Column("why that is to be expected", wide=True),
-    )
     families = dict.fromkeys(str(row["family"]) for row in cases)
     bodies = tuple(
-        Body(family, body([case_row(row) for row in cases if row["family"] == family]).rows) for family in families
+        body(lines(CASE_COLUMNS, [row for row in cases if row["family"] == family]), family) for family in families
     )
     note = (
         "Other method: that gives the same times, as far as tolerances promise. Worst measure: the largest of all "
         "measures of a case but its use of the budget, each divided by the most that is allowed."
         f"{without_answer(cases)}{not_measured(cases)}"
     )
-    return Table("Extreme cases", columns, bodies, wordy=True, note=note)
+    return Table("Extreme cases", heads(CASE_COLUMNS), bodies, wordy=True, note=note)
 
 
 def without_answer(cases: Rows) -> str:
@@ -138,44 +147,23 @@ def by_reason(reasons: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
     return "; ".join(f"{reason} ({', '.join(cases)})" for reason, cases in names.items())
 
 
-def case_row(row: Mapping[str, Any]) -> list[str | Cell]:
-    """A case."""
-    judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
-    worst = max((one["value"] / one["limit"] for one in judged), default=None)
-    return [
-        str(row["name"]),
-        Cell(str(row["outcome"]), "good" if row["ok"] else "bad"),
-        whole(row["steps"]),
-        str(row["second_method"]) or "none",
-        number(worst, 2),
-        whole(row["rhs_evaluations"]),
-        number(1e3 * row["wall_s"], 3),
-        str(row["reason"]),
-    ]
+KNOWN_COLUMNS = (
+    Shown(Column("problem"), itemgetter("name")),
+    Shown(Column("quantity"), itemgetter("quantity")),
+    Shown(Column("by the contact code", numeric=True), lambda row: number(row["value"], 7)),
+    Shown(Column("reference", numeric=True), lambda row: number(row["reference"], 7)),
+    Shown(
+        Column("relative error", numeric=True),
+        lambda row: Cell(number(row["error"], 2), "good" if row["ok"] else "bad"),
+    ),
+    Shown(Column("the reference’s route", wide=True), itemgetter("source")),
+)
 
 
 def known_table(known: Rows) -> Table:
     """Every known problem."""
-    columns = [
-        Column("problem"),
-        Column("quantity"),
-        Column("by the contact code", numeric=True),
-        Column("reference", numeric=True),
-        Column("relative error", numeric=True),
-        Column("the reference’s route", wide=True),
-    ]
-    rows: list[list[str | Cell]] = [
-        [
-            str(row["name"]),
-            str(row["quantity"]),
-            number(row["value"], 7),
-            number(row["reference"], 7),
-            Cell(number(row["error"], 2), "good" if row["ok"] else "bad"),
-            str(row["source"]),
-        ]
-        for row in known
-    ]
-    return table("Problems with known answers, run through the contact code", columns, rows, wordy=True)
+    caption = "Problems with known answers, run through the contact code"
+    return table(caption, heads(KNOWN_COLUMNS), lines(KNOWN_COLUMNS, known), wordy=True)
 
 
 def ordinary_table(summary: Mapping[str, Any]) -> Table:

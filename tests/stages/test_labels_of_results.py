@@ -1,0 +1,34 @@
+"""Units stand in labels, and some in names as well: they have to be the same."""
+
+import pytest
+
+from walkerlab.benchmarks import ladder
+from walkerlab.benchmarks.engines import rows as engines
+from walkerlab.labels import labels_of, unit_by_name
+from walkerlab.stages import fixedpoint, tune_limit, walk_columns
+from walkerlab.verification.known import Known
+from walkerlab.verification.verdict import CaseResult
+
+CLASSES = (engines.Row, engines.SwingRow, engines.TuningRow, ladder.Row, CaseResult, Known)
+LABELS = {
+    **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
+    "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
+    "walk": walk_columns.OVER_TIME,
+    "limit": tune_limit.FACTORS | tune_limit.DISTANCES | tune_limit.OF_WALKS,
+}
+
+
+@pytest.mark.parametrize("labels", LABELS.values(), ids=LABELS)
+def test_a_name_that_ends_in_a_unit_ends_in_its_own(labels):
+    assert labels
+    for field, label in labels.items():
+        assert unit_by_name(label.name or field) in ("1", label.unit)
+        assert label.text
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("period_s", "s"), ("velocity_m_s", "m/s"), ("max_friction_ratio", "1"), ("slope_deg", "deg"), ("s", "1")],
+)
+def test_the_longest_ending_that_is_a_unit_tells_it(name, unit):
+    assert unit_by_name(name) == unit
