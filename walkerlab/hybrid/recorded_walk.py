@@ -169,7 +169,8 @@ class Recorder:
         self.strikes.append(strikes)
         self.before.append(before)
         self.after.append(after)
-        self.knees.append(knees[:taken] + begun)
+        if self.kneed:
+            self.knees.append(knees[:taken] + begun)
         self.steps += taken
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
@@ -240,9 +241,12 @@ class Recorder:
 
 def step_lengths(walker: Standing, start: State, before: Array, after: Array) -> Array:
     """Distance (steps,) in m from touch to touch: between the points of contact, and what the stance foot rolled."""
-    starts, ends = [start, *map(as_state, after[:-1])], [*map(as_state, before)]
-    steps = zip(starts[: len(ends)], ends, strict=True)
-    return np.array([swing_foot(walker, end)[1] + rolled_distance(walker, begun, end) for begun, end in steps])
+    lengths, begun = np.zeros(len(before)), start
+    for k, row in enumerate(before):
+        end = as_state(row)
+        lengths[k] = swing_foot(walker, end)[1] + rolled_distance(walker, begun, end)
+        begun = as_state(after[k])
+    return lengths
 
 
 def with_scaled_rates(walker: Standing, state: State, swing: float, stance: float) -> State:
