@@ -18,7 +18,7 @@ from walkerlab.sweeps.engines import Engine, Order, Pool
 SCOUTS: Final = 2
 """Points of the first chunk, which goes ahead alone: it has the kernels compiled once and says what a point takes."""
 LEAST_CHUNK_S: Final = 0.5
-LARGEST_CHUNK: Final = 5000
+LARGEST_CHUNK: Final = 1000
 SHARES: Final = 3
 """A chunk is at most this part of what is left to a worker, so that all end together."""
 MOST_DEATHS: Final = 12
