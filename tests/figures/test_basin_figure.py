@@ -24,7 +24,7 @@ def basin(attractor, aperiodic=False, config=CONFIG):
     walks = attractor != NONE
     found = Found(np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, 7, 1))
     attractors = [{"period": 1}, {"period": 2}]
-    said = summary(config, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
+    said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
     return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}
 
 

@@ -158,7 +158,7 @@ def test_the_ground_carries_the_walker_and_never_pulls(paper):
 
 
 def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
-    rigid = simulate.run(only(load().config, PIPELINE["simulate"].reads), {"fixedpoint": GAIT}, Silent())
+    rigid = simulate.run(only(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
     ours, theirs = (walk["trajectory"].variables for walk in (paper, rigid))
     shared = {name for name in ours.keys() & theirs if ours[name].dims == theirs[name].dims} - {"stance_leg"}
     assert shared >= {"time", "leg", "angle", "velocity", "hip_along_m", "foot_height_m", "mechanical_J"}

@@ -75,7 +75,7 @@ class ContactMap:
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
 
     def _formula(self, p: float) -> tuple[list[WalkerOnGround], Floats] | None:
-        return difference_formula(self._at, p, min(self._scale, abs(p)) if p != 0.0 else self._scale, few=True)
+        return difference_formula(self._at, p, min(self._scale, abs(p)) if p != 0.0 else self._scale)
 
     def units(self, frame_length: float, pendulum_time: float) -> Floats:
         """(d,) what one unit of each coordinate is in SI; those of the first walker, whatever the parameter."""

@@ -35,10 +35,9 @@ RTOL, ATOL, BUDGET = 1e-13, 1e-13, 20_000
 QUICK_RTOL, QUICK_ATOL, ENDLESS = 1e-9, 1e-11, 2**62  # of long walks
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far
-CENTRAL: tuple[tuple[int, float], ...] = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
-SIMPLE: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
-FORWARD: tuple[tuple[int, float], ...] = ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
-"""Offsets and weights of formulas for a first derivative, of fourth order but for the simple one."""
+CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
+FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
+"""Offsets and weights of formulas of second order for a first derivative."""
 
 
 @dataclass(frozen=True)
@@ -111,16 +110,14 @@ class StepMap(Protocol):
         """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
 
 
-def difference_formula(
-    build: Callable[[float], W | None], p: float, scale: float, few: bool = False
-) -> tuple[list[W], Floats] | None:
-    """Walkers at parameter values near p and their weights in a fourth-order formula for a derivative.
+def difference_formula(build: Callable[[float], W | None], p: float, scale: float) -> tuple[list[W], Floats] | None:
+    """Walkers at parameter values near p and their weights in a second-order formula for a derivative.
 
-    Central, of second order if there are to be `few`; one-sided where the parameter ends; None without room.
+    Central; one-sided where the parameter ends; None without room.
     """
     h = SPREAD * scale
     backward = tuple((-offset, -weight) for offset, weight in FORWARD)
-    for formula in (SIMPLE if few else CENTRAL, FORWARD, backward):
+    for formula in (CENTRAL, FORWARD, backward):
         walkers = [build(p + offset * h) for offset, _ in formula]
         built = [walker for walker in walkers if walker is not None]
         if len(built) == len(walkers):
@@ -167,7 +164,7 @@ class RigidMap:
 
     def _formula(self, p: float) -> tuple[tuple[Standing, ...], Floats] | None:
         scale = min(self._scale, abs(p)) if p != 0.0 else self._scale
-        found = difference_formula(self._unit_at, p, scale, few=True)
+        found = difference_formula(self._unit_at, p, scale)
         return None if found is None else (tuple(walker for walker, _ in found[0]), found[1])
 
     def similar(self, p: float) -> tuple[Standing, Units] | None:
