@@ -200,21 +200,34 @@ def test_a_knee_strike_keeps_what_the_knee_does_not_touch_and_loses_energy(numbe
     assert momenta(np.array(after)) == pytest.approx(momenta(np.array(y)), rel=1e-7, abs=1e-7)
 
 
-def differences(f, y, h=1e-5):
-    unit = np.eye(len(y))
-    columns = [np.array(f(tuple(y + h * e))) - np.array(f(tuple(y - h * e))) for e in unit]
+def differences(f, y, h=1e-5, along=None):
+    directions = np.eye(len(y)) if along is None else along
+    columns = [np.array(f(tuple(y + h * e))) - np.array(f(tuple(y - h * e))) for e in directions]
     return np.array(columns).T / (2 * h)
+
+
+def linked(mode, y):
+    """A state with the followers where their links have them."""
+    return np.array((*spread(mode.links, tuple(y[:4])), *spread(mode.links, tuple(y[4:]))))
 
 
 @pytest.mark.parametrize("links", ["bent", "straight"])
 @given(numbers=free)
 def test_the_jacobian_is_the_slope_of_the_rates(links, numbers):
     mode = Mode(KNEED, getattr(KNEED, links))
-    y = np.array(kneed_state(numbers))
-    J = np.zeros((8, 8))
+    y, J = linked(mode, kneed_state(numbers)), np.zeros((8, 8))
     mode_jacobian(mode, 0.0, tuple(y), J)
-    slopes = differences(lambda x: rates(KNEED, mode.links, x), y)
-    assert J[4:] == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
+    possible = [linked(mode, unit) for unit in np.eye(8)]
+    slopes = differences(lambda x: rates(KNEED, mode.links, x), y, along=possible)
+    assert J[4:] @ np.array(possible).T == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
+
+
+@given(numbers=free)
+def test_a_straight_leg_in_one_piece_moves_as_its_parts_held_in_line(numbers):
+    y = linked(Mode(KNEED, KNEED.straight), kneed_state(numbers))
+    assert rates(KNEED, KNEED.straight, tuple(y)) == pytest.approx(
+        rates(KNEED, KNEED.straight.links, tuple(y)), rel=1e-10, abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("strike", [(heel_strike, heel_strike_along), (knee_strike, knee_strike_along)])

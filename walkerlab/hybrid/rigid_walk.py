@@ -21,8 +21,7 @@ from walkerlab.mechanics.standing import (
     Variation,
     feet_on_slope,
     hip_height,
-    swing_foot,
-    swing_foot_velocity,
+    swing_foot_motion,
 )
 from walkerlab.mechanics.tuples import put
 from walkerlab.solvers.dop853 import Dop853
@@ -51,8 +50,7 @@ FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
 EVENTS = 4
-# what the step that is being taken leads to
-NOTHING, KNEE_STRIKE, FOOT_DOWN = range(3)
+KNEE_STRUCK = -1  # how a phase of a swing ends beside the outcomes
 WALKED, FELL, BENT_KNEE = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.BENT_KNEE)
 NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
@@ -175,7 +173,7 @@ def hip_above_fall(model: Standing, y: State) -> float:
 
 
 @inlined
-def may_end(model: Standing, method: Any, y: State, bent: bool) -> bool:
+def may_end(model: Standing, method: Any, y: State, knee: Any, at_start: bool) -> bool:
     """Whether the last step, which led to y, may hold an event: false through most of a swing.
 
     A heel strike needs the swing leg ahead of the stance leg and its foot to come down onto the slope; a knee strike
@@ -185,65 +183,75 @@ def may_end(model: Standing, method: Any, y: State, bent: bool) -> bool:
         return True
     old, h = head(model.blank, method.y_old, 0), method.clock[T] - method.clock[T_OLD]
     n = len(model.tree.arm_x)
-    if bent:
-        start, end = knee_angle(model.knee, old, 0), knee_angle(model.knee, y, 0)
-        if hull(start, h * knee_angle(model.knee, old, n), end, h * knee_angle(model.knee, y, n))[1] >= 0.0:
+    if is_bent(knee):
+        start, end = knee_angle(knee, old, 0), knee_angle(knee, y, 0)
+        start_rate, end_rate = h * knee_angle(knee, old, n), h * knee_angle(knee, y, n)
+        if hull(start, start_rate, end, end_rate, at_start)[1] >= 0.0:
             return True
-    before, before_rate = foot_function(model, old, bent)
-    now, now_rate = foot_function(model, y, bent)
+    before, before_rate = foot_function(knee, model, old)
+    now, now_rate = foot_function(knee, model, y)
     ahead = hull(before[1], h * before_rate[1], now[1], h * now_rate[1])
     return ahead[1] > 0.0 and hull(before[0], h * before_rate[0], now[0], h * now_rate[0])[0] <= 0.0
 
 
-@inlined
-def foot_function(model: Standing, y: State, bent: bool) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What tells that the swing foot comes down (falls through zero) and that it is ahead (positive), and their rates.
+@by_type
+def foot_function(knee: Any, model: Standing, y: State) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What falls through zero as the swing foot comes down, what is positive with it ahead, and their rates."""
 
-    Of a straight leg both are linear in the angles; scuffing near mid-swing is no zero of theirs. A bent leg has its
-    foot's height and place.
-    """
+
+@foot_function.case(NoKnee)
+def foot_of_straight_leg(knee: NoKnee, model: Standing, y: State) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Both linear in the angles; scuffing near mid-swing is no zero of theirs."""
     n = len(model.tree.arm_x)
-    if bent:
-        return swing_foot(model, y), swing_foot_velocity(model, y)
     down = feet_on_slope(model, y), y[SWING] - y[STANCE]
     return down, (y[n + SWING] + y[n + STANCE], y[n + SWING] - y[n + STANCE])
 
 
+@foot_function.case(SwingKnee)
+def foot_of_bent_leg(knee: SwingKnee, model: Standing, y: State) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Its foot's height and place."""
+    return swing_foot_motion(model, y)
+
+
 @inlined
-def hull(start: float, start_rate: float, end: float, end_rate: float) -> tuple[float, float]:
+def hull(
+    start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False
+) -> tuple[float, float]:
     """Bounds of an event function within a step, from its values and rates per step at the ends.
 
     Those of the Bernstein coefficients of Hermite's cubic, an eighth of their spread further apart: what the cubic
-    leaves out is far less.
+    leaves out is far less. Without the first one they tell of what a zero at the start leaves when divided out.
     """
     second, third = start + start_rate / 3.0, end - end_rate / 3.0
-    least, most = min(start, second, third, end), max(start, second, third, end)
+    first = second if zero_at_start else start
+    least, most = min(first, second, third, end), max(first, second, third, end)
     room = HULL_ROOM * (most - least)
     return least - room, most + room
 
 
 @inlined
-def sample_events(model: Standing, y: State, bent: bool, node: int, finder: CrossingFinder) -> None:
+def sample_events(knee: Any, model: Standing, y: State, node: int, finder: CrossingFinder) -> None:
     """Values of the event functions at one node of a step, where the state is y."""
-    foot, _ = foot_function(model, y, bent)
+    foot, _ = foot_function(knee, model, y)
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot
     finder.values[FALL, node] = hip_above_fall(model, y)
-    finder.values[KNEE, node] = knee_angle(model.knee, y, 0)
+    if is_bent(knee):
+        finder.values[KNEE, node] = knee_angle(knee, y, 0)
 
 
 @inlined
-def events_in_step(finder: CrossingFinder, at_start: bool, bent: bool) -> tuple[float, float, float]:
+def events_in_step(knee: Any, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, at_start)
-    knee = first_crossing(finder, KNEE, RISING, 0.0, at_start) if bent else NO_CROSSING
-    return strike, first_crossing(finder, FALL, FALLING, 0.0, False), knee
+    struck = first_crossing(finder, KNEE, RISING, 0.0, at_start) if is_bent(knee) else NO_CROSSING
+    return strike, first_crossing(finder, FALL, FALLING, 0.0, False), struck
 
 
 @by_type
 def scan_swing(
-    method: Any, system: Any, model: Standing, finder: CrossingFinder, at_start: bool, bent: bool
+    method: Any, system: Any, knee: Any, model: Standing, finder: CrossingFinder, at_start: bool
 ) -> tuple[float, float, float]:
     """`events_in_step` of the last step of a method; its dense output is ready."""
 
@@ -251,31 +259,31 @@ def scan_swing(
 @scan_swing.case(Dop853)
 @scan_swing.case(Radau5)
 def scan_compiled(
-    method: Any, system: Any, model: Standing, finder: CrossingFinder, at_start: bool, bent: bool
+    method: Any, system: Any, knee: Any, model: Standing, finder: CrossingFinder, at_start: bool
 ) -> tuple[float, float, float]:
     """Compiled with the walk."""
     for node in range(finder.nodes.size):
-        sample_events(model, interpolate(method, system, finder.nodes[node]), bent, node, finder)
-    return events_in_step(finder, at_start, bent)
+        sample_events(knee, model, interpolate(method, system, finder.nodes[node]), node, finder)
+    return events_in_step(knee, finder, at_start)
 
 
 @kernel
 def scan_states(
-    model: Standing, states: Any, finder: CrossingFinder, at_start: bool, bent: bool
+    knee: Any, model: Standing, states: Any, finder: CrossingFinder, at_start: bool
 ) -> tuple[float, float, float]:
     """`events_in_step` of a step whose states at the nodes are the rows of `states`."""
     for node in range(finder.nodes.size):
-        sample_events(model, load(states, node, model.blank), bent, node, finder)
-    return events_in_step(finder, at_start, bent)
+        sample_events(knee, model, load(states, node, model.blank), node, finder)
+    return events_in_step(knee, finder, at_start)
 
 
 @scan_swing.case(ScipyMethod)
 def scan_scipy(
-    method: ScipyMethod, system: Any, model: Standing, finder: CrossingFinder, at_start: bool, bent: bool
+    method: ScipyMethod, system: Any, knee: Any, model: Standing, finder: CrossingFinder, at_start: bool
 ) -> tuple[float, float, float]:
     """A walk in Python hands the step's states to compiled code at once."""
-    strike, fall, knee = scan_states(model, method.states_at(finder.nodes), finder, at_start, bent)
-    return strike, fall, knee
+    strike, fall, struck = scan_states(knee, model, method.states_at(finder.nodes), finder, at_start)
+    return strike, fall, struck
 
 
 @inlined
@@ -295,42 +303,115 @@ def swing(
     The first numbers of the system's state are the walker's. The time of the knee strike (s) goes into knee_time[step].
     On WALKED the method stands at the heel strike.
     """
-    limit = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
-    latest = limit
+    latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
+    return swing_of(model.knee, method, system, model, finder, observer, t, y0, latest, step, knee_time)
+
+
+@by_type
+def swing_of(
+    knee: Any,
+    method: Any,
+    system: Any,
+    model: Standing,
+    finder: CrossingFinder,
+    observer: Any,
+    t: float,
+    y0: State,
+    latest: float,
+    step: int,
+    knee_time: Any,
+) -> int:
+    """`swing` of a leg with this knee, over at the time `latest` (s) if not before."""
+
+
+@swing_of.case(NoKnee)
+def swing_straight(
+    knee: NoKnee,
+    method: Any,
+    system: Any,
+    model: Standing,
+    finder: CrossingFinder,
+    observer: Any,
+    t: float,
+    y0: State,
+    latest: float,
+    step: int,
+    knee_time: Any,
+) -> int:
+    """One phase."""
+    return swing_phase(method, system, knee, model, finder, observer, t, y0, latest, step, True)
+
+
+@swing_of.case(SwingKnee)
+def swing_bent_first(
+    knee: SwingKnee,
+    method: Any,
+    system: Any,
+    model: Standing,
+    finder: CrossingFinder,
+    observer: Any,
+    t: float,
+    y0: State,
+    latest: float,
+    step: int,
+    knee_time: Any,
+) -> int:
+    """Bent until the knee strikes, then straight."""
+    status = swing_phase(method, system, knee, model, finder, observer, t, y0, latest, step, True)
+    if status != KNEE_STRUCK:
+        return status
+    t, y = on_event(method, system, KNEE)
+    knee_time[step] = t
+    y = with_knee_struck(system, y)
+    return swing_phase(method, straightened(system), NoKnee(), model, finder, observer, t, y, latest, step, False)
+
+
+@inlined
+def swing_phase(
+    method: Any,
+    system: Any,
+    knee: Any,
+    model: Standing,
+    finder: CrossingFinder,
+    observer: Any,
+    t: float,
+    y0: State,
+    latest: float,
+    step: int,
+    at_start: bool,
+) -> int:
+    """Integrate up to the strike that ends a phase: of the knee that is free in it, or else of the heel.
+
+    at_start  the foot on the slope, and the knee in line, are the strike before: none of this phase
+    """
+    limit, coming = latest, False
     begin(method, system, t, y0, method.clock[H_NEXT])
-    bent, at_start, coming = is_bent(model.knee), True, NOTHING
     observe_start(observer, mode_of(system), head(model.blank, y0, 0))
     while method.clock[T] < limit:
         status = advance(method, system, limit)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
-        if coming == FOOT_DOWN or (coming == KNEE_STRIKE and method.clock[T] < limit):
+        if coming:
             continue
-        if coming == KNEE_STRIKE:
-            t, y = on_event(method, system, KNEE)
-            knee_time[step] = t
-            y, system = with_knee_struck(system, y), straightened(system)
-            begin(method, system, t, y, method.clock[H_NEXT])
-            observe_start(observer, mode_of(system), head(model.blank, y, 0))
-            bent, coming, limit = False, NOTHING, latest
-            continue
-        near = may_end(model, method, end_state(method, system), bent)
+        near = may_end(model, method, end_state(method, system), knee, at_start)
         if near or wants_dense(observer):
             prepare_dense(method, system)
-        strike, fall, knee = NO_CROSSING, NO_CROSSING, NO_CROSSING
+        strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
         if near:
-            strike, fall, knee = scan_swing(method, system, model, finder, at_start, bent)
-        observe(observer, method, mode_of(system), system, min(1.0, strike, fall, knee), step)
-        if fall < min(strike, knee):
+            strike, fall, struck = scan_swing(method, system, knee, model, finder, at_start)
+        observe(observer, method, mode_of(system), system, min(1.0, strike, fall, struck), step)
+        if fall < min(strike, struck):
             return FELL
-        if bent and strike < knee:
+        if is_bent(knee) and strike < struck:
             return BENT_KNEE
-        if min(strike, knee) <= 1.0:
-            coming = KNEE_STRIKE if knee < strike else FOOT_DOWN
-            limit = method.clock[T_OLD] + min(strike, knee) * (method.clock[T] - method.clock[T_OLD])
+        if min(strike, struck) <= 1.0:
+            coming = True
+            limit = method.clock[T_OLD] + min(strike, struck) * (method.clock[T] - method.clock[T_OLD])
             rewind(method, system)
         at_start = False
-    return WALKED if coming == FOOT_DOWN else NO_HEEL_STRIKE
+    if not coming:
+        return NO_HEEL_STRIKE
+    return KNEE_STRUCK if is_bent(knee) else WALKED
 
 
 @kernel

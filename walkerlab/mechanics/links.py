@@ -21,6 +21,15 @@ class Links(NamedTuple):
     weights: Vector  # (n n) row k: weights of the angles that body k follows
 
 
+class InLine(NamedTuple):
+    """Links of n bodies of which the swing shank turns with its thigh: both may as well be one body of n - 1."""
+
+    links: Links
+    others: Any  # links of the n - 1
+    one_each: Vector  # (n - 1) zeros
+    square: Vector  # (n - 1)^2 zeros
+
+
 @by_type
 def reduced(links: Any, M: Vector, r: Vector) -> tuple[Vector, Vector]:
     """E' M E and E' r, with trivial equations for the followers."""
@@ -93,6 +102,24 @@ def to_the_followers(links: Links, z: Vector) -> Vector:
                 total += links.weights[c * n + p] * z[p]
             z = put(z, c, total)
     return z
+
+
+@reduced.case(InLine)
+def reduced_one_by_one(links: InLine, M: Vector, r: Vector) -> tuple[Vector, Vector]:
+    """As any links."""
+    return reduced(links.links, M, r)
+
+
+@spread.case(InLine)
+def spread_one_by_one(links: InLine, z: Vector) -> Vector:
+    """As any links."""
+    return spread(links.links, z)
+
+
+@gathered.case(InLine)
+def gathered_one_by_one(links: InLine, r: Vector) -> Vector:
+    """As any links."""
+    return gathered(links.links, r)
 
 
 @inlined

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import Anchor, levers, tree_about
-from walkerlab.mechanics.links import Independent, Links
+from walkerlab.mechanics.links import Independent, InLine, Links
 from walkerlab.mechanics.parts import Assembly, Revolute
-from walkerlab.mechanics.standing import STANCE, SWING, NoKnee, Standing, SwingKnee, on_slope
+from walkerlab.mechanics.standing import SHANK, STANCE, SWING, NoKnee, Standing, SwingKnee, on_slope
 from walkerlab.mechanics.tree import Tree
 
 Floats = NDArray[np.float64]
@@ -63,9 +63,9 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
         hip_x=float(to_hip[STANCE, 0]),
         hip_y=float(to_hip[STANCE, 1]),
         knee=SwingKnee(places.knees[0][1], places.knees[0][0]) if places.knees else NoKnee(),
-        straight=links({**torso, **knees}, n, bool(knees)),
-        bent=links(torso, n, bool(knees)),
-        at_strike=links({**torso, **({} if free else knees)}, n, bool(knees)),
+        straight=links(torso, knees, n),
+        bent=links(torso, {}, n),
+        at_strike=links(torso, {} if free else knees, n),
         roles=places.roles,
         picked=(STANCE, n + SWING, n + STANCE, *(n + shank for shank in free)),
         lean=math.atan2(hanging[0], -hanging[1]),
@@ -119,14 +119,19 @@ def knee_rows(places: Places) -> dict[int, Floats]:
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
-def links(rows: dict[int, Floats], n: int, kneed: bool) -> Links | Independent:
-    """The links of followers' weights; of one type in all modes of a walker with knees."""
-    if not rows and not kneed:
+def links(torso: dict[int, Floats], knees: dict[int, Floats], n: int) -> Independent | Links | InLine:
+    """The links of n bodies by the followers' weights."""
+    rows = {**torso, **knees}
+    if not rows:
         return Independent()
     weights = np.eye(n)
     for follower, row in rows.items():
         weights[follower] = row
-    return Links(tuple(1.0 if k in rows else 0.0 for k in range(n)), numbers(weights.ravel()))
+    every = Links(tuple(1.0 if k in rows else 0.0 for k in range(n)), numbers(weights.ravel()))
+    if not knees:
+        return every
+    others = links({k - 1: np.delete(row, SHANK) for k, row in torso.items()}, {}, n - 1)
+    return InLine(every, others, (0.0,) * (n - 1), (0.0,) * (n - 1) ** 2)
 
 
 def merged(tree: Tree, members: Floats) -> Tree:

@@ -15,14 +15,14 @@ belongs to both legs.
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import inlined, woven
-from walkerlab.mechanics.links import gathered, reduced, solve_linked, spread
+from walkerlab.kernels import by_type, inlined, woven
+from walkerlab.mechanics.links import Independent, InLine, Links, gathered, reduced, solve_linked, spread
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, with_centrifugal
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.mechanics.tuples import Vector, factored, put, solve_factored
 from walkerlab.solvers.system import State, blank, derivative, jacobian
 
-SWING, STANCE = 0, 1
+SWING, STANCE, SHANK = 0, 1, 2
 
 
 class Standing(NamedTuple):
@@ -104,7 +104,7 @@ def projections(arm_x: Vector, arm_y: Vector, s: Vector, c: Vector) -> tuple[Vec
 
 
 @inlined
-def standing_mass(model: Standing, s: Vector, c: Vector, U: Vector) -> Vector:
+def standing_mass(model: Any, s: Vector, c: Vector, U: Vector) -> Vector:
     """M' (n n), kg m^2."""
     n, R = len(s), model.radius
     M = mass_matrix(model.tree, s, c)
@@ -118,7 +118,7 @@ def standing_mass(model: Standing, s: Vector, c: Vector, U: Vector) -> Vector:
 
 
 @inlined
-def standing_torques(model: Standing, s: Vector, c: Vector, F: Vector, U: Vector, y: State) -> Vector:
+def standing_torques(model: Any, s: Vector, c: Vector, F: Vector, U: Vector, y: State) -> Vector:
     """r (n), N m."""
     n = len(s)
     r = U
@@ -134,10 +134,75 @@ def standing_torques(model: Standing, s: Vector, c: Vector, F: Vector, U: Vector
 
 @woven
 def rates(model: Standing, links: Any, y: State) -> Vector:
-    """Angular accelerations (n) in rad/s^2: M'^-1 r with the followers out of the way."""
+    """Angular accelerations (n) in rad/s^2."""
+    return rates_of(links, model, y)
+
+
+@by_type
+def rates_of(links: Any, model: Any, y: State) -> Vector:
+    """`rates` of the bodies that `links` leave to themselves."""
+
+
+@rates_of.case(Independent, woven=True)
+@rates_of.case(Links, woven=True)
+def linked_rates(links: Any, model: Any, y: State) -> Vector:
+    """M'^-1 r with the followers out of the way."""
     s, c = sines_cosines(model.tree, y, 0, model.slope)
     F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
     return solve_linked(links, standing_mass(model, s, c, U), standing_torques(model, s, c, F, U, y))
+
+
+class OneLess(NamedTuple):
+    """What a walker's equations of motion need, with its straight swing leg as one body."""
+
+    tree: Tree
+    centrifugal: Tree
+    radius: float
+    gravity_along: float
+    gravity_down: float
+    slope: float
+
+
+@rates_of.case(InLine, woven=True)
+def rates_in_line(links: InLine, model: Standing, y: State) -> Vector:
+    """Those of one body less."""
+    one = OneLess(
+        straight_tree(links, model.tree),
+        straight_tree(links, model.centrifugal),
+        model.radius,
+        model.gravity_along,
+        model.gravity_down,
+        model.slope,
+    )
+    n, less = len(model.tree.arm_x), len(links.one_each)
+    state = links.one_each + links.one_each
+    for k in range(less):
+        state = put(state, k, y[k if k < SHANK else k + 1])
+        state = put(state, less + k, y[n + (k if k < SHANK else k + 1)])
+    alpha, every = rates_of(links.others, one, state), model.tree.arm_x
+    for k in range(n):
+        every = put(every, k, alpha[place_in_line(k)])
+    return every
+
+
+@inlined
+def place_in_line(k: int) -> int:
+    """Where body k is among those of one body less."""
+    return SWING if k == SHANK else (k if k < SHANK else k - 1)
+
+
+@inlined
+def straight_tree(links: InLine, tree: Tree) -> Tree:
+    """The tree with the swing leg in one piece: constants of bodies that turn as one add up."""
+    n, less = len(tree.arm_x), len(links.one_each)
+    A, B, arm_x, arm_y = links.square, links.square, links.one_each, links.one_each
+    for k in range(n):
+        row = place_in_line(k)
+        arm_x, arm_y = put(arm_x, row, arm_x[row] + tree.arm_x[k]), put(arm_y, row, arm_y[row] + tree.arm_y[k])
+        for l in range(n):
+            at = row * less + place_in_line(l)
+            A, B = put(A, at, A[at] + tree.cosine[k * n + l]), put(B, at, B[at] + tree.sine[k * n + l])
+    return Tree(tree.mass, A, B, arm_x, arm_y)
 
 
 @inlined
@@ -286,26 +351,22 @@ def total_energy(model: Standing, y: State) -> float:
 @inlined
 def swing_foot(model: Standing, y: State) -> tuple[float, float]:
     """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.foot_x, model.foot_y, s, c)
-    height, ahead = 0.0, 0.0
-    for k in range(len(s)):
-        height += U[k]
-        ahead += F[k]
-    return height, ahead
+    return swing_foot_motion(model, y)[0]
 
 
 @inlined
-def swing_foot_velocity(model: Standing, y: State) -> tuple[float, float]:
-    """Rates (m/s) of `swing_foot`."""
+def swing_foot_motion(model: Standing, y: State) -> tuple[tuple[float, float], tuple[float, float]]:
+    """`swing_foot` and its rates (m/s)."""
     n = len(model.tree.arm_x)
     s, c = sines_cosines(model.tree, y, 0, model.slope)
     F, U = projections(model.foot_x, model.foot_y, s, c)
-    upward, apart = 0.0, 0.0
+    height, ahead, upward, apart = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
+        height += U[k]
+        ahead += F[k]
         upward += F[k] * y[n + k]
         apart -= U[k] * y[n + k]
-    return upward, apart
+    return (height, ahead), (upward, apart)
 
 
 @inlined

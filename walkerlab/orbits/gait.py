@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.standing import Standing, swing_foot_velocity
+from walkerlab.mechanics.standing import Standing, swing_foot_motion
 from walkerlab.orbits.similarity import Units
 from walkerlab.orbits.small_slope import Vector
 from walkerlab.orbits.step_map import on_section
@@ -76,6 +76,6 @@ def measured(walker: Standing, units: Units, method: Any, z: Vector, DP: Vector)
         min_normal_force=step.min_normal_force * units.force,
         max_friction_ratio=step.max_friction_ratio,
         max_scuff_depth=step.max_scuff_depth * units.length,
-        trailing_foot_rises=swing_foot_velocity(walker, start)[0] >= 0.0,
+        trailing_foot_rises=swing_foot_motion(walker, start)[1][0] >= 0.0,
         knee_strike=None if step.knee_strikes is None else float(step.knee_strikes[0]) * units.time,
     )
