@@ -45,7 +45,10 @@ def fill_reactions(walker: Standing, states: Any, bent: Any, out: Any) -> None:
     """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
-        out[i, 0], out[i, 1] = ground_reaction(walker, walker.bent if bent[i] else walker.straight, y)
+        if bent[i]:
+            out[i, 0], out[i, 1] = ground_reaction(walker, walker.bent, y)
+        else:
+            out[i, 0], out[i, 1] = ground_reaction(walker, walker.straight, y)
 
 
 @dataclass(frozen=True)
