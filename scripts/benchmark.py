@@ -3,7 +3,7 @@
     python scripts/benchmark.py [--quick] [--write]
 
 Everything is warm; times are medians. Peers are named with their versions. With --write the table goes into
-docs/performance.md. With --quick each time is the median of fewer repeats, and near-rigid ground is left out.
+docs/performance.md. With --quick each time is the median of fewer repeats.
 """
 
 from __future__ import annotations
@@ -245,7 +245,7 @@ def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
     yield at_most(work, rigid / typed, "x", 1.5, 1)
 
 
-def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
+def batch_lines(watch: Stopwatch) -> Iterator[Line]:
     """Walks in lanes on one core, and basins of attraction on two."""
     trial = printed_trial()
     reference = reference_for(trial)
@@ -262,8 +262,7 @@ def batch_lines(watch: Stopwatch, quick: bool) -> Iterator[Line]:
     said = f"{rate:.3g} steps/s at {error:.1e} ({', '.join(others)})"
     yield Line("rigid steps in lanes, one core, at 1e-6", said, "1e+06 steps/s", bar)
     yield basin_line("basin, rigid, 1,000 x 1,000", 20.0, "basin.cells=[1000,1000]")
-    if not quick:
-        yield basin_line("basin, contact, 200 x 200", 120.0, "basin.model=contact", "basin.cells=[200,200]")
+    yield basin_line("basin, contact, 200 x 200", 120.0, "basin.model=contact", "basin.cells=[200,200]")
 
 
 def basin_line(work: str, bar: float, *sets: str) -> Line:
@@ -366,7 +365,7 @@ def conclusion(lines: Sequence[Line]) -> str:
 
 
 def all_lines(
-    watch: Stopwatch, trial: ContactTrial, reference: Reference, sides: dict[str, float], repeats: int, quick: bool
+    watch: Stopwatch, trial: ContactTrial, reference: Reference, sides: dict[str, float], repeats: int
 ) -> Iterator[Line]:
     """Every claim, as it is measured."""
     yield from rigid_lines(watch)
@@ -377,7 +376,7 @@ def all_lines(
     yield memory_line()
     yield process_line(repeats)
     yield from family_lines(Stopwatch(3, 10.0))
-    yield from batch_lines(watch, quick)
+    yield from batch_lines(watch)
 
 
 def main() -> None:
@@ -393,7 +392,7 @@ def main() -> None:
     reference = reference_for(trial)
     sides = times_ns(repeats)
     lines: list[Line] = []
-    for line in all_lines(watch, trial, reference, sides, repeats, options.quick):
+    for line in all_lines(watch, trial, reference, sides, repeats):
         print(f"{line.work}: {line.measured}; {line.verdict}", flush=True)
         lines.append(line)
     parts = {
