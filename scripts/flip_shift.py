@@ -1,11 +1,13 @@
 """How the contact model's first flip comes to the rigid model's as its ground creeps less and stiffens.
 
     python scripts/flip_shift.py [--velocities 100 25 6.25] [--radii 0.001 0.0001 0.00001] [--factors 1 10 100]
+                                 [--frictions 0.5 1 2]
 
 The paper's walker over slope. Three series, each from the end of the one before: the stiction velocity falls and the
 friction velocity with it; the ball feet, which roll, shrink to points; the ground stiffens, its damping as k^p
-(--damping) and the penetration of full damping as k^(-1/e). The observed order comes from the changes between
-neighbours, and so does not hang on what else separates the models.
+(--damping) and the penetration of full damping as k^(-1/e). A fourth from the end of the second: friction, with both
+velocities in proportion to it, so that feet creep alike. The observed order comes from the changes between neighbours,
+and so does not hang on what else separates the models.
 """
 
 from __future__ import annotations
@@ -33,10 +35,11 @@ class Ground(NamedTuple):
     radius: float  # of the ball feet, m
     stiffer: float = 1.0  # times the config's stiffness
     damped: float = 1.0  # times its damping
+    rubbed: float = 1.0  # times its coefficients of friction
 
 
-def config_of(ground: Ground) -> Config:
-    """The paper's walker on another ground."""
+def config_of(ground: Ground, *more: str) -> Config:
+    """The paper's walker on another ground; `more` is set besides, as on the command line."""
     own = load().config.contact
     assert own is not None, "the paper's walker has a contact block"
     changed = {
@@ -45,9 +48,11 @@ def config_of(ground: Ground) -> Config:
         "full_damping_penetration": own.full_damping_penetration * ground.stiffer ** (-1.0 / own.exponent),
         "stiction_velocity": ground.velocity,
         "friction_velocity": own.friction_velocity / own.stiction_velocity * ground.velocity,
+        "static_friction": own.static_friction * ground.rubbed,
+        "dynamic_friction": own.dynamic_friction * ground.rubbed,
     }
     sets = [f"contact.{name}={value!r}" for name, value in changed.items()]
-    return load(sets=[*sets, f"walker.foot_radius_m={ground.radius!r}"]).config
+    return load(sets=[*sets, f"walker.foot_radius_m={ground.radius!r}", *more]).config
 
 
 def question(config: Config) -> Question:
@@ -92,6 +97,7 @@ def main() -> None:
     parser.add_argument("--radii", type=float, nargs="+", default=[1e-3, 1e-4, 1e-5], help="m")
     parser.add_argument("--factors", type=float, nargs="+", default=[1.0, 10.0, 100.0], help="of the stiffness")
     parser.add_argument("--damping", type=float, default=1.0, help="power of the stiffness that the damping goes with")
+    parser.add_argument("--frictions", type=float, nargs="+", default=[0.5, 1.0, 2.0], help="of its coefficients")
     asked = parser.parse_args()
     found = first_flip(rigid_branches(question(load().config), Silent())[0].branches)
     assert found is not None, "the rigid walker's flip is in the span"
@@ -104,10 +110,12 @@ def main() -> None:
         ("radius of the feet (m)", [Ground(velocity, one) for one in asked.radii], asked.radii),
         ("times the stiffness", stiffer, asked.factors),
     )
+    rubbing = [Ground(velocity * factor, point, rubbed=factor) for factor in asked.frictions]
     for name, grounds, knob in series:
         flips = rows(name, grounds, knob, rigid)
         if len(flips) > 2:
             print(f"{'limit':>24} {limit(flips):12.6f} {limit(flips) - rigid:12.6f}")
+    rows("times the friction", rubbing, asked.frictions, rigid)
 
 
 if __name__ == "__main__":

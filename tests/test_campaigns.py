@@ -100,3 +100,18 @@ def test_texts_of_cases_do_not_become_markup():
     page = render(Page("title", (section(Results(None, {"stability": stability})),)))
     assert MARKUP not in page
     assert "&lt;script&gt;" in page
+
+
+def test_stiffer_ground_does_not_let_the_trailing_foot_go_as_the_rigid_impact_does():
+    script("flip_shift")
+    trailing = script("trailing_foot")
+    losses, shares = [], []
+    for ground in trailing.GROUNDS[:2]:
+        walker, y, (slips, rises) = trailing.at_touch(ground, 4.2)
+        found = trailing.strike(walker, y)
+        losses.append(slips - found.slips)
+        shares.append(found.share)
+        assert found.rises > rises
+    assert all(0.005 < loss < 0.02 for loss in losses)
+    assert losses[1] > losses[0]
+    assert all(0.0005 < share < 0.002 for share in shares)
