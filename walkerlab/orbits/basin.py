@@ -44,6 +44,7 @@ NONE = -1  # no attractor
 LONGEST_PERIOD = 32  # steps; an attractor that repeats itself later, or never, is aperiodic
 REPEATS = 1e-7  # distance of states that are called the same
 SETTLING = 2_000  # steps after which walks are looked at
+FIRST = 64  # starts that walk as long without any attractor known
 SETTLING_AGAIN = 400  # at the tight tolerance, from where they were
 COMING_BACK = 1_000  # steps in which walks from around an attractor must come ten times nearer to it
 WATCHED = 32  # walks that are looked at
@@ -183,13 +184,31 @@ def walk_one_by_one(
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """The attractors that walks from section coordinates `starts` (n, 3) come to.
 
+    The first few starts walk long; of the others only those that do not come to an attractor known by then.
+
     walker  the unit walker
     seed    of the starts around attractors
     """
+
+    def with_reaches(cycles: Sequence[Floats]) -> tuple[Cycle, ...]:
+        generator = np.random.default_rng(seed)
+        return tuple(Cycle(points, reach_of(walker, points, cycles, generator)) for points in cycles)
+
+    cycles, aperiodic = settled_cycles(walker, starts[:FIRST], Attractors())
+    reached = with_reaches(cycles)
+    more, beside = settled_cycles(walker, starts[FIRST:], Attractors(reached))
+    new = [cycle for cycle in more if not any(same_cycle(cycle, other) for other in cycles)]
+    if new:
+        reached = with_reaches(in_order([*cycles, *new]))
+    return Attractors(reached, aperiodic or beside)
+
+
+def settled_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[list[Floats], bool]:
+    """The cycles that walks settle on which come to none that is known; whether any settles on no cycle."""
     tight = (FOUND_RTOL, FOUND_ATOL)
-    rough = arrivals(walker, Attractors(), starts, SETTLING)
-    alive = np.flatnonzero(rough.outcome == Outcome.WALKED)
-    distinct = distinct_points(rough.last[alive])[:WATCHED]
+    rough = arrivals(walker, known, starts, SETTLING)
+    elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == NONE))
+    distinct = distinct_points(rough.last[elsewhere])[:WATCHED]
     settled = arrivals(walker, Attractors(), distinct, SETTLING_AGAIN, tolerances=tight)
     cycles: list[Floats] = []
     aperiodic = False
@@ -199,10 +218,12 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
             aperiodic = True
         elif not any(same_cycle(cycle, other) for other in cycles):
             cycles.append(cycle)
-    cycles.sort(key=lambda points: (len(points), *points[0]))
-    generator = np.random.default_rng(seed)
-    reached = tuple(Cycle(points, reach_of(walker, points, cycles, generator)) for points in cycles)
-    return Attractors(reached, aperiodic)
+    return in_order(cycles), aperiodic
+
+
+def in_order(cycles: Sequence[Floats]) -> list[Floats]:
+    """Short ones first."""
+    return sorted(cycles, key=lambda points: (len(points), *points[0]))
 
 
 def distinct_points(points: Floats) -> Floats:

@@ -34,7 +34,6 @@ from walkerlab.stages.basin_pieces import (
     unpacked,
 )
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.tune import BUDGET_FACTOR, LEAST_BUDGET, MAP_ATOL, MAP_RTOL, free_scene
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 from walkerlab.verification.processes import in_order
@@ -146,6 +145,9 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     """The contact model at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise ConfigError("basin.model: contact needs a contact block, and the config has none.", "Add one.")
+    # Imported here: it brings interpolation along, which the rigid model's basin does without.
+    from walkerlab.stages.tune import BUDGET_FACTOR, LEAST_BUDGET, MAP_ATOL, MAP_RTOL, free_scene
+
     gait = inputs["fixedpoint"].summary
     state = tuple(float(number) for number in gait["state"])
     answer = contact_gait(config, float(gait["step_length_m"]), state)
