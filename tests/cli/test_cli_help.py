@@ -48,6 +48,12 @@ def test_help_names_every_command(walker):
     assert {*(stage.name for stage in STAGES), "status", "show", "schema", "clean"} <= commands
 
 
+def test_help_says_what_each_command_is_for_without_cutting_it_short(walker):
+    words = " ".join(walker("--help").stdout.split())
+    assert all(stage.purpose in words for stage in STAGES)
+    assert "..." not in words
+
+
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
 def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
     words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())

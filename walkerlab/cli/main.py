@@ -3,9 +3,10 @@
 import inspect
 import os
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from walkerlab import __version__
 from walkerlab.cli import around, housekeeping, sweep
@@ -41,10 +42,23 @@ def main() -> None:
     program()()
 
 
+class Commands(TyperGroup):
+    """The commands, with their whole purpose in the list."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Wrapped to the width, where click would cut."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, str(command.help).split("\n\n")[0]) for name, command in commands.items() if command]
+            )
+
+
 def program(graph: Graph = PIPELINE) -> typer.Typer:
     """The command line for a pipeline."""
     app = typer.Typer(
         name="walkerlab",
+        cls=Commands,
         help="Passive-dynamic walking as a reproducible experiment. Without --config, the paper's walker.",
         add_completion=True,
         no_args_is_help=True,
