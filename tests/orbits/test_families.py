@@ -245,6 +245,28 @@ def test_a_doubled_branch_is_followed_away_from_its_flip():
             assert 0.0 < parted[0] < parted[1] < parted[2]
 
 
+def between_the_first_flip_and_the_branch_beyond_it():
+    one = next(branch for branch in compass_family() if branch.period == 1 and branch.stable_ranges)
+    two = next(branch for branch in compass_family() if branch.period == 2)
+    slope = 0.5 * (two.ends[0].value + two.points[0].value)
+    follower = Follower(map_of(paper_walker, 0.1 - 1e-4), Span(1e-4, 0.1), limits=Limits(points=12))
+    walked = settled(follower.step_map, one.points[-1].z, slope, 400, 2)
+    return follower, Seed(walked.last, slope, 2)
+
+
+def test_a_gait_just_beyond_a_flip_is_on_the_branch_that_begins_there():
+    follower, seed = between_the_first_flip_and_the_branch_beyond_it()
+    known = compass_family()
+    assert follower.family([seed], 2, known) == known
+
+
+def test_no_branch_is_followed_from_a_flip_that_another_one_has_closed_on():
+    follower, seed = between_the_first_flip_and_the_branch_beyond_it()
+    branches = follower.family([seed, *seeds_at(paper_walker, 0.07)], 2)
+    assert [branch.period for branch in branches] == [2, 1, 1]
+    assert any(end.reason.startswith("closes") for end in branches[0].ends)
+
+
 def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():
     step_map = map_of(paper_walker, 0.1)
     one, two = (next(b for b in compass_family() if b.period == n and b.stable_ranges) for n in (1, 2))

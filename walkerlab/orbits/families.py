@@ -192,8 +192,13 @@ class Follower:
             start = self.solved_at(seed.z, seed.value, seed.period)
             if start is None or repeats_sooner(start, seed.period):
                 continue
-            if not any(self.lies_on(branch, start) for branch in branches if branch.period == seed.period):
-                branches.append(self.both_ways(start, seed.period))
+            like = [branch for branch in branches if branch.period == seed.period]
+            if any(self.lies_on(branch, start) for branch in like):
+                continue
+            found = self.both_ways(start, seed.period)
+            # between a flip and the first gait beyond it a branch that is known has no points
+            if not any(self.lies_on(found, branch.points[0].solved) for branch in like):
+                branches.append(found)
         for branch in branches:  # grows on the way
             if 2 * branch.period <= periods and branch not in known:
                 branches.extend(self.doubled(branch, branches))
@@ -378,11 +383,15 @@ def closes(last: Solved[Cycle], solved: Solved[Cycle], period: int) -> bool:
 
 
 def ends_at(branch: Branch, flip: Bifurcation, period: int) -> bool:
-    """Whether a branch of this period closes on this flip."""
-    if branch.period != period or not branch.ends[1].reason.startswith("closes"):
+    """Whether a branch of this period closes on this flip, at either end."""
+    if branch.period != period:
         return False
-    last, before = branch.points[-1], branch.points[max(0, len(branch.points) - 2)]
-    return abs(branch.ends[1].value - flip.value) <= 2.0 * abs(last.value - before.value) + 1e-12
+    values = branch.values
+    for end, last, before in ((branch.ends[0], 0, 1), (branch.ends[1], -1, -2)):
+        near = 2.0 * abs(values[last] - values[before]) if values.size > 1 else 0.0
+        if end.reason.startswith("closes") and abs(end.value - flip.value) <= near + 1e-12:
+            return True
+    return False
 
 
 def why_lost(lost: Lost) -> str:
