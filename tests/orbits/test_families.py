@@ -366,3 +366,10 @@ def test_what_repeats_itself_has_a_period_and_what_does_not_has_none():
     cycle = np.tile([[0.1, 0.2], [0.3, 0.1], [0.2, 0.5]], (8, 1))
     assert period_of(cycle) == 3
     assert period_of(np.random.default_rng(0).standard_normal((30, 2))) == 0
+
+
+def test_what_still_settles_has_the_period_that_it_comes_to():
+    settling = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 5e-4 * 0.99 ** np.arange(96)[:, None]
+    assert period_of(settling) == 2
+    drifting = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 1e-4 * 1.05 ** np.arange(96)[:, None]
+    assert period_of(drifting) == 0

@@ -22,6 +22,7 @@ from walkerlab.orbits.step_maps import StepMap
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
+NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how much so from first to last third
 BLOCKS = 10
 SMALLER_STEPS = 8
 CANDIDATES = 4  # near returns that are tried, of one number of steps
@@ -65,9 +66,12 @@ class Attractors:
 
 
 def period_of(points: Floats) -> int:
-    """After how many steps points (steps, d) repeat themselves; 0 if they do not."""
+    """After how many steps points (steps, d) repeat themselves, or come closer and closer to it; 0 if they do not."""
     for period in range(1, min(LONGEST_PERIOD, points.shape[0] // 2) + 1):
-        if np.max(np.abs(points[period:] - points[:-period])) < REPEATS:
+        apart = np.max(np.abs(points[period:] - points[:-period]), axis=1)
+        third = apart.size // 3
+        before, after = apart[: third + 1].max(), apart[apart.size - third - 1 :].max()
+        if apart.max() < REPEATS or (apart.max() < NEARLY and after < CLOSER * before):
             return period
     return 0
 

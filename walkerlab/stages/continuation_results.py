@@ -13,7 +13,8 @@ from walkerlab.config.continuation import Continuation, Span
 from walkerlab.labels import Label
 from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
-from walkerlab.orbits.families import Branch, strike_to_strike
+from walkerlab.orbits.bifurcations import Bifurcation
+from walkerlab.orbits.families import Branch, ends_at, strike_to_strike
 from walkerlab.orbits.regions import Regions
 from walkerlab.orbits.step_maps import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
@@ -107,7 +108,7 @@ def limit_rows(followed: Followed) -> Iterator[dict[str, Any]]:
 def cascade_rows(followed: Followed) -> Iterator[dict[str, Any]]:
     """Chains of branches, each born in a flip of the one before, with the ratios of their flips' distances."""
     for first in followed.branches:
-        if first.ends[0].reason.startswith("flip"):
+        if any(is_born_in(first, flip, other) for other in followed.branches for flip in other.bifurcations):
             continue
         flips = chain(first, followed.branches)
         if len(flips) > 1:
@@ -118,12 +119,19 @@ def cascade_rows(followed: Followed) -> Iterator[dict[str, Any]]:
 
 def chain(branch: Branch, branches: Sequence[Branch]) -> list[float]:
     """Flips of a branch, of the branch born there, and so on, wherever a branch is stable before it."""
-    flips = [one.value for one in branch.bifurcations if one.kind == "flip"]
+    flips = [one for one in branch.bifurcations if one.kind == "flip"]
     for flip in flips:
         for child in branches:
-            if child.period == 2 * branch.period and child.ends[0].value == flip:
-                return [flip, *chain(child, branches)]
-    return flips[:1]
+            if is_born_in(child, flip, branch):
+                return [flip.value, *chain(child, branches)]
+    return [flip.value for flip in flips[:1]]
+
+
+def is_born_in(child: Branch, flip: Bifurcation, parent: Branch) -> bool:
+    """Whether a branch begins at a flip of another one, at either of its ends."""
+    if flip.kind != "flip" or child.period != 2 * parent.period:
+        return False
+    return child.ends[0].value == flip.value or ends_at(child, flip, child.period)
 
 
 def attractor_summary(model: str, attractors: Attractors) -> dict[str, Any]:
