@@ -11,7 +11,7 @@ import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
 from walkerlab.labels import Label
-from walkerlab.orbits.attractors import Attractors, feigenbaum_ratios
+from walkerlab.orbits.attractors import feigenbaum_ratios
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.bifurcations import Bifurcation
 from walkerlab.orbits.families import Branch, ends_at, strike_to_strike
@@ -56,7 +56,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "lyapunov": [{"model": one.model, **asdict(exponent)} for one in found for exponent in one.exponents],
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
-        "attractors": [attractor_summary(one.model, one.attractors) for one in found if one.attractors.found],
+        "attractors": [attractor_summary(one) for one in found if one.attractors.found],
         "curves": [row for one in found for row in curve_rows(one)],
         "regions": [row for one in found for row in region_rows(one)],
     }
@@ -134,11 +134,21 @@ def is_born_in(child: Branch, flip: Bifurcation, parent: Branch) -> bool:
     return child.ends[0].value == flip.value or ends_at(child, flip, child.period)
 
 
-def attractor_summary(model: str, attractors: Attractors) -> dict[str, Any]:
-    """Over which values the attractor was followed, and what became of it."""
-    aperiodic = [one.value for one in attractors.found if one.period == 0]
+def attractor_summary(followed: Followed) -> dict[str, Any]:
+    """Over which values the attractor was followed, and what became of it.
+
+    Just beyond a flip walks leave the gait slowly: what has not repeated itself by then is aperiodic only where
+    neighbours part, by the exponent that was measured nearest to it.
+    """
+
+    def part(value: float) -> bool:
+        nearest = min(followed.exponents, key=lambda one: abs(one.value - value), default=None)
+        return nearest is None or nearest.exponent > 0.0
+
+    attractors = followed.attractors
+    aperiodic = [one.value for one in attractors.found if one.period == 0 and part(one.value)]
     return {
-        "model": model,
+        "model": followed.model,
         "from": attractors.found[0].value,
         "to": attractors.found[-1].value,
         "aperiodic_from": min(aperiodic, default=None),
