@@ -7,7 +7,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.attractors import close_returns, feigenbaum_ratios, largest_exponent, period_of, settled
+from walkerlab.orbits.attractors import (
+    Lyapunov,
+    close_returns,
+    feigenbaum_ratios,
+    largest_exponent,
+    may_part,
+    period_of,
+    settled,
+)
 from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
@@ -366,6 +374,15 @@ def test_what_repeats_itself_has_a_period_and_what_does_not_has_none():
     cycle = np.tile([[0.1, 0.2], [0.3, 0.1], [0.2, 0.5]], (8, 1))
     assert period_of(cycle) == 3
     assert period_of(np.random.default_rng(0).standard_normal((30, 2))) == 0
+
+
+def test_neighbours_may_part_where_an_exponent_beside_is_positive():
+    exponents = [Lyapunov(4.0, -0.2, 0.01), Lyapunov(5.0, -0.1, 0.01), Lyapunov(6.0, 0.3, 0.01)]
+    assert not may_part(exponents, 4.5)
+    assert not may_part(exponents, 4.0)
+    assert may_part(exponents, 5.2)
+    assert may_part(exponents, 7.0)
+    assert may_part([], 4.0)
 
 
 def test_what_still_settles_has_the_period_that_it_comes_to():

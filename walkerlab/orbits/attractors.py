@@ -9,7 +9,7 @@ Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -51,6 +51,13 @@ class Lyapunov:
     value: float
     exponent: float
     uncertainty: float
+
+
+def may_part(exponents: Sequence[Lyapunov], value: float) -> bool:
+    """Whether neighbours may part at a value: not if the exponents measured around it, in order, say that they meet."""
+    below = [one for one in exponents if one.value <= value][-1:]
+    above = [one for one in exponents if one.value >= value][:1]
+    return not exponents or any(one.exponent > 0.0 for one in (*below, *above))
 
 
 @dataclass(frozen=True, eq=False)

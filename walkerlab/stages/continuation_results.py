@@ -11,7 +11,7 @@ import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
 from walkerlab.labels import Label
-from walkerlab.orbits.attractors import feigenbaum_ratios
+from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.bifurcations import Bifurcation
 from walkerlab.orbits.families import Branch, ends_at, strike_to_strike
@@ -137,16 +137,11 @@ def is_born_in(child: Branch, flip: Bifurcation, parent: Branch) -> bool:
 def attractor_summary(followed: Followed) -> dict[str, Any]:
     """Over which values the attractor was followed, and what became of it.
 
-    Just beyond a flip walks leave the gait slowly: what has not repeated itself by then is aperiodic only where
-    neighbours part, by the exponent that was measured nearest to it.
+    Just beyond a flip walks leave the gait slowly: what has not repeated itself by then counts as aperiodic only where
+    neighbours may part.
     """
-
-    def part(value: float) -> bool:
-        nearest = min(followed.exponents, key=lambda one: abs(one.value - value), default=None)
-        return nearest is None or nearest.exponent > 0.0
-
-    attractors = followed.attractors
-    aperiodic = [one.value for one in attractors.found if one.period == 0 and part(one.value)]
+    attractors, exponents = followed.attractors, followed.exponents
+    aperiodic = [one.value for one in attractors.found if one.period == 0 and may_part(exponents, one.value)]
     return {
         "model": followed.model,
         "from": attractors.found[0].value,
