@@ -386,7 +386,6 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write the tables into docs/performance.md")
     options = parser.parse_args()
     watch = Stopwatch(3, 0.3) if options.quick else Stopwatch(9, 3.0)
-
     repeats = 5 if options.quick else 15
     trial = contact_trial_of(ONE_DEGREE)
     reference = reference_for(trial)

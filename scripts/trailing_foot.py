@@ -10,14 +10,15 @@ impact lets the trailing foot go freely. Stiffness, damping and friction change 
 from __future__ import annotations
 
 import argparse
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 from flip_shift import Ground, config_of
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.walker import ContactWalker, foot_force
+from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import feet_motion
 from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.mechanics.impact import heel_strike
@@ -66,21 +67,23 @@ def strike(walker: ContactWalker, y: State) -> Struck:
     """Integrate from the touch until the leading foot stops sinking in, with the normal impulses of both feet."""
     system = OnGround(walker, (True, True))
 
-    def rates(t: float, x: tuple[float, ...]) -> tuple[float, ...]:
-        state = tuple(float(value) for value in x[:-2])
-        pushes = (
-            foot_force(walker, foot).normal.force if foot.height < 0.0 else 0.0 for foot in feet_motion(walker, state)
-        )
-        return (*derivative(system, t, state), *pushes)
+    def feet(x: Any) -> tuple[FootMotion, FootMotion]:
+        return feet_motion(walker, tuple(x[:-2].tolist()))
 
-    def sinking(_t: float, x: tuple[float, ...]) -> float:
-        return feet_motion(walker, tuple(float(value) for value in x[:-2]))[LEADING].climb
+    def rates(t: float, x: Any) -> tuple[float, ...]:
+        pushes = (foot_force(walker, foot).normal.force if foot.height < 0.0 else 0.0 for foot in feet(x))
+        return (*derivative(system, t, tuple(x[:-2].tolist())), *pushes)
 
-    sinking.terminal, sinking.direction = True, 1.0  # type: ignore[attr-defined]
-    run = solve_ivp(rates, (0.0, LONGEST), (*y, 0.0, 0.0), method="Radau", rtol=1e-7, atol=1e-10, events=sinking)
+    def sinking(_t: float, x: Any) -> float:
+        return feet(x)[LEADING].climb
+
+    ending: Any = sinking
+    ending.terminal, ending.direction = True, 1.0
+    start = np.array([*y, 0.0, 0.0])
+    run = solve_ivp(rates, (0.0, LONGEST), start, method="Radau", rtol=1e-7, atol=1e-10, events=ending)
     assert run.status == 1, "the leading foot stops"
     end = run.y[:, -1]
-    foot = feet_motion(walker, tuple(float(value) for value in end[:-2]))[TRAILING]
+    foot = feet(end)[TRAILING]
     return Struck(foot.slip, foot.climb, float(end[-1] / end[-2]))
 
 

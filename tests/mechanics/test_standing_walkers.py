@@ -211,10 +211,20 @@ def linked(mode, y):
     return np.array((*spread(mode.links, tuple(y[:4])), *spread(mode.links, tuple(y[4:]))))
 
 
-@pytest.mark.parametrize("links", ["bent", "straight"])
+@pytest.mark.parametrize("links", [KNEED.bent, KNEED.straight.links], ids=["bent", "straight"])
 @given(numbers=free)
 def test_the_jacobian_is_the_slope_of_the_rates(links, numbers):
-    mode = Mode(KNEED, getattr(KNEED, links))
+    mode = Mode(KNEED, links)
+    y = np.array(kneed_state(numbers))
+    J = np.zeros((8, 8))
+    mode_jacobian(mode, 0.0, tuple(y), J)
+    slopes = differences(lambda x: rates(KNEED, mode.links, x), y)
+    assert J[4:] == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
+
+
+@given(numbers=free)
+def test_the_jacobian_of_a_leg_in_one_piece_is_the_slope_along_what_it_can_do(numbers):
+    mode = Mode(KNEED, KNEED.straight)
     y, J = linked(mode, kneed_state(numbers)), np.zeros((8, 8))
     mode_jacobian(mode, 0.0, tuple(y), J)
     possible = [linked(mode, unit) for unit in np.eye(8)]
