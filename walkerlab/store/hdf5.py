@@ -86,7 +86,8 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
     def _read_anew(self, name: str) -> Variable:
         with h5py.File(self.file) as opened:
-            return read_variable(name, opened[self.path][name], Budget(self.file.stat().st_size))
+            group = opened[self.path]
+            return read_variable(name, group[name], names_of(dict(group)), Budget(self.file.stat().st_size))
 
 
 def write_group(target: Any, group: Group) -> None:
@@ -158,15 +159,18 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
     if path.count("/") >= MOST_LEVELS:
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
+    members: dict[str, Any] = {}
     for name in parent:
         budget.spend(LEAST_BYTES)
         if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"it holds a link, {name!r}")
-        member = parent[name]
+        members[name] = parent[name]
+    names = names_of(members)
+    for name, member in members.items():
         if isinstance(member, h5py.Group):
             yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
         elif not is_bare_dimension(member):
-            variables[name] = read_variable(name, member, budget)
+            variables[name] = read_variable(name, member, names, budget)
     if path:
         yield path, Group(variables, dict(read_attributes(parent)))
     elif variables:
@@ -178,14 +182,24 @@ def is_bare_dimension(dataset: Any) -> bool:
     return "NAME" in dataset.attrs and read_text(dataset, "NAME").startswith(BARE_DIMENSION)
 
 
-def read_variable(name: str, dataset: Any, budget: Budget) -> Variable:
-    """One array with its labels."""
+def names_of(members: Mapping[str, Any]) -> dict[int, str]:
+    """Names by address: a scale is reached by reference, and HDF5 would search the whole file for its name."""
+    return {address(member): name for name, member in members.items()}
+
+
+def address(member: Any) -> int:
+    """Where in the file a group or dataset is."""
+    return int(h5py.h5o.get_info(member.id).addr)
+
+
+def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
+    """One array with its labels; `names` are those of its group's members, by address."""
     values = read_values(name, dataset, budget)
     if read_text(dataset, "dtype", "") == "bool":
         values = values.astype(np.bool_)
     return Variable(
         values,
-        dims=read_dims(name, dataset),
+        dims=read_dims(name, dataset, names),
         units=read_text(dataset, "units"),
         long_name=read_text(dataset, "long_name"),
         timing="timing" in dataset.attrs,
@@ -224,11 +238,14 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     return values
 
 
-def read_dims(name: str, dataset: Any) -> tuple[str, ...]:
-    """The names of a dataset's dimensions."""
+def read_dims(name: str, dataset: Any, names: Mapping[int, str]) -> tuple[str, ...]:
+    """The names of a dataset's dimensions, which are members of its group."""
     if dataset.is_scale:
         return (name,)
-    return tuple(axis[0].name.rpartition("/")[2] for axis in dataset.dims)
+    scales = [address(axis[0]) for axis in dataset.dims]
+    if not all(scale in names for scale in scales):
+        raise ValueError(f"a dimension of {name!r} is not in its group")
+    return tuple(names[scale] for scale in scales)
 
 
 def read_attributes(holder: Any) -> Iterator[tuple[str, Attribute]]:
