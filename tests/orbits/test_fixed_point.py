@@ -12,7 +12,7 @@ from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
-from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton
+from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton, newton_from_each
 from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.dop853 import new_dop853
@@ -286,3 +286,19 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     after_others = [starts_from_seeds(degrees) for degrees in (4.0, 0.3, 7.0, 2.0)][-1]
     branches.cache_clear()
     assert starts_from_seeds(2.0) == after_others
+
+
+@pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
+def test_a_gait_is_come_near_with_fewer_derivatives_than_it_is_solved_with(walker):
+    map_ = shooting(walker)
+    gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
+    start = gait * [1.02, 0.96, 1.03]
+    ends, derivatives = [], []
+    for approaching in (False, True):
+        z, found = start.reshape(1, 3).copy(), np.zeros((1, 4))
+        newton_from_each(map_, z, 1e-6, approaching, found)
+        assert found[0, 2] < 1e-6
+        ends.append(z[0])
+        derivatives.append(int(map_.method.counts[RHS]))
+    np.testing.assert_allclose(ends, [gait, gait], atol=1e-5)
+    assert derivatives[1] <= derivatives[0] / 3

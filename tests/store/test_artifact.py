@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
-from walkerlab.store import artifact
+from walkerlab.store import artifact, hdf5
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
@@ -172,6 +172,17 @@ def test_variables_that_come_one_by_one_make_the_same_artifact(tmp_path, content
     for name, variable in on_disk.variables.items():
         assert variable.dims == found[""].variables[name].dims
         np.testing.assert_array_equal(variable.values, found[""][name])
+
+
+def test_a_group_on_disk_is_looked_through_once_however_many_variables_are_read(
+    tmp_path, content, identity, origin, monkeypatch
+):
+    path, looked = tmp_path / "a.h5", []
+    artifact.write_in_turn(path, in_turn(content, 10_000), identity, origin)
+    monkeypatch.setattr(hdf5, "names_of", lambda members, names_of=hdf5.names_of: looked.append(1) or names_of(members))
+    on_disk = GroupOnDisk(path)
+    assert len([on_disk[name] for name in on_disk.variables]) > 3
+    assert len(looked) == 1
 
 
 def test_a_writer_in_turn_that_fails_leaves_the_old_artifact(tmp_path, content, identity, origin):

@@ -22,7 +22,7 @@ from walkerlab.solvers.registry import finder_for
 
 RANDOM_START = "random start"
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
-SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground is standing
+SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
 LOOKED_RESIDUAL = 1e-6  # of a random search that has come near a gait
 SAME = 1e-5  # relative distance of states below which two searches found one gait
 # ranges of random starting values: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance
@@ -148,7 +148,8 @@ class Search:
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
         found = np.zeros((len(starts), 4))
         newton_from_each(self.looking, starts, LOOKED_RESIDUAL, True, found)
-        for z in starts[found[:, 2] < LOOKED_RESIDUAL]:
+        apart = np.abs(starts[:, 0] + self.walker.slope + self.walker.lean) > SMALLEST_ANGLE
+        for z in starts[apart & (found[:, 2] < LOOKED_RESIDUAL)]:
             self.keep(z, RANDOM_START)
 
     def keep(self, z: Vector, by: str) -> bool:

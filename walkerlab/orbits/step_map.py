@@ -167,20 +167,21 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
 
 
 @kernel
-def newton_from_each(shooting: Shooting, starts: Any, tolerance: float, may_fall: bool, found: Any) -> None:
-    """`solved_from` many starts.
+def newton_from_each(shooting: Shooting, starts: Any, tolerance: float, approaching: bool, found: Any) -> None:
+    """`solved_from` many starts, or `approach` from them.
 
-    starts    (starts, d); overwritten with the best states found
-    may_fall  whether each is tried by a first step without its derivative, a fraction of the work, and given up if that
-              does not end in a heel strike
-    found     (starts, 4) what `solved_from` returns; written
+    starts       (starts, d); overwritten with the best states found
+    approaching  whether to come near a solution is enough
+    found        (starts, 4) what `solved_from` returns, of which `approach` knows the residual; written
     """
     z = shooting.start
     for i in range(len(starts)):
         for j in range(z.size):
             z[j] = starts[i, j]
         status, period, residual, evaluations = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL, 0
-        if not may_fall or residual_alone(shooting, z) < NO_RESIDUAL:
+        if approaching:
+            residual = approach(shooting, z, tolerance)
+        else:
             status, period, residual, evaluations = solved_from(shooting, z, tolerance)
         found[i, 0], found[i, 1], found[i, 2], found[i, 3] = status, period, residual, evaluations
         for j in range(z.size):
@@ -238,6 +239,60 @@ def solved_from(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, floa
             z[i] = best[i] + scale * move[i]
     keep(best, DP, z, shooting.DP)
     return best_status, best_period, best_residual, evaluations
+
+
+@inlined
+def approach(shooting: Shooting, z: Any, tolerance: float) -> float:
+    """Come near a solution of P(z) = z with few derivatives, each of which takes as long as five steps.
+
+    After a full move that makes the residual smaller, Broyden's update of the derivative serves for the next one
+    (Broyden 1965, his first method); else it is computed anew, and moves with it are halved until they do. A start that
+    does not walk to a heel strike is given up.
+
+    z  (d,) start; overwritten with the best state found
+
+    Returns the residual there.
+    """
+    clear_counts(shooting.method)
+    best, move = shooting.best, shooting.move
+    best_residual, scale, evaluations = residual_alone(shooting, z), 1.0, 1
+    stale, exact = True, False
+    while tolerance < best_residual < NO_RESIDUAL and evaluations < MOST_EVALUATIONS:
+        if stale:
+            status, _ = step_with_jacobian(shooting, z)
+            if status != WALKED:
+                break
+            stale, exact, scale = False, True, 1.0
+        if scale == 1.0:
+            for i in range(z.size):
+                best[i] = z[i]
+            if not newton_move(shooting, z, move):
+                break
+        for i in range(z.size):
+            z[i] = best[i] + scale * move[i]
+        residual = residual_alone(shooting, z)
+        evaluations += 1
+        if residual < best_residual:
+            stale, exact, best_residual = scale < 1.0, False, residual
+            update(shooting, z, move)
+        else:
+            for i in range(z.size):
+                z[i] = best[i]
+            stale, scale = not exact, 0.5 * scale
+            if scale < SMALLEST_MOVE:
+                break
+    return best_residual
+
+
+@inlined
+def update(shooting: Shooting, z: Any, move: Any) -> None:
+    """Broyden's update of the derivative in `DP` after a full move (d,) to z (d,)."""
+    square = 0.0
+    for i in range(move.size):
+        square += move[i] * move[i]
+    for i in range(move.size):
+        for j in range(move.size):
+            shooting.DP[i, j] += (shooting.z_next[i] - z[i]) * move[j] / square
 
 
 @inlined

@@ -66,9 +66,10 @@ class VariablesOnDisk(Mapping[str, Variable]):
         """Read the names."""
         self.file, self.path = file, path
         with h5py.File(file) as opened:
-            members = opened[path].items()
+            members = dict(opened[path])
+            self._members = names_of(members)
             self._names = [
-                name for name, one in members if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
+                name for name, one in members.items() if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
             ]
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
@@ -86,8 +87,8 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
     def _read_anew(self, name: str) -> Variable:
         with h5py.File(self.file) as opened:
-            group = opened[self.path]
-            return read_variable(name, group[name], names_of(dict(group)), Budget(self.file.stat().st_size))
+            dataset = opened[self.path][name]
+            return read_variable(name, dataset, self._members, Budget(self.file.stat().st_size))
 
 
 def write_group(target: Any, group: Group) -> None:
