@@ -268,7 +268,7 @@ class Run:
                 if member is None:
                     return
                 self.waiting.remove(stage)
-                begun = self.running[member] = self._begin(step, self.jobs if stage.alone else max(1, self.jobs // 2))
+                begun = self.running[member] = self._begin(step, self.jobs)
                 member.give(begun.task, begun.reporter)
 
     def _ready(self, stage: Stage, stages: Sequence[Stage]) -> bool:
