@@ -100,6 +100,7 @@ class Run(Simulation):
         if own is not None and "stiction_tolerance" in own.settings:
             self._plant.set_stiction_tolerance(own.settings["stiction_tolerance"])
         self._order = np.array([j.position_start() + i for j in joints for i in range(j.num_positions())])
+        self._rates = len(q) + self._order
         if self.forces is not None:
             apply(builder, self._plant, self.forces, self._order)
         self._simulator = Simulator(builder.Build())
@@ -121,15 +122,13 @@ class Run(Simulation):
         if self._discrete:
             self._march(steps, until_s, on_step)
             return
-        plant, at, order = self._plant, self._at, self._order
         left = [steps]
 
         def monitor(root: Any) -> Any:
             if root.get_time() <= 0.0:
                 return EventStatus.DidNothing()
             left[0] -= 1
-            q, v = plant.GetPositions(at)[order], plant.GetVelocities(at)[order]
-            if not on_step(root.get_time(), q, v) or left[0] <= 0:
+            if not on_step(root.get_time(), *self._state()) or left[0] <= 0:
                 return EventStatus.ReachedTermination(None, "the walk is over")
             return EventStatus.DidNothing()
 
@@ -138,11 +137,16 @@ class Run(Simulation):
 
     def _march(self, steps: int, until_s: float, on_step: OnStep) -> None:
         """Discrete updates, one after the other."""
-        plant, at, order, h = self._plant, self._at, self._order, self._h
+        h = self._h
         for count in range(1, min(steps, round(until_s / h)) + 1):
             self._simulator.AdvanceTo((count + 0.25) * h)
-            if not on_step(count * h, plant.GetPositions(at)[order], plant.GetVelocities(at)[order]):
+            if not on_step(count * h, *self._state()):
                 return
+
+    def _state(self) -> tuple[Floats, Floats]:
+        """Coordinates and velocities."""
+        x = self._plant.GetPositionsAndVelocities(self._at)
+        return x[self._order], x[self._rates]
 
     def carry(self, ball: int, carried: bool) -> None:
         """Let a foot's ball collide or not, by a filter of its own."""
@@ -276,6 +280,8 @@ def apply(builder: Any, plant: Any, forces: Forces, place: Any) -> None:
     from pydrake.systems.framework import LeafSystem
 
     n = len(place)
+    rates = n + place
+    result = np.zeros(n)
 
     class Ground(LeafSystem):  # type: ignore[misc]
         def __init__(self) -> None:
@@ -285,8 +291,7 @@ def apply(builder: Any, plant: Any, forces: Forces, place: Any) -> None:
 
         def _calculate(self, context: Any, output: Any) -> None:
             state = self.get_input_port(0).Eval(context)
-            result = np.zeros(n)
-            result[place] = forces(state[:n][place], state[n:][place])
+            result[place] = forces(state[place], state[rates])
             output.SetFromVector(result)
 
     ground = builder.AddSystem(Ground())
