@@ -46,6 +46,7 @@ from walkerlab.hybrid.contact_rules import (
 from walkerlab.hybrid.contact_run import new_ledger
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.solvers.scipy_methods import entry_point
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -82,15 +83,16 @@ class Follower:
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Take in the state at the end of a step; whether the ground under a foot may have changed."""
         before, now = self.feet, self.look.feet(q, v)
-        if not all(-FAR_AWAY < place < FAR_AWAY for foot in now for place in foot[:2]):
+        if not is_near(*now[0]) or not is_near(*now[1]):
             self._end(int(Outcome.SOLVER_FAILED))
             return False
         if self.bends:
+            bends = bends_of(self.scene, q, v)
             if self.watches:
-                self.turn = self._turning(time_s - self.time_s, now, q, v)
+                self.turn = self._turning(time_s - self.time_s, now, bends)
             if self.turn is not None and self.watches:
                 return False
-            self.bends = bends_of(self.scene, q, v)
+            self.bends = bends
         happened = self._happened(before, now)
         if happened:
             self._let_happen(time_s, before, now, q, v)
@@ -129,7 +131,7 @@ class Follower:
         if ledger.feet[STEPS] == ledger.touch_time.size:
             self._end(int(Outcome.WALKED))
 
-    def _turning(self, h: float, now: Feet, q: Floats, v: Floats) -> Turn | None:
+    def _turning(self, h: float, now: Feet, bends: Feet) -> Turn | None:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
         ledger, found = self.ledger, []
         stance = ledger.feet[STANCE]
@@ -137,7 +139,7 @@ class Follower:
             sinking = max(0.0, -self.feet[stance][3])
             share = sinking / (sinking + now[stance][3]) if sinking > 0.0 else 0.0
             found.append(Turn(share, int(stance) * PER_FOOT + CLIMB))
-        for knee, (old, bend) in enumerate(zip(self.bends, bends_of(self.scene, q, v), strict=True)):
+        for knee, (old, bend) in enumerate(zip(self.bends, bends, strict=True)):
             if ledger.knee[knee] == RELEASED and bend[1] < -FLEXED:
                 ledger.knee[knee] = BENT
             elif ledger.knee[knee] == BENT and bend[1] >= 0.0:
@@ -231,8 +233,13 @@ def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Feet:
     return [[0.0, float(q[place]), 0.0, float(v[place])] if place >= 0 else [0.0] * 4 for place in scene.knee_places]
 
 
+def is_near(along: float, height: float, _slip: float, _climb: float) -> bool:
+    """Whether a foot is anywhere near; one whose numbers are lost is not."""
+    return -FAR_AWAY < along < FAR_AWAY and -FAR_AWAY < height < FAR_AWAY
+
+
 class FeetAndForces:
-    """The compiled function with what stays the same in its calls."""
+    """The compiled function with what stays the same in its calls; coordinates and velocities are contiguous arrays."""
 
     def __init__(self, scene: EngineScene, carried: Any) -> None:
         """Make room for its results; `carried` is the ledger's own array and changes with it."""
@@ -240,15 +247,17 @@ class FeetAndForces:
         like = ((0.0,) * (4 + 2 * n), (0.0,) * n)
         self._fixed = (*in_arrays(scene.walker), *like, scene.chain, carried)
         self._feet, self._forces, self._none = np.zeros((2, 4)), np.zeros(scene.model.size), np.zeros(0)
+        q = np.zeros(scene.model.size)
+        self._call = entry_point(feet_and_forces, *self._fixed, q, q, self._feet, self._forces)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
         """How the feet move."""
-        feet_and_forces(*self._fixed, q, v, self._feet, self._none)
+        self._call(*self._fixed, q, v, self._feet, self._none)
         return self._feet.tolist()
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         """The generalised forces of the ground, in memory that the next call overwrites."""
-        feet_and_forces(*self._fixed, q, v, self._feet, self._forces)
+        self._call(*self._fixed, q, v, self._feet, self._forces)
         return self._forces
 
 

@@ -29,6 +29,7 @@ from walkerlab.hybrid.outcome import Outcome
 Floats = NDArray[np.float64]
 ROUNDING = 1e-9
 MANY = 10_000_000  # steps
+AT_REST = 5  # times as long steps do where only the end counts, at which nothing moves any more
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ class Walk:
             if self.rules.turn is not None and self.rules.watches:
                 return False
             self.steps += 1
-            self.time_s, self.q, self.v = self.seen_s, np.array(q), np.array(v)
+            self.time_s, self.q, self.v = self.seen_s, q.copy(), v.copy()
             if changed:
                 self.hand_over_ground(engine)
             return self.rules.outcome is None and not (changed and self.rules.is_outdated)
@@ -196,7 +197,7 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> list[tuple[float
     seen: list[tuple[float, Floats, Floats]] = []
 
     def on_step(time_s: float, q: Floats, v: Floats) -> bool:
-        seen.append((time_s, np.array(q), np.array(v)))
+        seen.append((time_s, q.copy(), v.copy()))
         return True
 
     engine.run(steps, until_s, on_step)
@@ -223,7 +224,10 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class TuningTask:
-    """A ball dropped and a block slid on an engine's own contact."""
+    """A ball dropped and a block slid on an engine's own contact.
+
+    step_s  of a motion that is watched
+    """
 
     engine: str
     contact: str
@@ -249,9 +253,12 @@ class Bench:
         self.task, self.own = task, own
         self.adapter = ENGINES[task.engine].adapter()
 
-    def after(self, time_s: float, along: float, depth: float, velocity: tuple[float, float]) -> Motion:
-        """How the ball moves for a time from `depth` (m) inside the ground, pulled by `along` times its weight."""
-        target, h = self.task.target, self.task.step_s
+    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> Motion:
+        """How the ball moves for a time from `depth` (m) inside the ground, pulled by `along` times its weight.
+
+        h  step (s)
+        """
+        target = self.task.target
         radius, ground = ball_and_ground(0.0)
         link = Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
         model = PlanarModel(
@@ -274,12 +281,12 @@ class Bench:
 
     def at_rest(self) -> float:
         """Penetration (m) of a ball that was dropped from the surface."""
-        return -float(self.after(self.settling_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(self.after(self.settling_s, AT_REST * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
         """Of the oscillator that fits the ball's motion about its rest (least squares of accelerations)."""
         omega = math.sqrt(self.task.target.gravity / self.task.target.penetration)
-        motion = self.after(self.settling_s / 4.0, 0.0, depth, (0.0, -0.02 * depth * omega))
+        motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # means of two ends of a step stand for its middle, whatever the engine's own rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
@@ -291,15 +298,15 @@ class Bench:
         """Deceleration over gravity of a block that slides, once its penetration has settled."""
         target, settled = self.task.target, self.settling_s
         start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
-        motion = self.after(1.25 * settled, 0.0, depth, (start, 0.0))
+        motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
         watched = len(motion.v) // 5
         fall = motion.v[-1 - watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[-1 - watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
         """Velocity (m/s) at which a block that stands on an incline creeps down."""
-        target = self.task.target
-        return float(self.after(self.settling_s, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
+        target, h = self.task.target, AT_REST * self.task.step_s
+        return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
 
 
 class Motion:
