@@ -16,6 +16,7 @@ WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE = 0, 1, 2, 3,
 # rows of events: two feet of (height, left edge, right edge), feet passing, hip, slide, two knees, sinking
 PASSING, FALL, SLIDE, KNEES, SINKING, EVENTS = 6, 7, 8, 9, 11, 12
 ARMED = 0.01  # rad of flexion from which on a knee locks
+ROUNDING = 1e-12  # s, m
 HALVINGS = 60
 # so many times shorter are steps with both feet in the ground: friction holds a foot below a light, unlocked shank at
 # rates of 1e6/s and more while the other strikes
@@ -273,7 +274,8 @@ def walk(walker, y, steps, h, hinged):
     side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
     while done < steps:
         both = side[0] < 0.0 and side[3] < 0.0 and carried[0] and carried[1] and hinged < 0
-        dt = h / SHORTER if both else h
+        aloft = grounded_at + 0.25 * tau - t
+        dt = min(h / SHORTER if both else h, aloft)
         new = runge_kutta(walker, y, dt, hinged, locked, carried)
         g = event_values(walker, new, cells, stance, touched)
         low, high, event = 0.0, dt, -1
@@ -317,7 +319,7 @@ def walk(walker, y, steps, h, hinged):
                 grounded_at = t
         if t - last > 10.0 * tau:
             return NO_HEEL_STRIKE, done, times, places, slips, rolled, t, y, locks[:lock_count]
-        if t - grounded_at > 0.25 * tau:
+        if t - grounded_at > 0.25 * tau - ROUNDING:
             return LIFTED_OFF, done, times, places, slips, rolled, t, y, locks[:lock_count]
         if event < 0:
             continue
@@ -339,7 +341,9 @@ def walk(walker, y, steps, h, hinged):
         if event == PASSING:
             side[PASSING] = -side[PASSING]
             for foot in range(2):
-                if walker.terrain == AFTER_MID_SWING and side[3 * foot] > 0.0 and foot != stance:
+                # equal legs of a hinged step pass each other on the ground: rounding lifts no foot
+                above = foot_at(walker, foot, y)[1] > ROUNDING
+                if walker.terrain == AFTER_MID_SWING and above and foot != stance:
                     carried[foot] = (side[PASSING] > 0.0) == (foot == 1)
             continue
         foot, kind = event // 3, event % 3
