@@ -10,21 +10,16 @@ from typing import Any
 
 from walkerlab.cli.text import aligned, described_summary
 from walkerlab.labels import unit_by_name
-from walkerlab.report.numbers import MINUS, count, fixed, length, listed, number, quantity
+from walkerlab.report.numbers import count, fixed, length, listed, number, quantity, told_apart
+from walkerlab.report.outcomes import ENDS, LOOKED_FORWARD_TO, walks
+from walkerlab.report.sections.gaits import STATE, heads_of, multiplier, symbol
+from walkerlab.report.sections.models import CHANNELS
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], list[str]]
 
-SYMBOLS = {
-    "theta_1": "θ₁",
-    "theta_2": "θ₂",
-    "dtheta_1": "θ̇₁",
-    "dtheta_2": "θ̇₂",
-}
-COMPASS = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 SHOWN = 6
 """So many of a long row of numbers are shown."""
-WORDS = {"as-printed": "as printed", "corrected": "corrected"}
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
@@ -45,25 +40,22 @@ def fixedpoint(summary: Summary) -> list[str]:
     sets = summary.get("equation_sets", {})
     shown = {name: found for name, found in sets.items() if "state" in found} or {summary["equations"]: summary}
     first = [summary["equations"], *(name for name in shown if name != summary["equations"])]
-    rows = [["", *(WORDS.get(name, name) for name in first), "unit"], *gait_rows([shown[name] for name in first])]
+    names = summary.get("state_names", STATE)
+    rows = [["", *heads_of(first), "unit"], *gait_rows(names, [shown[name] for name in first])]
     found = f"{count(summary['gaits_found'], 'gait')} of one step found."
     return [head, "", *aligned(rows), "", found]
 
 
-def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
+def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]:
     """State, multipliers and measures of gaits, one column each."""
-    names = gaits[0].get("state_names") or COMPASS[: len(gaits[0]["state"])]
     rows = [
         [symbol(name), *(fixed(gait["state"][place], 6) for gait in gaits), "rad/s" if name.startswith("d") else "rad"]
         for place, name in enumerate(names)
     ]
     most = max(len(gait["multipliers"]) for gait in gaits)
+    rows += [[f"multiplier {place + 1}", *(multiplier(gait, place) for gait in gaits), ""] for place in range(most)]
     rows += [
-        [f"multiplier {place + 1}", *(multiplier(gait["multipliers"], place) for gait in gaits), "1"]
-        for place in range(most)
-    ]
-    rows += [
-        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_by_name(key)]
+        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_of(key)]
         for key, words, written in (
             ("period_s", "step period", partial(fixed, decimals=5)),
             ("step_length_m", "step length", partial(fixed, decimals=5)),
@@ -71,34 +63,28 @@ def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
             ("energy_drift_J", "energy drift", partial(number, digits=2)),
             ("min_normal_force_N", "least normal force", partial(fixed, decimals=1)),
             ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4)),
-            ("max_scuff_depth_m", "scuffing depth", partial(number, digits=4)),
+            ("max_scuff_depth_m", "scuffing depth", depth),
         )
         if any(key in gait for gait in gaits)
     ]
     return rows
 
 
-def symbol(name: str) -> str:
-    """A coordinate's symbol, its own name if it has none."""
-    return SYMBOLS.get(name, name)
+def depth(value_m: float) -> str:
+    """A depth in metres."""
+    return number(told_apart(value_m), 4)
 
 
-def multiplier(values: Sequence[Sequence[float]], place: int) -> str:
-    """A multiplier as a complex number."""
-    if place >= len(values):
-        return ""
-    real, imaginary = values[place]
-    if imaginary == 0.0:
-        return fixed(real, 4)
-    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)} i"
+def unit_of(key: str) -> str:
+    """The unit that a key ends in, as a table shows it: nothing for a pure number."""
+    unit = unit_by_name(key)
+    return "" if unit == "1" else unit
 
 
 def walk(model: str, summary: Summary) -> list[str]:
     """How a walk of the rigid or the contact model went, step by step."""
     steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
-    walked = summary["outcome"] == "walked"
-    head = f"The {model} model walks " + (f"all {count(steps, 'step')}" if walked else count(steps, "step"))
-    head += "" if walked else f" and then: {summary['outcome']}"
+    head = f"The {model} model {walks(steps, summary['outcome'])}"
     if periods:
         head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
     rows = [["step", *map(str, shown_places(steps)), ""]] if steps else []
@@ -108,14 +94,16 @@ def walk(model: str, summary: Summary) -> list[str]:
     if summary.get("slips_m"):
         rows.append(["slip", *elided([fixed(1e3 * value, 2) for value in summary["slips_m"]]), "mm"])
     own = [[words, said] for words, said in walk_measures(summary) if said]
-    advice = [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != "walked" else []
+    advice = (
+        [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO else []
+    )
     return [f"{head}.", "", *aligned(rows), "", *aligned(own), *advice]
 
 
 def walk_measures(summary: Summary) -> list[tuple[str, str]]:
     """What was measured over a walk as a whole."""
     dissipated = summary.get("dissipated_J") or {}
-    lost = listed(f"{quantity(value, 'J', 3)} by {name}" for name, value in dissipated.items())
+    lost = listed(f"{quantity(value, 'J', 3)} {CHANNELS[name]}" for name, value in dissipated.items() if value)
     return [
         ("mean energy", told(summary, "mean_energy_J", 7)),
         ("energy drift", told(summary, "energy_drift_J", 2)),
@@ -163,7 +151,7 @@ def tune(summary: Summary) -> list[str]:
             ["step period", quantity(gait["period_s"], "s")],
             ["step length", quantity(gait["step_length_m"], "m")],
             ["slip a step", length(gait["slip_m"])],
-            ["largest multiplier", multiplier(gait["multipliers"], 0)],
+            ["largest multiplier", multiplier(gait, 0)],
         ]
     else:
         rows.append(["own gait", f"none: {gait['reason']}"])
@@ -194,12 +182,15 @@ def compare(summary: Summary) -> list[str]:
 def models_compared(summary: Summary) -> list[str]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
     steps, outcomes = summary["steps"], summary["outcomes"]
-    rows = [["last step", "period", "length", "ends as"]]
+    rows = [["last step", "period (s)", "length (m)", "outcome"]]
     walks = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
     releases = summary.get("releases", {}).items()
     walks += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
     rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in walks]
-    head = f"The rigid model's walk ends as {outcomes['rigid']}, the contact model's as {outcomes['contact']}"
+    rigid, contact = (ENDS[outcomes[model]] for model in ("rigid", "contact"))
+    head = f"The rigid model {rigid}, " + (
+        "and so does the contact model" if contact == rigid else f"the contact model {contact}"
+    )
     return [f"{head}.", "", *aligned(rows)]
 
 
@@ -264,8 +255,8 @@ def verdict(results: Mapping[str, Summary]) -> list[str]:
     lines = []
     if "fixedpoint" in results:
         lines.append(fixedpoint(results["fixedpoint"])[0])
-    walks = [(words, results[name]) for name, words in WALKS.items() if name in results]
-    said = [f"the {words} model walks {count(one['steps'], 'step')} ({one['outcome']})" for words, one in walks]
+    models = [(words, results[name]) for name, words in WALKS.items() if name in results]
+    said = [f"the {words} model {walks(one['steps'], one['outcome'])}" for words, one in models]
     if said:
         lines.append(f"{'; '.join(said)}."[:1].upper() + f"{'; '.join(said)}."[1:])
     last = [compare(results["compare"])[0]] if "compare" in results else []
