@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.cli.answers import answer, elided, verdict
+from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
 from walkerlab.cli.text import aligned, described_summary, width
 from walkerlab.hybrid.outcome import Outcome
 
@@ -105,6 +105,30 @@ def test_both_models_of_another_walker_are_compared_in_a_sentence(outcome):
     head = answer("compare", summary)[0]
     rest = "and so does the contact model" if outcome == "walked" else "the contact model falls"
     assert head == f"The rigid model walks to the end, {rest}."
+
+
+@pytest.mark.parametrize("stage", ANSWERS)
+def test_a_stage_that_came_to_nothing_has_nothing_to_tell(stage):
+    assert answer(stage, {}) == []
+
+
+def test_families_are_told_in_sentences_with_their_bifurcations():
+    branch = {"model": "rigid", "period": 1, "stable_ranges": [[1.0, 4.0]]}
+    flip = {"kind": "flip", "model": "rigid", "period": 1, "value": 4.0, "multiplier": [-1.0, 0.0]}
+    found = {"branches": [branch, branch], "bifurcations": [flip], "cascades": [], "attractors": [], "lyapunov": []}
+    lines = answer("continuation", found | {"over": "slope_deg", "unit": "deg"})
+    assert lines[0] == "2 branches of gaits over slope_deg."
+    assert lines[1].replace("\u00a0", " ") == "The rigid model's gait of one step is stable from 1 deg to 4 deg."
+    assert lines[-1].split() == ["flip", "rigid", "1", "4", "−1.0000"]
+
+
+def test_engines_are_told_by_what_was_concluded():
+    summary = {
+        "rows": [{}],
+        "versions": {"drake": "1.5"},
+        "conclusions": {"kneed": {"own-law": "Closest.", "same-law": ""}},
+    }
+    assert answer("engines", summary) == ["1 run in drake 1.5.", "", "kneed, own-law: Closest."]
 
 
 def test_long_rows_keep_their_ends():

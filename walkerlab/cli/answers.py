@@ -3,27 +3,39 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from walkerlab.cli.text import aligned, described_summary
-from walkerlab.labels import unit_by_name
+from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.report.gait_diagram import parameter
 from walkerlab.report.numbers import count, fixed, length, listed, number, quantity, told_apart
-from walkerlab.report.outcomes import ENDS, LOOKED_FORWARD_TO, walks
-from walkerlab.report.sections.gaits import STATE, heads_of, multiplier, symbol
+from walkerlab.report.outcomes import LOOKED_FORWARD_TO, ends, walks
+from walkerlab.report.sections.basin import shares
+from walkerlab.report.sections.families import findings as families
+from walkerlab.report.sections.gaits import STATE, complex_number, heads_of, multiplier, symbol
 from walkerlab.report.sections.models import CHANNELS
+from walkerlab.report.symbols import in_signs
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], list[str]]
 
+COLUMNS = 100
+"""A paragraph is as wide."""
 SHOWN = 6
 """So many of a long row of numbers are shown."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short."""
+    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short.
+
+    None for a stage that came to nothing: that is told as an error.
+    """
+    if not summary:
+        return []
     return ANSWERS[stage](summary) if stage in ANSWERS else list(described_summary(summary, short=True))
 
 
@@ -97,7 +109,8 @@ def walk(model: str, summary: Summary) -> list[str]:
     advice = (
         [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO else []
     )
-    return [f"{head}.", "", *aligned(rows), "", *aligned(own), *advice]
+    steps_taken = ["", *aligned(rows)] if rows else []
+    return [f"{head}.", *steps_taken, "", *aligned(own), *advice]
 
 
 def walk_measures(summary: Summary) -> list[tuple[str, str]]:
@@ -187,7 +200,7 @@ def models_compared(summary: Summary) -> list[str]:
     releases = summary.get("releases", {}).items()
     walks += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
     rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in walks]
-    rigid, contact = (ENDS[outcomes[model]] for model in ("rigid", "contact"))
+    rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
     head = f"The rigid model {rigid}, " + (
         "and so does the contact model" if contact == rigid else f"the contact model {contact}"
     )
@@ -226,6 +239,40 @@ def stability(summary: Summary) -> list[str]:
     return [head, "", *aligned(rows), *said]
 
 
+def continuation(summary: Summary) -> list[str]:
+    """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
+    found = [f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {summary['over']}."]
+    over = with_unit(parameter(summary), summary["unit"])
+    rows = [["bifurcation", "model", "steps", over, "multiplier"]]
+    rows += [
+        [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), complex_number(*one["multiplier"])]
+        for one in summary["bifurcations"]
+    ]
+    return [*found, *families(summary), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+
+
+def basin(summary: Summary) -> list[str]:
+    """How much walks, and to what."""
+    rows = [["attractor", "cells", "steps to reach it"]]
+    rows += [
+        [count(row["period"], "step"), str(row["cells"]), number(row.get("median_steps_to_settle"), 3)]
+        for row in summary["attractors"]
+    ]
+    return [*textwrap.wrap(in_signs(shares(summary).text), COLUMNS), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+
+
+def engines(summary: Summary) -> list[str]:
+    """What was concluded of each scene; every run is in `show`."""
+    told = [
+        f"{scene}, {experiment}: {text}"
+        for scene, concluded in summary["conclusions"].items()
+        for experiment, text in concluded.items()
+        if text
+    ]
+    ran = listed(f"{name} {version}" for name, version in summary["versions"].items())
+    return [f"{count(len(summary['rows']), 'run')} in {ran}.", "", *told]
+
+
 def plot(summary: Summary) -> list[str]:
     """The figures."""
     figures = summary["figures"]
@@ -245,6 +292,9 @@ ANSWERS: dict[str, Answer] = {
     "compare": compare,
     "accuracy": accuracy,
     "stability": stability,
+    "continuation": continuation,
+    "basin": basin,
+    "engines": engines,
     "plot": plot,
     "report": report,
 }

@@ -48,11 +48,16 @@ def finding(results: Results, stage: str) -> Finding | None:
     return Finding(MODELS[stage], " ".join(text for text in sentences if text), outcome, tone(outcome))
 
 
+def ends(outcome: str) -> str:
+    """What a walker does in the end; an outcome that this version does not know keeps its name."""
+    return ENDS.get(outcome, f"ends as {outcome}")
+
+
 def walks(steps: int, outcome: str) -> str:
     """How far a walker comes, as the rest of a sentence that it begins."""
     if outcome == LOOKED_FORWARD_TO:
         return f"walks all {count(steps, 'step')}"
-    return f"walks {count(steps, 'step')} and then {ENDS[outcome]}" if steps else f"{ENDS[outcome]} in its first step"
+    return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
 
 
 def tone(outcome: str) -> Tone:

@@ -316,7 +316,7 @@ class Run:
         done = Done(stage.name, "run", reason, time.perf_counter() - begun.started)
         self.done.append(done)
         self.left = [name for name in self.left if name != stage.name]
-        answered = [] if result.complete else [reason]
+        answered = [] if result.complete else ["no answer"]
         left = [f"left: {', '.join(self.left)}"] if self.left else []
         begun.reporter.end("; ".join([said_of(done), *answered, *left]))
 
@@ -414,11 +414,12 @@ def unanswered(error: NoAnswer) -> Content:
 
 
 def said_of(done: Done) -> str:
-    """One line about what was done with a stage."""
+    """One line about what was done with a stage; why there is no answer is told once, in the end."""
+    why, _, _ = done.reason.partition(": ")
     match done.action:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s"
         case "reuse":
-            return f"{done.stage}: reused ({done.reason})"
+            return f"{done.stage}: reused ({why})"
         case _:
-            return f"{done.stage}: left out ({done.reason})"
+            return f"{done.stage}: left out ({why})"

@@ -123,7 +123,8 @@ function drawWalk(picture, scene, tracks, colours) {
   c.textAlign = "center";
   for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
     const [x, y] = place(i * tick, under - 0.1 * scene.leg_m);
-    c.fillText(`${digits(i * tick)} m`, x, y);
+    const [said, room] = [`${digits(i * tick)} m`, 0.5 * c.measureText(`${digits(i * tick)} m`).width];
+    if (x > room && x < width - room) c.fillText(said, x, y);
   }
   picture.points = [];
   tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
