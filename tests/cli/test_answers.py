@@ -131,6 +131,18 @@ def test_engines_are_told_by_what_was_concluded():
     assert answer("engines", summary) == ["1 run in drake 1.5.", "", "kneed, own-law: Closest."]
 
 
+def test_how_far_a_start_may_change_is_told_in_signs():
+    margins = {
+        "dtheta_1 down": {"factor": 0.0, "beyond": ""},
+        "both up": {"factor": 1.10664, "beyond": "off-pad"},
+    }
+    change = {"needed": False, "found": True, "margins": margins}
+    cells = {"walks_share": 0.296, "cells": 3721}
+    lines = answer("tune", {"adjustment": change, "gait": {"found": False, "reason": "none was sought"}, "map": cells})
+    assert " ".join(row(lines, "θ̇₁ down")) == "walks to a factor of 0, as far as searched"
+    assert " ".join(row(lines, "both up")) == "walks to a factor of 1.107; beyond: off-pad"
+
+
 def test_long_rows_keep_their_ends():
     assert elided(list(range(12))) == list(range(12))
     assert elided(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]

@@ -20,9 +20,7 @@ BOMB = b"a: &a [x,x]\nb: &b [*a,*a]\nc: [*b,*b]\n"
 
 def test_a_missing_file_is_named_with_what_was_perhaps_meant(write: Write, tmp_path: Path) -> None:
     write("name: mine\n", "experiment.yaml")
-    with pytest.raises(
-        ConfigError, match=r"there is no config .*experimnt\.yaml; did you mean .*experiment\.yaml\?"
-    ):
+    with pytest.raises(ConfigError, match=r"there is no config .*experimnt\.yaml; did you mean .*experiment\.yaml\?"):
         load(tmp_path / "experimnt.yaml")
 
 

@@ -169,8 +169,8 @@ def tune(summary: Summary) -> list[str]:
     else:
         rows.append(["own gait", f"none: {gait['reason']}"])
     for name, margin in change.get("margins", {}).items():
-        beyond = margin["beyond"] or "still walks"
-        rows.append([name.replace("_", " "), f"to a factor of {number(margin['factor'], 4)}; beyond: {beyond}"])
+        beyond = f"; beyond: {margin['beyond']}" if margin["beyond"] else ", as far as searched"
+        rows.append([in_signs(name), f"walks to a factor of {number(margin['factor'], 4)}{beyond}"])
     return [head, "", *aligned(rows)]
 
 
