@@ -162,4 +162,7 @@ def test_the_verdict_of_a_run_is_three_lines():
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert len(said) == 3
     assert said[1] == "The rigid model walks all 20000 steps."
+    assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [
+        "5 of 5 extreme cases and known problems ended as expected."
+    ]
     assert said[2].startswith("Of 4 numbers that the paper prints, 3 are reproduced and 1 is explained.")

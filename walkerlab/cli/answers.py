@@ -309,7 +309,7 @@ def verdict(results: Mapping[str, Summary]) -> list[str]:
     said = [f"the {words} model {walks(one['steps'], one['outcome'])}" for words, one in models]
     if said:
         lines.append(f"{'; '.join(said)}."[:1].upper() + f"{'; '.join(said)}."[1:])
-    last = [compare(results["compare"])[0]] if "compare" in results else []
+    last = [compare(results["compare"])[0]] if "verdicts" in results.get("compare", {}) else []
     last += [stability(results["stability"])[0]] if "stability" in results else []
     return [*lines, " ".join(last)] if last else lines
 
