@@ -2,8 +2,9 @@
 
 import pytest
 
-from walkerlab.cli.answers import answer, elided, multiplier, verdict
+from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
 from walkerlab.cli.text import aligned, described_summary, width
+from walkerlab.hybrid.outcome import Outcome
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
@@ -26,10 +27,23 @@ WALK = {
 }
 
 
+def row(lines, head):
+    """What stands in the row of a table, its head left away."""
+    (found,) = (line for line in lines if line.startswith(f"{head}  "))
+    return found.removeprefix(head).split()
+
+
 def test_multipliers_are_written_as_complex_numbers():
-    assert multiplier(GAIT["multipliers"], 0) == "0.3633 + 0.4596 i"
-    assert multiplier(GAIT["multipliers"], 1) == "0.3633 − 0.4596 i"
-    assert multiplier(GAIT["multipliers"], 2) == "0.2160"
+    lines = answer("fixedpoint", GAIT)
+    assert row(lines, "multiplier 1") == ["0.3633", "+", "0.4596i"]
+    assert row(lines, "multiplier 2") == ["0.3633", "−", "0.4596i"]
+    assert row(lines, "multiplier 3") == ["0.2160"]
+
+
+def test_what_is_right_is_named_only_beside_what_is_misprinted():
+    assert answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}})[2].split() == ["value", "unit"]
+    printed = {**GAIT, "equations": "as-printed"}
+    assert answer("fixedpoint", printed)[2].split() == ["as", "printed", "unit"]
 
 
 def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
@@ -42,14 +56,12 @@ def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
 
 
 def test_a_walker_with_more_angles_has_its_own_names():
-    kneed = {
-        **GAIT,
-        "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2],
-        "state_names": ["hip", "knee", "foot", "dhip", "dk", "df"],
-    }
-    text = "\n".join(answer("fixedpoint", kneed))
-    assert "knee" in text
-    assert "0.300000" in text
+    gait = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2]}
+    names = ["theta_1", "theta_2", "theta_1_shank", "dtheta_1", "dtheta_2", "dtheta_1_shank"]
+    lines = answer("fixedpoint", {**gait, "state_names": names, "equation_sets": {"corrected": gait}})
+    assert row(lines, "θ₁, shank") == ["0.300000", "rad"]
+    assert row(lines, "θ̇₁") == ["1.000000", "rad/s"]
+    assert row(lines, "θ̇₁, shank") == ["1.200000", "rad/s"]
 
 
 def test_without_a_gait_the_reason_is_the_answer():
@@ -68,8 +80,67 @@ def test_a_long_walk_is_a_few_short_lines(stage):
 def test_a_fall_is_told_with_its_advice():
     fall = {"outcome": "fell", "steps": 1, "step_periods_s": [0.7], "step_lengths_m": [0.4], "advice": "Start slower."}
     lines = answer("contact-sim", WALK | fall)
-    assert lines[0].startswith("The contact model walks 1 step and then: fell")
+    assert lines[0].startswith("The contact model walks 1 step and then falls; the last takes 0.7000 s")
     assert lines[-1] == "advice: Start slower."
+    at_once = {"steps": 0, "step_periods_s": [], "step_lengths_m": []}
+    assert answer("simulate", WALK | fall | at_once)[0] == "The rigid model falls in its first step."
+
+
+@pytest.mark.parametrize("outcome", [outcome.label for outcome in Outcome])
+def test_every_end_of_a_walk_has_words(outcome):
+    said = answer("simulate", WALK | {"outcome": outcome, "advice": "Try again."})[0]
+    assert outcome not in said.split("; ")[0].split()
+
+
+def test_channels_that_took_no_energy_are_left_out():
+    lost = {"damping": 4.0, "friction": 0.0, "edges": 0.0, "knee_strikes": 0.274, "knee_stop": 0.0}
+    told = " ".join(row(answer("contact-sim", WALK | {"dissipated_J": lost}), "energy lost"))
+    assert told == "4 J in the ground's damping and 0.274 J in knee strikes"
+
+
+@pytest.mark.parametrize("outcome", ["walked", "fell"])
+def test_both_models_of_another_walker_are_compared_in_a_sentence(outcome):
+    step = {"period_s": 0.7, "length_m": 0.4}
+    summary = {"steps": {"rigid": step, "contact": step}, "outcomes": {"rigid": "walked", "contact": outcome}}
+    head = answer("compare", summary)[0]
+    rest = "and so does the contact model" if outcome == "walked" else "the contact model falls"
+    assert head == f"The rigid model walks to the end, {rest}."
+
+
+@pytest.mark.parametrize("stage", ANSWERS)
+def test_a_stage_that_came_to_nothing_has_nothing_to_tell(stage):
+    assert answer(stage, {}) == []
+
+
+def test_families_are_told_in_sentences_with_their_bifurcations():
+    branch = {"model": "rigid", "period": 1, "stable_ranges": [[1.0, 4.0]]}
+    flip = {"kind": "flip", "model": "rigid", "period": 1, "value": 4.0, "multiplier": [-1.0, 0.0]}
+    found = {"branches": [branch, branch], "bifurcations": [flip], "cascades": [], "attractors": [], "lyapunov": []}
+    lines = answer("continuation", found | {"over": "slope_deg", "unit": "deg"})
+    assert lines[0] == "2 branches of gaits over slope_deg."
+    assert lines[1].replace("\u00a0", " ") == "The rigid model's gait of one step is stable from 1 deg to 4 deg."
+    assert lines[-1].split() == ["flip", "rigid", "1", "4", "−1.0000"]
+
+
+def test_engines_are_told_by_what_was_concluded():
+    summary = {
+        "rows": [{}],
+        "versions": {"drake": "1.5"},
+        "conclusions": {"kneed": {"own-law": "Closest.", "same-law": ""}},
+    }
+    assert answer("engines", summary) == ["1 run in drake 1.5.", "", "kneed, own-law: Closest."]
+
+
+def test_how_far_a_start_may_change_is_told_in_signs():
+    margins = {
+        "dtheta_1 down": {"factor": 0.0, "beyond": ""},
+        "both up": {"factor": 1.10664, "beyond": "off-pad"},
+    }
+    change = {"needed": False, "found": True, "margins": margins}
+    cells = {"walks_share": 0.296, "cells": 3721}
+    lines = answer("tune", {"adjustment": change, "gait": {"found": False, "reason": "none was sought"}, "map": cells})
+    assert " ".join(row(lines, "θ̇₁ down")) == "walks to a factor of 0, as far as searched"
+    assert " ".join(row(lines, "both up")) == "walks to a factor of 1.107; beyond: off-pad"
 
 
 def test_long_rows_keep_their_ends():
@@ -90,5 +161,8 @@ def test_the_verdict_of_a_run_is_three_lines():
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert len(said) == 3
-    assert said[1] == "The rigid model walks 20000 steps (walked)."
+    assert said[1] == "The rigid model walks all 20000 steps."
+    assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [
+        "5 of 5 extreme cases and known problems ended as expected."
+    ]
     assert said[2].startswith("Of 4 numbers that the paper prints, 3 are reproduced and 1 is explained.")

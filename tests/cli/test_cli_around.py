@@ -34,6 +34,15 @@ def test_init_knows_the_types_of_walkers(walker):
     assert "Did you mean compass?" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("walker_type", "config"), [("torso", "torso"), ("parts", "parts"), ("straight-legs", "round-feet")]
+)
+def test_init_writes_a_type_or_a_built_in_config_under_its_name(walker, walker_type, config):
+    assert walker("init", "--type", walker_type).returncode == 0
+    written = load(walker.folder / f"{walker_type}.yaml").config
+    assert written.model_copy(update={"name": config}) == load(Path(config)).config
+
+
 @pytest.mark.parametrize(("text", "name"), [("Läufer 2", "Laufer-2"), ("a  b", "a-b"), ("-x.", "x"), ("歩", "run")])
 def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
     assert safe_name(text) == name
@@ -84,8 +93,13 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
 
 
 def test_open_without_a_page_says_what_writes_it(toy):
-    assert "there is no run paper" in toy("open").stderr
+    for command in (("open",), ("status", "paper"), ("diff", "paper", "kneed")):
+        assert toy(*command).stderr.splitlines()[:2] == [
+            "error: there is no run paper.",
+            "advice: `walkerlab report` makes the run of the paper config.",
+        ]
     toy("roll")
+    assert "there is no run papr. Did you mean paper?" in toy("open", "papr").stderr
     done = toy("open", "paper")
     assert done.returncode == 5
     assert "walkerlab report -c runs/paper" in done.stderr
@@ -98,6 +112,24 @@ def test_a_key_is_explained_in_80_columns(walker):
     done = walker("schema", "contact.stifness")
     assert done.returncode == 3
     assert "Did you mean contact.stiffness?" in done.stderr
+
+
+def test_a_key_of_one_kind_of_walker_is_found_by_the_name_that_a_config_has(walker):
+    lines = walker("schema", "walker.thigh").stdout.splitlines()
+    assert "walker(kneed).thigh.length_m" in lines
+    assert walker("schema", "walker(kneed).thigh").stdout.splitlines() == lines
+
+
+def test_a_config_that_is_not_there_is_begun_with_init(walker):
+    done = walker("fixedpoint", "-c", "mine.yaml")
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init FILE` writes a config to begin with"
+
+
+def test_a_film_needs_no_name(walker):
+    done = walker("animate", "paper")
+    assert done.returncode == 5
+    assert "there is no run paper" in done.stderr
 
 
 def test_advice_can_be_typed_back(toy):

@@ -9,6 +9,7 @@ def states(done):
 
 def test_status_says_missing_current_stale_damaged_and_left_out(toy):
     assert set(states(toy("status", "--json")).values()) == {"missing", "not run"}
+    assert "drop     missing\n" in toy("status").stdout
     assert not list(toy.folder.iterdir())
     toy("page")
     runs = toy.folder / "runs"

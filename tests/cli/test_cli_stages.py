@@ -1,6 +1,7 @@
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 
@@ -24,11 +25,19 @@ def test_results_go_to_stdout_and_messages_to_stderr(toy):
     assert "ran" not in first.stdout
     told = [line.split()[:2] for line in first.stderr.splitlines()]
     assert told == [["drop:", "starts"], ["drop:", "ran"], ["roll:", "starts"], ["roll:", "ran"]]
-    assert "(1 of 2, not there yet)" in first.stderr
-    assert "left: roll" in first.stderr
+    assert "drop: starts (1 of 2)\n" in first.stderr
+    assert re.search(r"^drop: ran in [\d.]+ s; left: roll$", first.stderr, re.MULTILINE)
+    assert "not there yet" not in first.stderr
     second = toy("roll")
     assert second.stdout == first.stdout
     assert [line.split()[:2] for line in second.stderr.splitlines()] == [["drop:", "reused"], ["roll:", "reused"]]
+
+
+def test_a_stage_that_runs_anew_says_why_as_it_starts(toy):
+    assert toy("drop").stderr.startswith("drop: starts\n")
+    changed = toy("drop", "--force").stderr
+    assert changed.startswith("drop: starts (--force)\n")
+    assert "--force" not in changed.splitlines()[1]
 
 
 def test_json_is_one_object_with_the_fixed_keys(toy):

@@ -17,7 +17,7 @@ MIRROR = Path(__file__).parents[2] / "configs"
 
 
 def test_the_built_in_configs_are_these() -> None:
-    others = ("kneed", "kneed-round-feet", "round-feet", "simplest", "torso")
+    others = ("kneed", "kneed-round-feet", "parts", "round-feet", "simplest", "torso")
     papers = ("contact-si", "paper", "paper-as-printed", "rigid-only", "sliding-feet", "slope-3deg")
     assert builtin_names() == tuple(sorted((*others, *papers)))
 

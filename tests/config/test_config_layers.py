@@ -111,7 +111,10 @@ def test_strides_of_the_command_line_are_over_everything() -> None:
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("contact.stifness=1e6", r"--set contact\.stifness=1e6:1:1: .* did you mean contact\.stiffness\?"),
+        (
+            "contact.stifness=1e6",
+            r"^--set contact\.stifness=1e6: contact\.stifness: unknown key .* did you mean contact\.stiffness\?",
+        ),
         ("contact.damping=fast", r":1:17: contact\.damping: 'fast' is not a number"),
         ("strides=", r"strides: nothing is not an integer"),
         ("name=../../x", r"is not safe"),
@@ -132,7 +135,7 @@ def test_a_bad_setting_is_refused_with_its_place(refused: Refused, setting: str,
 
 
 def test_bad_strides_are_refused() -> None:
-    with pytest.raises(ConfigError, match="--strides 0:1:1: strides: 0 is out of bounds"):
+    with pytest.raises(ConfigError, match="--strides 0: strides: 0 is out of bounds"):
         load(strides=0)
 
 

@@ -121,10 +121,10 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         ("start: fixedpoint\n", r"did you mean fixed-point\?"),
         ("outputs: states\n", r"'states' is not a list"),
         ("outputs: [state]\n", r"1:11: outputs: 'state' is not allowed; did you mean states\?"),
-        ("equations: as_printed\n", r"did you mean as-printed\?; allowed: one of corrected, as-printed"),
+        ("equations: as_printed\n", r"; did you mean as-printed\? Allowed: one of corrected, as-printed"),
         (
             "solver: {rigid: {method: dop835}}\n",
-            r"did you mean dop853\?; allowed: one of dop853, radau5, scipy-rk45",
+            r"; did you mean dop853\? Allowed: one of dop853, radau5, scipy-rk45",
         ),
         ("solver: {contact: {method: radau}}\n", r"did you mean (radau5|scipy-radau)\?"),
         ("contact: {pad_pitch: -1}\n", r"-1 is out of bounds; allowed: rigid, own, or 1e-6 to 1e4 \(m\)"),

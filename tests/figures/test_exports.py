@@ -11,6 +11,7 @@ from synthetic_walks import both_models
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import cell, export_from
 from walkerlab.cli.films import Film, write_film
+from walkerlab.cli.named import walk_in
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.store.artifact import write
@@ -70,12 +71,40 @@ def test_a_table_for_latex_guards_its_letters(run):
     assert r"t\_left & s & $0.7$ \\" in text
     assert cell(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert cell("50 %") == r"50 \%"
+    assert cell("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
+
+
+@pytest.mark.parametrize("name", ["7", "07", "figure-7", "fig 7"])
+def test_a_figure_is_known_by_its_number(run, name):
+    assert export_from(run, name, "svg", None, 2, "").name == "paper-figure-07.svg"
+
+
+def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
+    with pytest.raises(ConfigError) as refused:
+        export_from(run, "figur", "pdf", None, 2, "")
+    assert "figure-07" in refused.value.advice
+    assert refused.value.advice.endswith("table-3 and trajectory.")
+    assert "figure-13" not in refused.value.advice
+
+
+def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
+    for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
+        with pytest.raises(StaleError) as refused:
+            export_from(run, name, "pdf", None, 2, "")
+        assert refused.value.advice == f"`walkerlab {command} -c {run}` makes what it needs."
+
+
+def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
+    assert walk_in(run) == "contact-sim"
+    (run / "contact-sim.h5").unlink()
+    assert walk_in(run) == "simulate"
 
 
 @pytest.mark.parametrize(
     ("what", "kind", "error", "said"),
     [
-        ("figure-7", "pdf", ConfigError, "Did you mean figure-07"),
+        ("tabl", "tex", ConfigError, "there is no tabl. Did you mean table"),
+        ("table-1", "tex", ConfigError, "compares with the paper's walker"),
         ("figure-07", "csv", ConfigError, "cannot be written as csv"),
         ("figure-11", "pdf", StaleError, "cannot be drawn"),
     ],

@@ -124,6 +124,13 @@ def test_the_values_under_the_pointer_are_told(page):
     assert "contact leg 2" in told
 
 
+@pytest.mark.parametrize(
+    ("value", "said"), [("0", "0 m"), ("5.55e-17", "0 m"), ("-2.5e-8", "−25 nm"), ("1.2e-4", "120 µm")]
+)
+def test_rounding_is_no_length(page, value, said):
+    assert page.evaluate(f"metres({value})") == said
+
+
 def test_a_figure_grows_on_a_click_and_escape_closes_it(page):
     page.evaluate("document.querySelector('[data-large]').click()")
     assert page.evaluate("document.getElementById('large').open")

@@ -1,9 +1,11 @@
 """What the report says of families of gaits."""
 
+from dataclasses import replace
+
 from synthetic_results import config, families, families_that_move, simulate, with_motion
 
 from walkerlab.config.loader import load
-from walkerlab.report.gait_diagram import gait_diagram
+from walkerlab.report.gait_diagram import CLEAR, apart, gait_diagram
 from walkerlab.report.results import Results
 from walkerlab.report.sections import families as section
 
@@ -17,7 +19,7 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     (paragraph, table) = made.blocks
     assert "stable from 1\u00a0deg to 4\u00a0deg" in made.finding
     assert "0.2 a step" in paragraph.text
-    assert "leaves its attractor: fell" in paragraph.text
+    assert "leaves its attractor and falls." in paragraph.text
     assert [cell.text for cell in table.bodies[0].rows[0]][:4] == ["flip", "rigid", "1", "4"]
 
 
@@ -30,3 +32,11 @@ def test_the_diagram_has_a_mark_for_every_gait_whose_motion_is_stored():
     assert first.walker.samples > 2
     assert [scene["slope_rad"] for scene in (first.scene, second.scene)] == [0.02, 0.09]
     assert gait_diagram(Results(config(), families())) is None
+
+
+def test_no_mark_covers_another_and_stable_gaits_keep_theirs():
+    walk = with_motion(simulate())
+    (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
+    near, far = replace(mark, x=mark.x + 0.9 * CLEAR), replace(mark, x=mark.x + CLEAR)
+    assert apart([mark, near, far]) == (mark, far)
+    assert apart([replace(mark, stable=False), near, far]) == (near,)

@@ -37,7 +37,8 @@ def test_fixed_decimals_never_print_minus_zero():
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(0.37143, "0.3714 m"), (0.00037, "0.37 mm"), (5.88e-5, "58.8 µm"), (0.0, "0 m")]
+    ("value", "text"),
+    [(0.37143, "0.3714 m"), (0.00037, "0.37 mm"), (5.88e-5, "58.8 µm"), (1.11e-16, "0 m"), (0.0, "0 m")],
 )
 def test_lengths_are_in_the_unit_they_are_easiest_read_in(value, text):
     assert plain(length(value)) == text

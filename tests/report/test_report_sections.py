@@ -240,7 +240,7 @@ def test_a_set_of_equations_without_a_gait_is_left_away():
     summary = dict(fixedpoint().summary)
     summary["equation_sets"] = {"corrected": summary["equation_sets"]["corrected"], "as-printed": {"gaits_found": 0}}
     (table,) = blocks(sections([], fixedpoint=stored("fixedpoint", {}, summary))["gait"], Table)
-    assert [column.title for column in table.columns] == ["quantity", "corrected"]
+    assert [column.title for column in table.columns] == ["quantity", "value"]
 
 
 def test_assumptions_are_judged():

@@ -30,6 +30,7 @@ def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
     path = tmp_path / "own-parts.yaml"
     path.write_text(text)
     own, kneed = load(path).config, load(Path("kneed")).config
+    assert own.walker == load(Path("parts")).config.walker
     assert coordinates(own) == coordinates(kneed)
     one, other = rigid_walker(own, "corrected"), rigid_walker(kneed, "corrected")
     assert type(one) is type(other)

@@ -68,6 +68,12 @@ def test_parameters_are_named_by_the_last_key_unless_two_would_be_the_same():
     )
 
 
+def test_a_sweep_over_nothing_is_shown_an_example():
+    with pytest.raises(ConfigError) as refused:
+        question()
+    assert "`walkerlab sweep --over slope_deg=" in refused.value.advice
+
+
 @pytest.mark.parametrize(
     ("over", "said"),
     [

@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from walkerlab.cli.text import aligned, described_summary
-from walkerlab.labels import unit_by_name
-from walkerlab.report.numbers import MINUS, count, fixed, length, listed, number, quantity
+from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.report.gait_diagram import parameter
+from walkerlab.report.numbers import count, fixed, length, listed, number, quantity, told_apart
+from walkerlab.report.outcomes import LOOKED_FORWARD_TO, ends, walks
+from walkerlab.report.sections.basin import shares
+from walkerlab.report.sections.families import findings as families
+from walkerlab.report.sections.gaits import STATE, complex_number, heads_of, multiplier, symbol
+from walkerlab.report.sections.models import CHANNELS
+from walkerlab.report.symbols import in_signs
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], list[str]]
 
-SYMBOLS = {
-    "theta_1": "θ₁",
-    "theta_2": "θ₂",
-    "dtheta_1": "θ̇₁",
-    "dtheta_2": "θ̇₂",
-}
-COMPASS = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+COLUMNS = 100
+"""A paragraph is as wide."""
 SHOWN = 6
 """So many of a long row of numbers are shown."""
-WORDS = {"as-printed": "as printed", "corrected": "corrected"}
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short."""
+    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short.
+
+    None for a stage that came to nothing: that is told as an error.
+    """
+    if not summary:
+        return []
     return ANSWERS[stage](summary) if stage in ANSWERS else list(described_summary(summary, short=True))
 
 
@@ -45,25 +52,22 @@ def fixedpoint(summary: Summary) -> list[str]:
     sets = summary.get("equation_sets", {})
     shown = {name: found for name, found in sets.items() if "state" in found} or {summary["equations"]: summary}
     first = [summary["equations"], *(name for name in shown if name != summary["equations"])]
-    rows = [["", *(WORDS.get(name, name) for name in first), "unit"], *gait_rows([shown[name] for name in first])]
+    names = summary.get("state_names", STATE)
+    rows = [["", *heads_of(first), "unit"], *gait_rows(names, [shown[name] for name in first])]
     found = f"{count(summary['gaits_found'], 'gait')} of one step found."
     return [head, "", *aligned(rows), "", found]
 
 
-def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
+def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]:
     """State, multipliers and measures of gaits, one column each."""
-    names = gaits[0].get("state_names") or COMPASS[: len(gaits[0]["state"])]
     rows = [
         [symbol(name), *(fixed(gait["state"][place], 6) for gait in gaits), "rad/s" if name.startswith("d") else "rad"]
         for place, name in enumerate(names)
     ]
     most = max(len(gait["multipliers"]) for gait in gaits)
+    rows += [[f"multiplier {place + 1}", *(multiplier(gait, place) for gait in gaits), ""] for place in range(most)]
     rows += [
-        [f"multiplier {place + 1}", *(multiplier(gait["multipliers"], place) for gait in gaits), "1"]
-        for place in range(most)
-    ]
-    rows += [
-        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_by_name(key)]
+        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_of(key)]
         for key, words, written in (
             ("period_s", "step period", partial(fixed, decimals=5)),
             ("step_length_m", "step length", partial(fixed, decimals=5)),
@@ -71,34 +75,28 @@ def gait_rows(gaits: Sequence[Summary]) -> list[list[str]]:
             ("energy_drift_J", "energy drift", partial(number, digits=2)),
             ("min_normal_force_N", "least normal force", partial(fixed, decimals=1)),
             ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4)),
-            ("max_scuff_depth_m", "scuffing depth", partial(number, digits=4)),
+            ("max_scuff_depth_m", "scuffing depth", depth),
         )
         if any(key in gait for gait in gaits)
     ]
     return rows
 
 
-def symbol(name: str) -> str:
-    """A coordinate's symbol, its own name if it has none."""
-    return SYMBOLS.get(name, name)
+def depth(value_m: float) -> str:
+    """A depth in metres."""
+    return number(told_apart(value_m), 4)
 
 
-def multiplier(values: Sequence[Sequence[float]], place: int) -> str:
-    """A multiplier as a complex number."""
-    if place >= len(values):
-        return ""
-    real, imaginary = values[place]
-    if imaginary == 0.0:
-        return fixed(real, 4)
-    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)} i"
+def unit_of(key: str) -> str:
+    """The unit that a key ends in, as a table shows it: nothing for a pure number."""
+    unit = unit_by_name(key)
+    return "" if unit == "1" else unit
 
 
 def walk(model: str, summary: Summary) -> list[str]:
     """How a walk of the rigid or the contact model went, step by step."""
     steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
-    walked = summary["outcome"] == "walked"
-    head = f"The {model} model walks " + (f"all {count(steps, 'step')}" if walked else count(steps, "step"))
-    head += "" if walked else f" and then: {summary['outcome']}"
+    head = f"The {model} model {walks(steps, summary['outcome'])}"
     if periods:
         head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
     rows = [["step", *map(str, shown_places(steps)), ""]] if steps else []
@@ -108,14 +106,17 @@ def walk(model: str, summary: Summary) -> list[str]:
     if summary.get("slips_m"):
         rows.append(["slip", *elided([fixed(1e3 * value, 2) for value in summary["slips_m"]]), "mm"])
     own = [[words, said] for words, said in walk_measures(summary) if said]
-    advice = [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != "walked" else []
-    return [f"{head}.", "", *aligned(rows), "", *aligned(own), *advice]
+    advice = (
+        [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO else []
+    )
+    steps_taken = ["", *aligned(rows)] if rows else []
+    return [f"{head}.", *steps_taken, "", *aligned(own), *advice]
 
 
 def walk_measures(summary: Summary) -> list[tuple[str, str]]:
     """What was measured over a walk as a whole."""
     dissipated = summary.get("dissipated_J") or {}
-    lost = listed(f"{quantity(value, 'J', 3)} by {name}" for name, value in dissipated.items())
+    lost = listed(f"{quantity(value, 'J', 3)} {CHANNELS[name]}" for name, value in dissipated.items() if value)
     return [
         ("mean energy", told(summary, "mean_energy_J", 7)),
         ("energy drift", told(summary, "energy_drift_J", 2)),
@@ -163,13 +164,13 @@ def tune(summary: Summary) -> list[str]:
             ["step period", quantity(gait["period_s"], "s")],
             ["step length", quantity(gait["step_length_m"], "m")],
             ["slip a step", length(gait["slip_m"])],
-            ["largest multiplier", multiplier(gait["multipliers"], 0)],
+            ["largest multiplier", multiplier(gait, 0)],
         ]
     else:
         rows.append(["own gait", f"none: {gait['reason']}"])
     for name, margin in change.get("margins", {}).items():
-        beyond = margin["beyond"] or "still walks"
-        rows.append([name.replace("_", " "), f"to a factor of {number(margin['factor'], 4)}; beyond: {beyond}"])
+        beyond = f"; beyond: {margin['beyond']}" if margin["beyond"] else ", as far as searched"
+        rows.append([in_signs(name), f"walks to a factor of {number(margin['factor'], 4)}{beyond}"])
     return [head, "", *aligned(rows)]
 
 
@@ -194,12 +195,15 @@ def compare(summary: Summary) -> list[str]:
 def models_compared(summary: Summary) -> list[str]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
     steps, outcomes = summary["steps"], summary["outcomes"]
-    rows = [["last step", "period", "length", "ends as"]]
+    rows = [["last step", "period (s)", "length (m)", "outcome"]]
     walks = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
     releases = summary.get("releases", {}).items()
     walks += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
     rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in walks]
-    head = f"The rigid model's walk ends as {outcomes['rigid']}, the contact model's as {outcomes['contact']}"
+    rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
+    head = f"The rigid model {rigid}, " + (
+        "and so does the contact model" if contact == rigid else f"the contact model {contact}"
+    )
     return [f"{head}.", "", *aligned(rows)]
 
 
@@ -235,6 +239,40 @@ def stability(summary: Summary) -> list[str]:
     return [head, "", *aligned(rows), *said]
 
 
+def continuation(summary: Summary) -> list[str]:
+    """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
+    found = [f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {summary['over']}."]
+    over = with_unit(parameter(summary), summary["unit"])
+    rows = [["bifurcation", "model", "steps", over, "multiplier"]]
+    rows += [
+        [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), complex_number(*one["multiplier"])]
+        for one in summary["bifurcations"]
+    ]
+    return [*found, *families(summary), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+
+
+def basin(summary: Summary) -> list[str]:
+    """How much walks, and to what."""
+    rows = [["attractor", "cells", "steps to reach it"]]
+    rows += [
+        [count(row["period"], "step"), str(row["cells"]), number(row.get("median_steps_to_settle"), 3)]
+        for row in summary["attractors"]
+    ]
+    return [*textwrap.wrap(in_signs(shares(summary).text), COLUMNS), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+
+
+def engines(summary: Summary) -> list[str]:
+    """What was concluded of each scene; every run is in `show`."""
+    told = [
+        f"{scene}, {experiment}: {text}"
+        for scene, concluded in summary["conclusions"].items()
+        for experiment, text in concluded.items()
+        if text
+    ]
+    ran = listed(f"{name} {version}" for name, version in summary["versions"].items())
+    return [f"{count(len(summary['rows']), 'run')} in {ran}.", "", *told]
+
+
 def plot(summary: Summary) -> list[str]:
     """The figures."""
     figures = summary["figures"]
@@ -254,6 +292,9 @@ ANSWERS: dict[str, Answer] = {
     "compare": compare,
     "accuracy": accuracy,
     "stability": stability,
+    "continuation": continuation,
+    "basin": basin,
+    "engines": engines,
     "plot": plot,
     "report": report,
 }
@@ -264,11 +305,11 @@ def verdict(results: Mapping[str, Summary]) -> list[str]:
     lines = []
     if "fixedpoint" in results:
         lines.append(fixedpoint(results["fixedpoint"])[0])
-    walks = [(words, results[name]) for name, words in WALKS.items() if name in results]
-    said = [f"the {words} model walks {count(one['steps'], 'step')} ({one['outcome']})" for words, one in walks]
+    models = [(words, results[name]) for name, words in WALKS.items() if name in results]
+    said = [f"the {words} model {walks(one['steps'], one['outcome'])}" for words, one in models]
     if said:
         lines.append(f"{'; '.join(said)}."[:1].upper() + f"{'; '.join(said)}."[1:])
-    last = [compare(results["compare"])[0]] if "compare" in results else []
+    last = [compare(results["compare"])[0]] if "verdicts" in results.get("compare", {}) else []
     last += [stability(results["stability"])[0]] if "stability" in results else []
     return [*lines, " ".join(last)] if last else lines
 

@@ -12,7 +12,8 @@ from walkerlab.stages.graph import Graph
 RunArgument = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 and so on, table-1 to table-3, table, trajectory"
+FIGURES = "figure-07 and so on, or its number; table-1 to table-3, table, trajectory"
+FIRST_WALK = "default: contact-sim, or simulate where that has not run"
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
@@ -20,15 +21,20 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
     @app.command("init")
     def init(
-        file: Annotated[Path, typer.Argument(metavar="FILE", help="The config to be written; it must not exist.")],
-        walker: Annotated[str, typer.Option("--type", metavar="TYPE", help="Type of walker.")] = "compass",
+        file: Annotated[
+            Path | None,
+            typer.Argument(metavar="[FILE]", help="The config to be written; it must not exist. Default: TYPE.yaml."),
+        ] = None,
+        walker: Annotated[
+            str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
+        ] = "compass",
         quiet: Quiet = False,
     ) -> None:
         """Write a commented config to begin with, and a schema by which editors check it."""
         with exit_on_failure("init", as_json=False):
             from walkerlab.cli.begin import write_config
 
-            said = write_config(file, walker)
+            said = write_config(file or Path(f"{walker}.yaml"), walker)
             if not quiet:
                 print(said)
 
@@ -67,21 +73,26 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")],
         output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Where to.")] = None,
         columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 2,
-        model: Annotated[str, typer.Option(metavar="STAGE", help="Whose trajectory.")] = "contact-sim",
+        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
         runs: Runs = RUNS,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
         with exit_on_failure("export", as_json=False):
             from walkerlab.cli.exports import export_from
-            from walkerlab.cli.named import folder_of
+            from walkerlab.cli.named import walk_in
+            from walkerlab.stages.runs import run_named
 
-            print(export_from(folder_of(run, runs), what, to, output, columns, model))
+            folder = run_named(str(run), runs).path
+            print(export_from(folder, what, to, output, columns, model or walk_in(folder)))
 
     @app.command("animate")
     def animate(
         run: RunArgument,
-        to: Annotated[Path, typer.Option("--to", metavar="FILE", help="A .gif, or an .mp4 where ffmpeg is found.")],
-        model: Annotated[str, typer.Option(metavar="STAGE", help="Whose walk.")] = "contact-sim",
+        to: Annotated[
+            Path | None,
+            typer.Option("--to", metavar="FILE", help="A .gif, or an .mp4 where ffmpeg is found; default: RUN.gif."),
+        ] = None,
+        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
         steps: Annotated[int, typer.Option(min=1, help="Steps that are shown.")] = 4,
         rate: Annotated[int, typer.Option(min=1, max=60, help="Pictures a second.")] = 25,
         slower: Annotated[float, typer.Option(min=0.01, help="So many times slower than life.")] = 1.0,
@@ -92,6 +103,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("animate", as_json=False):
             from walkerlab.cli.console import Console
             from walkerlab.cli.films import Film, write_film
-            from walkerlab.cli.named import folder_of
+            from walkerlab.cli.named import walk_in
+            from walkerlab.stages.runs import run_named
 
-            print(write_film(folder_of(run, runs), to, Film(model, steps, rate, slower), Console(quiet)))
+            folder = run_named(str(run), runs).path
+            path = to or Path(f"{folder.resolve().name}.gif")
+            film = Film(model or walk_in(folder), steps, rate, slower)
+            print(write_film(folder, path, film, Console(quiet)))

@@ -33,12 +33,13 @@ def write_config(file: Path, walker: str) -> str:
 
 
 def template(walker: str) -> str:
-    """The built-in config of a type of walker, the paper's before others; ConfigError if there is none."""
+    """The built-in config of a type of walker, the paper's before others, or of its own name; ConfigError if none."""
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
         types.setdefault(load(Path(name)).config.walker.type, name)
-    if walker not in types:
-        near = nearest(walker, types)
+    named = types | {name: name for name in builtin_names()}
+    if walker not in named:
+        near = nearest(walker, named)
         meant = f" Did you mean {near}?" if near else ""
-        raise ConfigError(f"there is no type of walker {walker!r}.{meant}", f"There are {', '.join(types)}.")
-    return types[walker]
+        raise ConfigError(f"there is no type of walker {walker!r}.{meant}", f"There are {', '.join(named)}.")
+    return named[walker]

@@ -43,7 +43,7 @@ class Console:
             if sys.stderr.isatty():
                 self._show_bars()
             else:
-                self.note(f"{stage}: starts ({place})")
+                self.note(f"{stage}: starts ({place})" if place else f"{stage}: starts")
                 self._keep_talking()
         return line
 
@@ -64,7 +64,7 @@ class Console:
             return
         self._drawn = True
         path = (folder / str(page)).resolve()
-        self.note(f"page: {path} (what is there so far; it is written again as results come in)")
+        self.note(f"page: {path} (with what there is so far; it is written again as results come in)")
         if self.open_page:
             from walkerlab.cli.browser import open_file
 

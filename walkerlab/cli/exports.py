@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from walkerlab.config.problems import nearest
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
+from walkerlab.report.numbers import listed
+from walkerlab.stages.graph import PIPELINE
 from walkerlab.store.artifact import Damaged, Stored, read
 from walkerlab.store.content import Group
 from walkerlab.store.files import write_atomically
 
+if TYPE_CHECKING:
+    from walkerlab.figures.illustration import Illustration
+
 FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 TRAJECTORY = "trajectory"
+RAISED = re.compile(r"\\\^\{\}(-?\d+)")
+"""A power in a text whose letters are guarded already."""
+NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
@@ -27,15 +36,23 @@ def export_from(folder: Path, what: str, kind: str, output: Path | None, columns
 
     Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
     """
+    what = figure_named(what)
     if what == TRAJECTORY:
         data = written(what, kind, TRAJECTORY_KINDS, lambda: trajectory(result(folder, model), kind))
     elif what in TABLES:
-        data = written(what, kind, TABLE_KINDS, lambda: table(result(folder, "compare").summary[TABLES[what]], kind))
+        data = written(what, kind, TABLE_KINDS, lambda: table(rows_of(folder, what), kind))
     else:
-        data = written(what, kind, FIGURE_KINDS, lambda: figure(folder, what, kind, columns))
+        illustration = figure_in(folder, what)
+        data = written(what, kind, FIGURE_KINDS, lambda: figure(folder, illustration, kind, columns))
     path = output or Path(f"{folder.resolve().name}-{what}.{kind}")
     write_atomically(path, data)
     return path
+
+
+def figure_named(what: str) -> str:
+    """The name of a figure that is named by its number, as figure-7 or 7; another name as it is."""
+    found = NUMBERED.fullmatch(what)
+    return f"figure-{int(found[1]):02d}" if found else what
 
 
 def written(what: str, kind: str, kinds: Sequence[str], make: Callable[[], bytes]) -> bytes:
@@ -54,22 +71,61 @@ def result(folder: Path, stage: str) -> Stored:
         raise StaleError(f"{folder} has no result of {stage}.", advice) from None
 
 
-def figure(folder: Path, name: str, kind: str, columns: int) -> bytes:
-    """A figure, drawn anew for one or two columns of a journal."""
+def figure_in(folder: Path, name: str) -> Illustration:
+    """The figure of a name; ConfigError with what the run has if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
 
     named = {one.name: one for one in FIGURES}
     if name not in named:
+        stored = results_in(folder)
         near = nearest(name, (*named, *TABLES, TRAJECTORY))
         meant = f" Did you mean {near}?" if near else ""
-        raise ConfigError(f"there is no {name}.{meant}", f"There are {', '.join((*named, *TABLES, TRAJECTORY))}.")
-    illustration = named[name]
-    stored = {path.stem: read(path) for path in sorted(folder.glob("*.h5"))}
+        drawable = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
+        raise ConfigError(f"there is no {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
+    return named[name]
+
+
+def figure(folder: Path, illustration: Illustration, kind: str, columns: int) -> bytes:
+    """A figure, drawn anew for one or two columns of a journal; StaleError if the run has not what it needs."""
+    stored = results_in(folder)
     why = illustration.why_left_out(stored, {})
     if why is not None:
-        raise StaleError(f"{name} cannot be drawn: {why}.", f"`walkerlab plot -c {folder}` makes what it needs.")
+        made = [f"`walkerlab {command_of(stage)} -c {folder}`" for stage in illustration.stages if stage not in stored]
+        advice = f"{listed(made)} makes what it needs." if made else ""
+        raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     return illustration.as_file(stored, kind, columns)
+
+
+def results_in(folder: Path) -> dict[str, Stored]:
+    """The results of a run, by stage."""
+    return {path.stem: read(path) for path in sorted(folder.glob("*.h5"))}
+
+
+def exportable(stored: Mapping[str, Stored]) -> list[str]:
+    """What there is beside figures: tables of the paper's numbers, and a trajectory."""
+    compared = stored["compare"].summary if "compare" in stored else {}
+    tables = [name for name, key in TABLES.items() if key in compared]
+    return tables + [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
+
+
+def there_is(folder: Path, names: Sequence[str]) -> str:
+    """What a run has that can be exported."""
+    return f"{folder} has {listed(names)}." if names else f"{folder} has nothing yet: `walkerlab report` makes it all."
+
+
+def command_of(stage: str) -> str:
+    """What is typed to have a stage's result."""
+    main = PIPELINE[stage].campaign_of
+    return f"{main} --full" if main else stage
+
+
+def rows_of(folder: Path, name: str) -> Any:
+    """The rows of a table; ConfigError if the walker is another than the paper's."""
+    summary = result(folder, "compare").summary
+    if TABLES[name] not in summary:
+        raise ConfigError(f"{folder} has no {name}: it compares with the paper's walker, and this is another.")
+    return summary[TABLES[name]]
 
 
 def table(rows: Any, kind: str) -> bytes:
@@ -99,13 +155,13 @@ def tex_of(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bytes:
 
 
 def cell(value: Any) -> str:
-    """A value in a LaTeX table: numbers in maths, text with its special letters guarded."""
+    """A value in a LaTeX table: numbers in maths, text with its powers raised and its special letters guarded."""
     if value is None:
         return "--"
     if isinstance(value, float):
         mantissa, _, exponent = f"{value:.5g}".partition("e")
         return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
-    return str(value).translate(TEX)
+    return RAISED.sub(r"$^{\1}$", str(value).translate(TEX))
 
 
 def trajectory(stored: Stored, kind: str) -> bytes:

@@ -1,30 +1,26 @@
-"""Runs as they are named on the command line: a folder, or its name in the folder of all runs."""
+"""What is named on the command line for short: the page of a run, and which of its walks is meant."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from walkerlab.config.problems import nearest
 from walkerlab.errors import StaleError
+from walkerlab.stages.runs import run_named
 
 PAGE = "report.html"
-
-
-def folder_of(run: Path, runs: Path) -> Path:
-    """The folder of a run; StaleError with the nearest name if there is none."""
-    for folder in (run, runs / run):
-        if folder.is_dir():
-            return folder
-    there = sorted(path.name for path in runs.iterdir() if path.is_dir()) if runs.is_dir() else []
-    near = nearest(run.name, there)
-    meant = f" Did you mean {near}?" if near else f" There are {', '.join(there)}." if there else ""
-    raise StaleError(f"there is no run {run}.{meant}", "`walkerlab report` makes the run of the paper config.")
+WALKS = ("contact-sim", "simulate")
+"""Stages that walk; the first that a run has is shown."""
 
 
 def page_of(run: Path, runs: Path) -> Path:
     """The page of a run, as an absolute path; StaleError if it was not written yet."""
-    folder = folder_of(run, runs)
+    folder = run_named(str(run), runs).path
     page = (folder / PAGE).resolve()
     if not page.is_file():
         raise StaleError(f"{folder} has no page yet.", f"`walkerlab report -c {folder}` writes it.")
     return page
+
+
+def walk_in(folder: Path) -> str:
+    """The stage whose walk is meant if none is named."""
+    return next((stage for stage in WALKS if (folder / f"{stage}.h5").is_file()), WALKS[0])

@@ -11,7 +11,7 @@ from walkerlab.cli.text import aligned, described_summary
 from walkerlab.errors import StaleError
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import survey
-from walkerlab.store.artifact import Stored
+from walkerlab.store.artifact import NOT_THERE, Stored
 from walkerlab.store.content import Variable
 
 SHORT = 12
@@ -23,7 +23,8 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
     if step.found is None:
-        raise StaleError(f"there is no result to show, {path}: {step.reason}.", f"`walkerlab {stage}` makes it.")
+        why = "there is none yet" if step.reason == NOT_THERE else step.reason
+        raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` makes it.")
     if step.action != "reuse":
         request.console.warn(f"{path} is not current: {step.reason}")
     if request.as_json:

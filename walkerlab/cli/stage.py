@@ -68,7 +68,8 @@ def printed(request: Request, report: StageReport) -> str:
     if "html" in own:
         lines = [*verdict(report.results), *answer(report.stage, own), *pages(request, report)]
     else:
-        lines = [*answer(report.stage, own), "", f"stored in {report.artifact}"]
+        found = answer(report.stage, own)
+        lines = [*found, *([""] if found else []), f"stored in {report.artifact}"]
     return "\n".join([*lines, *left_out_lines(request, report)])
 
 

@@ -14,8 +14,9 @@ from walkerlab.cli.text import aligned
 from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError
 from walkerlab.stages.graph import Graph
-from walkerlab.stages.plan import Step, survey
+from walkerlab.stages.plan import UP_TO_DATE, Step, survey
 from walkerlab.stages.runs import RunSummary, config_of, run_named, runs_in
+from walkerlab.store.artifact import NOT_THERE
 from walkerlab.store.runfolder import RunFolder
 
 NOT_CURRENT = ("stale", "missing", "damaged")
@@ -67,7 +68,7 @@ def show(
         print_json(status | ({"error": described(error)} if check and error is not None else {}))
     else:
         print(f"{folder.path}:")
-        print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), s.reason] for s in steps)])))
+        print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])))
         if listed:
             print("\n".join([f"\nall runs in {request.runs}:", *aligned(rows_of_runs(listed))]))
     if check and error is not None:
@@ -86,6 +87,11 @@ def state_of(step: Step) -> str:
     if step.stage.optional:
         return "not run" if step.found is None else "outdated"
     return "missing" if step.found is None else "stale"
+
+
+def why(step: Step) -> str:
+    """Why a stage's result is in its state; nothing where the state says it."""
+    return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason
 
 
 def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:

@@ -230,7 +230,8 @@ def printed(swept: Swept, page: Path) -> list[str]:
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
-        f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}; {swept.reused} were there",
+        f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
+        f"  {swept.reused} of them were there already",
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]

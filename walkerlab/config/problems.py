@@ -32,16 +32,19 @@ class Problem:
         """On one line."""
         where = f"{self.position}: " if self.position else ""
         meant = f"; did you mean {self.nearest}?" if self.nearest else ""
-        allowed = f"; allowed: {self.allowed}" if self.allowed else ""
+        allowed = f"{' Allowed' if meant else '; allowed'}: {self.allowed}" if self.allowed else ""
         return f"{where}{self.text}{meant}{allowed}"
 
 
-def refusal(problems: Sequence[Problem]) -> ConfigError:
+KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
+
+
+def refusal(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> ConfigError:
     """One error for all `problems`, one a line."""
     lines = list(dict.fromkeys(str(problem) for problem in problems))
     if len(lines) > SHOWN_PROBLEMS:
         lines[SHOWN_PROBLEMS:] = [f"and {len(lines) - SHOWN_PROBLEMS} more"]
-    return ConfigError("\n".join(lines), "`walkerlab schema` lists every key with its unit, bounds and default")
+    return ConfigError("\n".join(lines), advice)
 
 
 def nearest(word: str, candidates: Iterable[str]) -> str:

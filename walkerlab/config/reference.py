@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
@@ -17,6 +18,8 @@ from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
+OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
+"""What tells a block's kinds apart in the name of a key; no config has it."""
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
@@ -90,13 +93,19 @@ def as_paragraphs(asked: str = "") -> str:
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
-    found = [key for key in keys() if not asked or key.key == asked or key.key.startswith(f"{asked}.")]
+    plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
+    found = [key for key in plain if not asked or any(is_in(asked, name) for name in (key.key, plain[key]))]
     if not found:
-        names = {".".join(key.key.split(".")[:depth]) for key in keys() for depth in (1, 2, 3)}
+        names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
         near = nearest(asked, names) or nearest(asked, {name.split(".")[-1] for name in names})
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
     return "\n\n".join("\n".join(_paragraph(key)) for key in found)
+
+
+def is_in(asked: str, key: str) -> bool:
+    """Whether a key is the one that was asked for, or in the block that was."""
+    return key == asked or key.startswith(f"{asked}.")
 
 
 def _paragraph(key: KeyReference) -> Iterator[str]:

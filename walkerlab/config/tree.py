@@ -15,8 +15,9 @@ class Position:
     column: int
 
     def __str__(self) -> str:
-        """As editors and terminals understand it: source:line:column."""
-        return f"{self.source}:{self.line}:{self.column}"
+        """As editors and terminals understand it: source:line:column; an option is itself where it begins."""
+        whole_option = self.source.startswith("--") and (self.line, self.column) == (1, 1)
+        return self.source if whole_option else f"{self.source}:{self.line}:{self.column}"
 
 
 @dataclass(frozen=True, slots=True)

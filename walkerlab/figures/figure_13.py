@@ -19,6 +19,7 @@ from walkerlab.figures.bifurcation_diagram import (
     label_of,
 )
 from walkerlab.figures.canvas import blank, legend_above
+from walkerlab.figures.first_doubling import first_doubling
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Results
 from walkerlab.figures.style import BLACK, GREY
@@ -106,13 +107,13 @@ def caption(results: Results) -> str:
     unit = f" {summary['unit']}" if summary["unit"] not in ("", "1") else ""
     said = ["Gaits over the parameter: solid where small disturbances die out, dashed where they grow."]
     for model in MODELS:
-        flips = [one for one in summary["bifurcations"] if one["model"] == model and one["kind"] == "flip"]
-        first = [one["value"] for one in flips if one["period"] == 1]
-        if first:
-            said.append(f"The {model} model's gait of one step first doubles its period at {min(first):.6g}{unit}.")
+        first = first_doubling(summary, model)
+        if first is not None:
+            said.append(f"The {model} model's gait of one step first doubles its period at {first:.6g}{unit}.")
     said += [
-        f"The {cascade['model']} model's flips accumulate at {cascade['accumulates_at']:.6g}{unit}, the last ratio of "
-        f"their distances being {cascade['ratios'][-1]:.4g}."
+        f"A cascade of the {cascade['model']} model from {cascade['flips'][0]:.6g}{unit} on accumulates at "
+        f"{cascade['accumulates_at']:.6g}{unit}, the last ratio of its flips' distances being "
+        f"{cascade['ratios'][-1]:.4g}."
         for cascade in summary["cascades"]
         if cascade["period"] == 1 and "accumulates_at" in cascade
     ]

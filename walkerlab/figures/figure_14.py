@@ -68,11 +68,11 @@ def caption(results: Results) -> str:
     """What the largest multipliers are where the span begins and ends."""
     said = ["Multipliers of the step map along the gaits of one step; inside the circle a disturbance dies out."]
     summary = results[STAGE].summary
-    said += [
-        f"{one['model'].capitalize()} model: a {one['kind']} at {one['value']:.6g}."
-        for one in summary["bifurcations"]
-        if one["period"] == 1
-    ]
+    alone = [one for one in summary["bifurcations"] if one["period"] == 1]
+    for model, kind in dict.fromkeys((one["model"], one["kind"]) for one in alone):
+        values = [one["value"] for one in alone if (one["model"], one["kind"]) == (model, kind)]
+        at = " and ".join(f"{value:.6g}" for value in sorted(values))
+        said.append(f"The {model} model has {f'a {kind}' if len(values) == 1 else f'{kind}s'} at {at}.")
     return " ".join(said)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.store.content import Group
 
 MODEL = "rigid"
+CLEAR = 16.0
+"""Between the centres of two marks, in units of the diagram: half as much again as they are wide, for fingers."""
 GAP = 3.0
 """Time between samples, in those of the walk itself: a gait is looked at, not measured."""
 
@@ -57,7 +59,7 @@ def gait_diagram(results: Results) -> Diagram | None:
         return None
     value = np.concatenate([branch["value"] for _, branch in branches])
     period = np.concatenate([branch["step_period"].ravel() for _, branch in branches])
-    over = str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
+    over = parameter(summary)
     across = scale_of(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = scale_of(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     return Diagram(
@@ -67,8 +69,23 @@ def gait_diagram(results: Results) -> Diagram | None:
         titles=(f"{over} ({summary['unit']})", "duration of a step (s)"),
         curves=tuple(curve for _, branch in branches for curve in curves(branch, across, up)),
         ticks=(across.ticks(), up.ticks()),
-        gaits=tuple(gaits(results, across, up)),
+        gaits=apart(list(gaits(results, across, up))),
     )
+
+
+def parameter(summary: Mapping[str, Any]) -> str:
+    """What the families are over; the slope is the slope in either unit."""
+    return str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
+
+
+def apart(marks: Sequence[Gait]) -> tuple[Gait, ...]:
+    """The marks of which none covers another, so that each can be pointed at; stable gaits go before others."""
+    kept: list[int] = []
+    for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
+        x, y = marks[place].x, marks[place].y
+        if all(math.hypot(marks[other].x - x, marks[other].y - y) >= CLEAR for other in kept):
+            kept.append(place)
+    return tuple(marks[place] for place in sorted(kept))
 
 
 def branches_of(results: Results) -> Iterator[tuple[str, Group]]:

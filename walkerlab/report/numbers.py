@@ -10,6 +10,8 @@ NONE = "–"
 SPACE = "\u00a0"
 """Between a number and what belongs to it: no line ends there."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LEAST_LENGTH_M = 1e-9
+"""Walkers are centimetres to metres tall, and walks are right to some 1e-10 of that: less is no length."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
 """Magnitudes that are written without a power of ten."""
 
@@ -47,10 +49,16 @@ def quantity(value: float | None, unit: str, digits: int = 5) -> str:
     return f"{number(value, digits)}{SPACE}{unit}" if unit not in ("", "1") else number(value, digits)
 
 
+def told_apart(value_m: float) -> float:
+    """A length, or zero where rounding and the solver's tolerance say as much (m)."""
+    return value_m if abs(value_m) >= LEAST_LENGTH_M else 0.0
+
+
 def length(value_m: float | None, digits: int = 4) -> str:
-    """A length in the unit in which it is easiest read: m, mm or µm."""
+    """A length in the unit in which it is easiest read: m, mm or µm; 0 m below what is told apart."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
+    value_m = told_apart(value_m)
     magnitude = abs(value_m)
     if magnitude >= 0.1 or magnitude == 0:
         return quantity(value_m, "m", digits)

@@ -17,6 +17,20 @@ MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
 
 LOOKED_FORWARD_TO = "walked"
 
+ENDS = {
+    "walked": "walks to the end",
+    "fell": "falls",
+    "off-pad": "trips on a pad",
+    "lifted-off": "leaves the ground",
+    "slid": "slides away",
+    "no-heel-strike": "takes no further step",
+    "bent-knee": "comes down on a bent knee",
+    "budget-exhausted": "uses up its right-hand sides",
+    "solver-failed": "defeats the solver",
+    "rejected": "is refused its start",
+}
+"""What a walker does in the end, by the outcome of its walk."""
+
 
 def finding(results: Results, stage: str) -> Finding | None:
     """How the walk of a stage ended; None if there is none."""
@@ -32,6 +46,18 @@ def finding(results: Results, stage: str) -> Finding | None:
         took = f"It took {taken} of {count(asked, 'step')}."
         sentences = [took, gait_sentence(summary), *why(results, stage, outcome)]
     return Finding(MODELS[stage], " ".join(text for text in sentences if text), outcome, tone(outcome))
+
+
+def ends(outcome: str) -> str:
+    """What a walker does in the end; an outcome that this version does not know keeps its name."""
+    return ENDS.get(outcome, f"ends as {outcome}")
+
+
+def walks(steps: int, outcome: str) -> str:
+    """How far a walker comes, as the rest of a sentence that it begins."""
+    if outcome == LOOKED_FORWARD_TO:
+        return f"walks all {count(steps, 'step')}"
+    return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
 
 
 def tone(outcome: str) -> Tone:

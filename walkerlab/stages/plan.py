@@ -31,6 +31,7 @@ class LeftOut:
 
 
 NO_CONTACT = "the config has no contact block"
+UP_TO_DATE = "up to date"
 STILL_COMPUTED = "still being computed"
 """Why a drawing made early has to do without a result."""
 
@@ -156,7 +157,7 @@ class Planner:
         verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
         reason = "--force" if force else self._why_run(stage, identity, verdict)
         if reason is None and verdict.artifact is not None:
-            kept = "up to date" if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
+            kept = UP_TO_DATE if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
             return Step(stage, "reuse", kept, identity, verdict.artifact)
         origin = None if force else self._elsewhere(stage, identity)
         if origin is not None:

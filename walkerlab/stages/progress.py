@@ -36,7 +36,7 @@ class Reporter(Protocol):
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
         """Begin a stage, perhaps beside others.
 
-        place       which of how many it is, and why it runs, in words
+        place       which of how many it is, and why it runs anew, in words; '' if it is the only one and new
         expected_s  how long it took the last time, if that is known
         """
 

@@ -294,8 +294,9 @@ class Run:
         task = task_of(stage, self.planner.config, inputs, self.folder, jobs=jobs, key=identity.key, left_out=absent)
         number = self.of - len(self.left) + 1 + len(self.running)
         of = max(self.of, number)
-        said = f"{number} of {of}, {step.reason}" if of > 1 else step.reason
-        reporter = self.reporter.begin(stage.name, said, seconds_taken(step.found))
+        place = [f"{number} of {of}"] if of > 1 else []
+        why = [step.reason] if step.reason != artifact.NOT_THERE else []
+        reporter = self.reporter.begin(stage.name, ", ".join(place + why), seconds_taken(step.found))
         return Begun(step, task, provenance.begin(self.planner.config, digests), reporter, time.perf_counter())
 
     def _settle(self, begun: Begun, content: Content, complete: bool) -> None:
@@ -315,7 +316,9 @@ class Run:
         done = Done(stage.name, "run", reason, time.perf_counter() - begun.started)
         self.done.append(done)
         self.left = [name for name in self.left if name != stage.name]
-        begun.reporter.end(said_of(done) + (f"; left: {', '.join(self.left)}" if self.left else ""))
+        answered = [] if result.complete else ["no answer"]
+        left = [f"left: {', '.join(self.left)}"] if self.left else []
+        begun.reporter.end("; ".join([said_of(done), *answered, *left]))
 
     def _draw_early(self, stages: Sequence[Stage]) -> None:
         """Draw what is to be looked at while the rest is still being computed."""
@@ -411,11 +414,12 @@ def unanswered(error: NoAnswer) -> Content:
 
 
 def said_of(done: Done) -> str:
-    """One line about what was done with a stage."""
+    """One line about what was done with a stage; why there is no answer is told once, in the end."""
+    why, _, _ = done.reason.partition(": ")
     match done.action:
         case "run":
-            return f"{done.stage}: ran in {done.wall_s:.2f} s ({done.reason})"
+            return f"{done.stage}: ran in {done.wall_s:.2f} s"
         case "reuse":
-            return f"{done.stage}: reused ({done.reason})"
+            return f"{done.stage}: reused ({why})"
         case _:
-            return f"{done.stage}: left out ({done.reason})"
+            return f"{done.stage}: left out ({why})"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from walkerlab.config.problems import nearest
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
@@ -95,8 +96,10 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     for path in (runs_dir / text, Path(text)):
         if path.is_dir():
             return RunFolder(path.parent, path.name)
-    there = ", ".join(sorted(path.name for path in runs_dir.glob("*/"))) or "none"
-    raise StaleError(f"there is no run {text} in {runs_dir}.", f"Runs there: {there}.")
+    there = sorted(path.name for path in runs_dir.glob("*/"))
+    near = nearest(Path(text).name, there)
+    meant = f" Did you mean {near}?" if near else f" There are {', '.join(there)}." if there else ""
+    raise StaleError(f"there is no run {text}.{meant}", "`walkerlab report` makes the run of the paper config.")
 
 
 @dataclass(frozen=True)

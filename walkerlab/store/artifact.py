@@ -17,6 +17,9 @@ from walkerlab.store.files import file_digest, read_bounded, refuse_full_disk, r
 from walkerlab.store.key import SCHEMA_VERSION, Identity
 from walkerlab.store.provenance import Provenance
 
+NOT_THERE = "not there yet"
+"""Why a result is made that never was."""
+
 LIMIT_BYTES = 1 << 30
 """No artifact is larger; a file that is, is not read."""
 
@@ -166,7 +169,7 @@ def check(path: Path, key: str) -> Verdict:
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
-        return Verdict(False, "not there yet")
+        return Verdict(False, NOT_THERE)
     except OtherLayout as error:
         return Verdict(False, str(error))
     except Damaged as error:

@@ -22,6 +22,7 @@ Layout = Literal["grid", "list"]
 POINT: Final = "point"
 MOST_POINTS: Final = 10_000_000
 FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
+EXAMPLE: Final = "For example: `walkerlab sweep --over slope_deg=0.5:5:10 --stage fixedpoint`"
 SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
 
 
@@ -129,7 +130,7 @@ def asked(
     repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
-        raise refusal([Problem(None, f"sweep: {text}", "--over KEY=VALUES, each key once")])
+        raise refusal([Problem(None, f"sweep: {text}", "--over KEY=VALUES, each key once")], EXAMPLE)
     if sample:
         return Question(stage, sampled(axes, sample, seed), "list")
     for one in axes:

@@ -8,8 +8,8 @@ from typing import Any
 
 from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.report.blocks import COSTS, Block, Cell, Column, Paragraph, Section, Table, table
-from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import tone
+from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
+from walkerlab.report.outcomes import tone, walks
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 
@@ -78,9 +78,10 @@ def needed(summary: Summary) -> str:
     if found["needed"]:
         released = summary["procedure"]["released"]
         return (
-            f"This contact needs an adjustment: from the rigid start the walk ends as {released['outcome']} after "
-            f"{count(released['steps'], 'step')}. The smallest change that walks {found['walked_steps']} steps scales "
-            f"the velocities of {swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "
+            "This contact needs an adjustment: from the rigid start it "
+            f"{walks(released['steps'], released['outcome'])}. "
+            f"The smallest change that walks {found['walked_steps']} steps scales the velocities of "
+            f"{swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "
             f"{number(found['scale_dtheta2'], 4)}."
         )
     down, up = (number(abs(found["margins"][f"dtheta_2 {way}"]["percent"]), 3) for way in ("down", "up"))

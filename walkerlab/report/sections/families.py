@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from walkerlab.figures.first_doubling import first_doubling
 from walkerlab.labels import with_unit
 from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
-from walkerlab.report.gait_diagram import gait_diagram
-from walkerlab.report.numbers import count, number, quantity
+from walkerlab.report.gait_diagram import gait_diagram, parameter
+from walkerlab.report.numbers import count, listed, number, quantity
+from walkerlab.report.outcomes import ends
 from walkerlab.report.results import Results
 
 MODELS = ("rigid", "contact")
@@ -26,7 +28,7 @@ def section(results: Results) -> Section | None:
         blocks.append(diagram)
     if summary["bifurcations"]:
         blocks.append(bifurcations(summary))
-    return Section("families", f"Families of gaits over {summary['over']}", tuple(blocks), first)
+    return Section("families", f"Families of gaits over {parameter(summary)}", tuple(blocks), first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -42,15 +44,16 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
                 f"The {model} model's gait of one step is stable from {quantity(widest[0], unit, 4)} to "
                 f"{quantity(widest[1], unit, 6)}."
             )
-    shift = first_flip(summary, "contact"), first_flip(summary, "rigid")
+    shift = first_doubling(summary, "contact"), first_doubling(summary, "rigid")
     if shift[0] is not None and shift[1] is not None:
         said.append(
             f"Compliance and creep of the ground move its first flip by {quantity(shift[0] - shift[1], unit, 3)}."
         )
     said += [
-        f"From {count(cascade['period'], 'step')} on the {cascade['model']} model's period doubles "
-        f"{len(cascade['flips'])} times, with ratios of {', '.join(number(r, 4) for r in cascade['ratios'])} "
-        f"(Feigenbaum: 4.669); doublings accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
+        f"Beginning with {count(cascade['period'], 'step')} at {quantity(cascade['flips'][0], unit, 6)}, the "
+        f"{cascade['model']} model's period doubles {len(cascade['flips'])} times, the distances between doublings "
+        f"shrinking by {listed(number(ratio, 4) for ratio in cascade['ratios'])} (Feigenbaum: 4.669); doublings "
+        f"accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
         for cascade in summary["cascades"]
         if "accumulates_at" in cascade
     ]
@@ -59,7 +62,8 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
             said.append(f"Walks first settle on nothing periodic at {quantity(one['aperiodic_from'], unit, 4)}.")
         if one["lost_at"] is not None:
             said.append(
-                f"At {quantity(one['lost_at'], unit, 4)} the {one['model']} model leaves its attractor: {one['ended']}."
+                f"At {quantity(one['lost_at'], unit, 4)} the {one['model']} model leaves its attractor and "
+                f"{ends(one['ended'])}."
             )
     wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
     if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
@@ -68,16 +72,6 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
             f"(standard error {number(wild['uncertainty'], 1)}), at {quantity(wild['value'], unit, 4)}."
         )
     return said
-
-
-def first_flip(summary: Mapping[str, Any], model: str) -> float | None:
-    """Where a model's gait of one step first doubles its period."""
-    found = [
-        one["value"]
-        for one in summary["bifurcations"]
-        if (one["model"], one["kind"], one["period"]) == (model, "flip", 1)
-    ]
-    return min(found, default=None)
 
 
 def bifurcations(summary: Mapping[str, Any]) -> Block:
@@ -90,7 +84,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Block:
         Column("kind"),
         Column("model"),
         Column("steps of the gait", numeric=True),
-        Column(with_unit(summary["over"], summary["unit"]), numeric=True),
+        Column(with_unit(parameter(summary), summary["unit"]), numeric=True),
         Column("critical multiplier", numeric=True),
     ]
     return table("Bifurcations, as zeros of their test functions", columns, rows)

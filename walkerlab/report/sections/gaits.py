@@ -71,14 +71,18 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
     rows.append(["stable", *("yes" if gait["stable"] else "no" for gait in sets.values())])
     rows.append(["energy from the stance foot (J)", *(fixed(gait["energy_J"], 3) for gait in sets.values())])
     rows.append(["residual of the step map", *(power_of_ten(gait["residual"], 2) for gait in sets.values())])
+    columns = [Column("quantity"), *(Column(head, numeric=True) for head in heads_of(list(sets)))]
     if len(sets) < 2:
-        columns = [Column("quantity"), *(Column(SETS[name], numeric=True) for name in sets)]
         return table("Fixed point of the step map and its multipliers", columns, rows)
-    columns = [Column("quantity"), *(Column(SETS[name], numeric=True) for name in sets)]
     note = "As printed: Appendix A with its misprint in eq. A.5, as the paper's own code; corrected: without it."
     return table(
         "Fixed point of the step map and its multipliers, under both sets of equations", columns, rows, note=note
     )
+
+
+def heads_of(sets: Sequence[str]) -> list[str]:
+    """The heads of columns of gaits: what is right needs no name while nothing misprinted stands beside it."""
+    return ["value"] if sets == ["corrected"] else [SETS[name] for name in sets]
 
 
 def coordinate(name: str) -> str:

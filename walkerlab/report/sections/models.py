@@ -7,6 +7,7 @@ from typing import Any
 
 from walkerlab.report.blocks import Block, Column, Section, Table, table
 from walkerlab.report.numbers import NONE, length, listed, number, quantity
+from walkerlab.report.outcomes import ends, walks
 from walkerlab.report.results import Results
 
 MEASURES = {
@@ -164,7 +165,7 @@ def release_in_words(name: str, walk: Mapping[str, Any], gait_period: float) -> 
     end = end_of(walk, gait_period)
     if end == "ended":
         return (
-            f"{released} the walker takes {walk['steps']} of {walk['of']} steps, {last}, and ends as {walk['outcome']}."
+            f"{released} the walker takes {walk['steps']} of {walk['of']} steps, {last}, and {ends(walk['outcome'])}."
         )
     came = "keeps to the rigid gait" if end == "this gait" else "goes over to another gait"
     return f"{released} the walker {came}: {walk['steps']} steps, {last}{as_rigid(walk)}."
@@ -176,7 +177,7 @@ def as_rigid(walk: Mapping[str, Any]) -> str:
     if not rigid:
         return ""
     if rigid["outcome"] != "walked":
-        return f"; the rigid model by that rule ends as {rigid['outcome']} after {rigid['steps']} steps"
+        return f"; the rigid model by that rule {walks(rigid['steps'], rigid['outcome'])}"
     return f"; the rigid model by that rule walks steps of {quantity(rigid['period_s'], 's')}"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.report.blocks import Block, Pad, Player, Section, Walker
-from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
+from walkerlab.report.outcomes import CONTACT, LOOKED_FORWARD_TO, MODELS, RIGID, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
 
@@ -71,7 +71,7 @@ def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
     summary = results.stored[stage].summary
     thin = track.thinned(gap)
     strikes = [float(time) for time in np.cumsum(summary["step_periods_s"]) if time <= track.end + 1e-9]
-    ended = "" if summary["outcome"] == "walked" else f"ends as {summary['outcome']}"
+    ended = "" if summary["outcome"] == LOOKED_FORWARD_TO else ends(summary["outcome"])
     return Walker(
         name=MODELS[stage],
         style=STYLES[stage],

@@ -35,7 +35,7 @@ def results_table(results: Results) -> Table:
     """When and by what each result was made."""
     columns = [
         Column("result"),
-        Column("begun (UTC)"),
+        Column("begun (UTC)", numeric=True),
         Column("took (s)", numeric=True),
         Column("seed", numeric=True),
         Column("complete"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from walkerlab.report.blocks import Column, Section, table
-from walkerlab.report.numbers import NONE, fixed, span
+from walkerlab.report.numbers import NONE, fixed, listed, span
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
 from walkerlab.report.results import Results
 
@@ -54,7 +54,8 @@ def section(results: Results) -> Section | None:
 def finding(results: Results) -> str:
     """How long the steps of each model take."""
     periods = {stage: (results.summary(stage) or {}).get("step_periods_s") for stage in (RIGID, CONTACT)}
-    return "; ".join(f"{MODELS[stage]}: steps of {span(found, 's')}" for stage, found in periods.items() if found) + "."
+    told = [f"{span(found, 's')} in the {MODELS[stage].lower()}" for stage, found in periods.items() if found]
+    return f"Steps take {listed(told)}."
 
 
 def values_of(summary: Mapping[str, Any], key: str) -> Sequence[float]:

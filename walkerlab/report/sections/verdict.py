@@ -89,7 +89,8 @@ def of_the_paper(results: Results, rows: Rows) -> list[Block]:
     if gravest:
         blocks += [
             Paragraph(
-                "What is behind it; printed, right and measured stand side by side on the page of the paper’s numbers."
+                "The reasons; printed, corrected and measured values stand side by side on the page of the paper’s "
+                "numbers."
             ),
             Findings(gravest, "columns"),
         ]

@@ -2,8 +2,9 @@ const TAU = 2 * Math.PI;
 const UNITS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
 const minus = (text) => text.replace("-", "−");
 const digits = (value, count = 4) => (value === undefined ? "–" : minus(Math.abs(value) < 1e-12 ? "0" : Number(value.toPrecision(count)).toString()));
+// What is below a nanometre is rounding.
 const metres = (value, count = 3) => {
-  const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? UNITS[value === 0 ? 0 : 3];
+  const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? [Infinity, "m"];
   return `${digits(value / scale, count)} ${unit}`;
 };
 const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
@@ -123,7 +124,8 @@ function drawWalk(picture, scene, tracks, colours) {
   c.textAlign = "center";
   for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
     const [x, y] = place(i * tick, under - 0.1 * scene.leg_m);
-    c.fillText(`${digits(i * tick)} m`, x, y);
+    const [said, room] = [`${digits(i * tick)} m`, 0.5 * c.measureText(`${digits(i * tick)} m`).width];
+    if (x > room && x < width - room) c.fillText(said, x, y);
   }
   picture.points = [];
   tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
