@@ -341,8 +341,9 @@ def walk(walker, y, steps, h, hinged):
         if event == PASSING:
             side[PASSING] = -side[PASSING]
             for foot in range(2):
-                # equal legs of a hinged step pass each other on the ground: rounding lifts no foot
-                above = foot_at(walker, foot, y)[1] > ROUNDING
+                _, height, _, climb, _ = foot_at(walker, foot, y)
+                # equal legs of a hinged step pass each other on the ground: rounding neither lifts a foot nor holds one
+                above = height > ROUNDING or (height > -ROUNDING and climb > 0.0)
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
                     carried[foot] = (side[PASSING] > 0.0) == (foot == 1)
             continue

@@ -24,3 +24,10 @@ def test_a_drawn_walk_ends_as_the_plain_integration_says(campaign, seed):
     assert one.outcome == one.expected
     # what halving the plain step still changes bounds what can be asked for
     assert one.apart_s < max(campaign.APART_S, 2.0 * one.own_s)
+
+
+def test_a_flight_ends_the_walk_a_quarter_of_a_pendulum_time_after_the_foot_left(campaign):
+    # the foot leaves where the force law nearly lets go, which the implicit method's dense output takes for a crossing
+    one = campaign.compare(5, steps=2, step_s=2e-5)
+    assert one.outcome == one.expected == "lifted-off"
+    assert one.apart_s < 1e-8

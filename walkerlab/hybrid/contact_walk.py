@@ -8,19 +8,9 @@ from typing import Any
 from walkerlab.ground.held import held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned
-from walkerlab.ground.terrain import (
-    order_matters,
-)
+from walkerlab.ground.terrain import order_matters
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import (
-    HEIGHT,
-    PASSING,
-    PER_FOOT,
-    Frame,
-    feels_ground,
-    is_join,
-    walker_state,
-)
+from walkerlab.hybrid.contact_events import PASSING, Frame, is_join, walker_state
 from walkerlab.hybrid.contact_knee import cross_knee
 from walkerlab.hybrid.contact_observer import ContactObserver, observe
 from walkerlab.hybrid.contact_rules import (
@@ -31,6 +21,7 @@ from walkerlab.hybrid.contact_rules import (
     STEPS,
     Ledger,
     happen,
+    is_above,
     note_flexion,
 )
 from walkerlab.hybrid.contact_scan import Feet, Scene, scan
@@ -56,6 +47,7 @@ LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
 EVENT_TIME = 1e-12  # s, how exactly an event is located
 REFINEMENTS = 4
 REWINDS = 24  # of one step; where rounding moves an event with each try, the step's end is the event
+DOUBTS = 12  # of these; after them a step at whose end an event is not borne out is one without it
 
 WALKED, LIFTED_OFF, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.LIFTED_OFF), int(Outcome.NO_HEEL_STRIKE)
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
@@ -158,7 +150,7 @@ def walk_part(
         elif arriving and method.clock[T] >= target:
             wait = time_to_zero(method, finder, signal)
             happens = abs(wait) <= EVENT_TIME
-            again = refinements <= REFINEMENTS and rewinds < REWINDS
+            again = refinements <= REFINEMENTS and rewinds < DOUBTS
             if not happens and again and method.clock[T_OLD] < target + wait <= latest:
                 target += wait
                 refinements += 1
@@ -168,7 +160,7 @@ def walk_part(
         rewinds = 0
         observe(observer, method, mode, walker, finder, ledger.carried, ledger.knee, ledger.feet[STANCE])
         note_flexion(walker.knees, ledger, walker_state(mode, end_state(method, mode)))
-        outcome = judge(mode, scene, method, finder, ledger)
+        outcome = judge(mode, scene, method, ledger)
         if outcome != GOES_ON:
             return outcome
         if method.clock[T] - method.clock[T_OLD] > 2.0 * EVENT_TIME:
@@ -215,17 +207,15 @@ def time_to_zero(method: Any, finder: CrossingFinder, signal: int) -> float:
 
 
 @inlined
-def judge(mode: Any, scene: Scene, method: Any, finder: CrossingFinder, ledger: Ledger) -> int:
-    """End the walk if it has flown or taken too long; note when a foot was last on the ground.
+def judge(mode: Any, scene: Scene, method: Any, ledger: Ledger) -> int:
+    """End the walk if it has flown or taken too long; note until when a foot was on the ground.
 
-    The signals of the last step are sampled; their last node is its end.
+    A foot that leaves the ground does so at the end of a step, and the ledger does not know yet.
     """
-    t, end = method.clock[T], finder.nodes.size - 1
-    pendulum_time = scene.frame.pendulum_time
+    t, pendulum_time = method.clock[T], scene.frame.pendulum_time
     grounded = is_hinged(mode)
     for foot in range(2):
-        height = finder.values[foot * PER_FOOT + HEIGHT, end]
-        grounded = grounded or feels_ground(mode, ledger.carried[foot] != 0, height)
+        grounded = grounded or (ledger.carried[foot] != 0 and not is_above(ledger, foot))
     if grounded:
         ledger.times[AIRBORNE_SINCE] = t
     if t >= ledger.times[LAST_TOUCH] + LONGEST_STEP * pendulum_time:
