@@ -7,6 +7,7 @@ its result is made of them. What a key means, its unit and its bounds stand in c
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from walkerlab.config import schema
 
 
+@cache
 def keys_of(takes: type) -> dict[str, type | None]:
     """The keys that a type names, those of its bases first; for a block of which it takes a part, the type of that."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
