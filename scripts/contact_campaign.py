@@ -1,12 +1,12 @@
 """Random walks on compliant ground against a plain integration written for the tests: the same ends at the same times.
 
-    python scripts/contact_campaign.py                 # 100 walks, half an hour
+    python scripts/contact_campaign.py                 # 100 walks, a quarter of an hour
     python scripts/contact_campaign.py --walks 6 --seed 3
 
-Terrain, first stance, friction, foot radius, exponent, stiffness, damping, slope, pitch and start are drawn; falls and
-trips are among the walks. The plain integration (tests/hybrid/plain_walk.py) walks twice, with one step and with half
-of it: a walk on which these two differ by more than they may is left out and counted. Prints a table in Markdown;
-exits 1 if a walk ends otherwise or a touch lies further off than 1e-6 s.
+Terrain, first stance, friction, foot radius, exponent, stiffness, damping, slope, pitch and start are drawn; falls,
+trips and flights are among the walks. The plain integration (tests/hybrid/plain_walk.py) walks twice, with one step and
+with half of it: a walk on which these two differ by more than they may is left out and counted. Prints a table in
+Markdown; exits 1 if a walk ends otherwise or a touch lies further off than 1e-6 s.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ WALK = {
 
 
 def row(lines, head):
-    """What stands in the row of a table, its head left away."""
+    """What stands in the row of a table, without its head."""
     (found,) = (line for line in lines if line.startswith(f"{head}  "))
     return found.removeprefix(head).split()
 
@@ -90,6 +90,8 @@ def test_a_fall_is_told_with_its_advice():
 def test_every_end_of_a_walk_has_words(outcome):
     said = answer("simulate", WALK | {"outcome": outcome, "advice": "Try again."})[0]
     assert outcome not in said.split("; ")[0].split()
+    at_once = {"outcome": outcome, "steps": 0, "step_periods_s": [], "step_lengths_m": [], "advice": "Try again."}
+    assert "further" not in answer("simulate", WALK | at_once)[0]
 
 
 def test_channels_that_took_no_energy_are_left_out():

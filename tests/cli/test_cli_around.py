@@ -39,7 +39,7 @@ def test_init_knows_the_types_of_walkers(walker):
 )
 def test_init_writes_a_type_or_a_built_in_config_under_its_name(walker, walker_type, config):
     assert walker("init", "--type", walker_type).returncode == 0
-    written = load(walker.folder / f"{walker_type}.yaml").config
+    written = load(walker.folder / f"my-{walker_type}.yaml").config
     assert written.model_copy(update={"name": config}) == load(Path(config)).config
 
 
@@ -123,7 +123,7 @@ def test_a_key_of_one_kind_of_walker_is_found_by_the_name_that_a_config_has(walk
 def test_a_config_that_is_not_there_is_begun_with_init(walker):
     done = walker("fixedpoint", "-c", "mine.yaml")
     assert done.returncode == 3
-    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init FILE` writes a config to begin with"
+    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to begin with"
 
 
 def test_a_film_needs_no_name(walker):

@@ -23,7 +23,7 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     assert [cell.text for cell in table.bodies[0].rows[0]][:4] == ["flip", "rigid", "1", "4"]
 
 
-def test_the_diagram_has_a_mark_for_every_gait_whose_motion_is_stored():
+def test_the_diagram_marks_gaits_whose_motion_is_stored():
     walk = with_motion(simulate())
     made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))
     first, second = made.gaits

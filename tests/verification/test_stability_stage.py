@@ -156,7 +156,7 @@ def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
 
 def test_a_file_of_cases_that_is_not_there_is_not_taken_for_a_config(tmp_path):
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
-    with pytest.raises(ConfigError, match=r"own.yaml:2:20: there is no file .*; allowed: a file that holds a list"):
+    with pytest.raises(ConfigError, match=r"own.yaml:2:20: there is no file .*Allowed: a file that holds a list"):
         load(tmp_path / "own.yaml")
 
 

@@ -24,7 +24,7 @@ Summary = Mapping[str, Any]
 Answer = Callable[[Summary], list[str]]
 
 COLUMNS = 100
-"""A paragraph is as wide."""
+"""Width of a paragraph, in characters."""
 SHOWN = 6
 """So many of a long row of numbers are shown."""
 
@@ -116,7 +116,9 @@ def walk(model: str, summary: Summary) -> list[str]:
 def walk_measures(summary: Summary) -> list[tuple[str, str]]:
     """What was measured over a walk as a whole."""
     dissipated = summary.get("dissipated_J") or {}
-    lost = listed(f"{quantity(value, 'J', 3)} {CHANNELS[name]}" for name, value in dissipated.items() if value)
+    lost = listed(
+        f"{quantity(value, 'J', 3)} {CHANNELS.get(name, name)}" for name, value in dissipated.items() if value
+    )
     return [
         ("mean energy", told(summary, "mean_energy_J", 7)),
         ("energy drift", told(summary, "energy_drift_J", 2)),
@@ -196,10 +198,10 @@ def models_compared(summary: Summary) -> list[str]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
     steps, outcomes = summary["steps"], summary["outcomes"]
     rows = [["last step", "period (s)", "length (m)", "outcome"]]
-    walks = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
+    last_steps = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
     releases = summary.get("releases", {}).items()
-    walks += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
-    rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in walks]
+    last_steps += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
+    rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in last_steps]
     rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
     head = f"The rigid model {rigid}, " + (
         "and so does the contact model" if contact == rigid else f"the contact model {contact}"

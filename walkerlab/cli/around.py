@@ -23,7 +23,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def init(
         file: Annotated[
             Path | None,
-            typer.Argument(metavar="[FILE]", help="The config to be written; it must not exist. Default: TYPE.yaml."),
+            typer.Argument(
+                metavar="[FILE]", help="The config to be written; it must not exist. Default: my-TYPE.yaml."
+            ),
         ] = None,
         walker: Annotated[
             str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
@@ -34,7 +36,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("init", as_json=False):
             from walkerlab.cli.begin import write_config
 
-            said = write_config(file or Path(f"{walker}.yaml"), walker)
+            said = write_config(file or Path(f"my-{walker}.yaml"), walker)
             if not quiet:
                 print(said)
 

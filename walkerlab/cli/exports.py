@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import re
@@ -87,23 +88,27 @@ def figure_in(folder: Path, name: str) -> Illustration:
 
 
 def figure(folder: Path, illustration: Illustration, kind: str, columns: int) -> bytes:
-    """A figure, drawn anew for one or two columns of a journal; StaleError if the run has not what it needs."""
+    """A figure, drawn anew for one or two columns of a journal; StaleError if the run lacks what it needs."""
     stored = results_in(folder)
     why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [f"`walkerlab {command_of(stage)} -c {folder}`" for stage in illustration.stages if stage not in stored]
-        advice = f"{listed(made)} makes what it needs." if made else ""
+        advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     return illustration.as_file(stored, kind, columns)
 
 
 def results_in(folder: Path) -> dict[str, Stored]:
-    """The results of a run, by stage."""
-    return {path.stem: read(path) for path in sorted(folder.glob("*.h5"))}
+    """The results of a run that can be read, by stage."""
+    found = {}
+    for path in sorted(folder.glob("*.h5")):
+        with contextlib.suppress(Damaged):
+            found[path.stem] = read(path)
+    return found
 
 
 def exportable(stored: Mapping[str, Stored]) -> list[str]:
-    """What there is beside figures: tables of the paper's numbers, and a trajectory."""
+    """What there is besides figures: tables of the paper's numbers, and a trajectory."""
     compared = stored["compare"].summary if "compare" in stored else {}
     tables = [name for name, key in TABLES.items() if key in compared]
     return tables + [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
@@ -124,7 +129,9 @@ def rows_of(folder: Path, name: str) -> Any:
     """The rows of a table; ConfigError if the walker is another than the paper's."""
     summary = result(folder, "compare").summary
     if TABLES[name] not in summary:
-        raise ConfigError(f"{folder} has no {name}: it compares with the paper's walker, and this is another.")
+        raise ConfigError(
+            f"{folder} has no {name}: it compares with the paper's walker, and this run's walker is another."
+        )
     return summary[TABLES[name]]
 
 

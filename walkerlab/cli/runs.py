@@ -118,8 +118,8 @@ def rows_of_runs(found: list[RunSummary]) -> list[list[str]]:
 
 def row_of(run: RunSummary) -> list[str]:
     """One run as a row."""
-    known = "unknown config" if run.stages else "0"
-    current = known if run.current is None else str(len([s for s in run.stages if s in run.current]))
+    unknown = "unknown config" if run.stages else "0"
+    current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
     return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed]
 
 

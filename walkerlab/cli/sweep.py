@@ -231,7 +231,7 @@ def printed(swept: Swept, page: Path) -> list[str]:
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
-        f"  {swept.reused} of them were there already",
+        *([f"  {swept.reused} of them were there already"] if swept.reused else []),
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import Problem, nearest, refusal, shown
+from walkerlab.config.problems import KEYS_ARE_LISTED, Problem, nearest, refusal, shown
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
@@ -146,7 +146,8 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
         problem = Problem(asked, f"there is no {kind} {file.label}", wanted or _what_there_is(), _near(file))
-        raise refusal([problem], "`walkerlab init FILE` writes a config to begin with") from None
+        advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
+        raise refusal([problem], advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise refusal([Problem(asked, f"{kind} {file.label} cannot be read: {reason.lower()}")]) from None

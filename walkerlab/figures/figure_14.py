@@ -71,7 +71,8 @@ def caption(results: Results) -> str:
     alone = [one for one in summary["bifurcations"] if one["period"] == 1]
     for model, kind in dict.fromkeys((one["model"], one["kind"]) for one in alone):
         values = [one["value"] for one in alone if (one["model"], one["kind"]) == (model, kind)]
-        at = " and ".join(f"{value:.6g}" for value in sorted(values))
+        *others, last = [f"{value:.6g}" for value in sorted(values)]
+        at = f"{', '.join(others)} and {last}" if others else last
         said.append(f"The {model} model has {f'a {kind}' if len(values) == 1 else f'{kind}s'} at {at}.")
     return " ".join(said)
 

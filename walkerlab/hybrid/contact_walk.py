@@ -47,7 +47,7 @@ LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
 EVENT_TIME = 1e-12  # s, how exactly an event is located
 REFINEMENTS = 4
 REWINDS = 24  # of one step; where rounding moves an event with each try, the step's end is the event
-DOUBTS = 12  # of these; after them a step at whose end an event is not borne out is one without it
+DOUBTS = 12  # rewinds of one step after which an event that its end does not bear out does not count
 
 WALKED, LIFTED_OFF, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.LIFTED_OFF), int(Outcome.NO_HEEL_STRIKE)
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
@@ -210,7 +210,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, signal: int) -> float:
 def judge(mode: Any, scene: Scene, method: Any, ledger: Ledger) -> int:
     """End the walk if it has flown or taken too long; note until when a foot was on the ground.
 
-    A foot that leaves the ground does so at the end of a step, and the ledger does not know yet.
+    The event at the step's end has not changed the ledger yet: a foot that leaves there was on the ground until then.
     """
     t, pendulum_time = method.clock[T], scene.frame.pendulum_time
     grounded = is_hinged(mode)

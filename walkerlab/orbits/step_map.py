@@ -84,7 +84,7 @@ class Shooting(NamedTuple):
     knee_time: Any  # (1,) s
     start: Any  # (d,) one of many
     move: Any  # (d,) Newton's
-    best: Any  # (d,) the best state that Newton's method has met
+    best: Any  # (d,) the best state met
     best_DP: Any  # (d, d) the derivative there
 
 
@@ -169,6 +169,8 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
 @kernel
 def newton_from_each(shooting: Shooting, starts: Any, tolerance: float, approaching: bool, found: Any) -> None:
     """`solved_from` many starts, or `approach` from them.
+
+    One kernel for both: each holds the walk with its variational equations, which takes seconds to compile.
 
     starts       (starts, d); overwritten with the best states found
     approaching  whether to come near a solution is enough
@@ -274,7 +276,8 @@ def approach(shooting: Shooting, z: Any, tolerance: float) -> float:
         evaluations += 1
         if residual < best_residual:
             stale, exact, best_residual = scale < 1.0, False, residual
-            update(shooting, z, move)
+            if not stale:
+                update(shooting, z, move)
         else:
             for i in range(z.size):
                 z[i] = best[i]

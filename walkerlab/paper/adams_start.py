@@ -62,7 +62,7 @@ class PaperStart:
         if self.airborne_from is not None:
             parts.append(f"so both feet are off the ground from {self.airborne_from:.3g} s on")
         steps = int(self.walk.touch_time_s.size)
-        taken = f"after {steps} steps" if steps else "before its first step is done"
+        taken = f"after {steps} step{'' if steps == 1 else 's'}" if steps else "before its first step is done"
         fate = f"the walk ends at {self.walk.end_time_s:.3g} s, {taken} ({self.walk.outcome.label})"
         return "; ".join((*parts, fate))
 

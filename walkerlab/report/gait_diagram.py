@@ -52,7 +52,7 @@ def scale_of(values: NDArray[np.float64], start: float, end: float) -> Scale:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Step periods over the parameter, with the gaits whose motion was stored; None if there are none."""
+    """Step periods over the parameter, with the gaits whose stored motion can be pointed at; None if there are none."""
     summary = results.summary("continuation") or {}
     branches = list(branches_of(results))
     if not any(results.group("continuation", f"{path}/motion_0") for path, _ in branches):

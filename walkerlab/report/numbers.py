@@ -50,12 +50,12 @@ def quantity(value: float | None, unit: str, digits: int = 5) -> str:
 
 
 def told_apart(value_m: float) -> float:
-    """A length, or zero where rounding and the solver's tolerance say as much (m)."""
+    """A length (m); zero if it is below rounding and the solver's tolerance."""
     return value_m if abs(value_m) >= LEAST_LENGTH_M else 0.0
 
 
 def length(value_m: float | None, digits: int = 4) -> str:
-    """A length in the unit in which it is easiest read: m, mm or µm; 0 m below what is told apart."""
+    """A length in the unit in which it is easiest read: m, mm or µm; 0 m below `LEAST_LENGTH_M`."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
     value_m = told_apart(value_m)

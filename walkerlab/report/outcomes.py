@@ -23,9 +23,9 @@ ENDS = {
     "off-pad": "trips on a pad",
     "lifted-off": "leaves the ground",
     "slid": "slides away",
-    "no-heel-strike": "takes no further step",
+    "no-heel-strike": "comes to no heel strike",
     "bent-knee": "comes down on a bent knee",
-    "budget-exhausted": "uses up its right-hand sides",
+    "budget-exhausted": "runs out of right-hand sides",
     "solver-failed": "defeats the solver",
     "rejected": "is refused its start",
 }

@@ -415,7 +415,7 @@ def unanswered(error: NoAnswer) -> Content:
 
 def said_of(done: Done) -> str:
     """One line about what was done with a stage; why there is no answer is told once, in the end."""
-    why, _, _ = done.reason.partition(": ")
+    why = "no answer" if done.reason.startswith("no answer: ") else done.reason.partition(": no answer: ")[0]
     match done.action:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s"

@@ -63,11 +63,11 @@ class VariablesOnDisk(Mapping[str, Variable]):
     """Variables of a group in a file, by name."""
 
     def __init__(self, file: Path, path: str) -> None:
-        """Read the names."""
+        """Read the names, and where in the file each is."""
         self.file, self.path = file, path
         with h5py.File(file) as opened:
             members = dict(opened[path])
-            self._members = names_of(members)
+            self._by_address = names_of(members)
             self._names = [
                 name for name, one in members.items() if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
             ]
@@ -88,7 +88,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
     def _read_anew(self, name: str) -> Variable:
         with h5py.File(self.file) as opened:
             dataset = opened[self.path][name]
-            return read_variable(name, dataset, self._members, Budget(self.file.stat().st_size))
+            return read_variable(name, dataset, self._by_address, Budget(self.file.stat().st_size))
 
 
 def write_group(target: Any, group: Group) -> None:

@@ -29,7 +29,7 @@ from walkerlab.hybrid.outcome import Outcome
 Floats = NDArray[np.float64]
 ROUNDING = 1e-9
 MANY = 10_000_000  # steps
-AT_REST = 5  # times as long steps do where only the end counts, at which nothing moves any more
+STEADY = 5  # so many times longer steps serve where only a steady end counts
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,7 @@ class Bench:
 
     def at_rest(self) -> float:
         """Penetration (m) of a ball that was dropped from the surface."""
-        return -float(self.after(self.settling_s, AT_REST * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(self.after(self.settling_s, STEADY * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
         """Of the oscillator that fits the ball's motion about its rest (least squares of accelerations)."""
@@ -305,7 +305,7 @@ class Bench:
 
     def creep(self, depth: float) -> float:
         """Velocity (m/s) at which a block that stands on an incline creeps down."""
-        target, h = self.task.target, AT_REST * self.task.step_s
+        target, h = self.task.target, STEADY * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
 
 

@@ -78,7 +78,7 @@ def needed(summary: Summary) -> str:
     if found["needed"]:
         released = summary["procedure"]["released"]
         return (
-            "This contact needs an adjustment: from the rigid start it "
+            "This contact needs an adjustment: from the rigid start the walker "
             f"{walks(released['steps'], released['outcome'])}. "
             f"The smallest change that walks {found['walked_steps']} steps scales the velocities of "
             f"{swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "

@@ -50,10 +50,10 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
             f"Compliance and creep of the ground move its first flip by {quantity(shift[0] - shift[1], unit, 3)}."
         )
     said += [
-        f"Beginning with {count(cascade['period'], 'step')} at {quantity(cascade['flips'][0], unit, 6)}, the "
+        f"From the gait of {count(cascade['period'], 'step')} at {quantity(cascade['flips'][0], unit, 6)} on, the "
         f"{cascade['model']} model's period doubles {len(cascade['flips'])} times, the distances between doublings "
-        f"shrinking by {listed(number(ratio, 4) for ratio in cascade['ratios'])} (Feigenbaum: 4.669); doublings "
-        f"accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
+        f"shrinking by factors of {listed(number(ratio, 4) for ratio in cascade['ratios'])} (Feigenbaum: 4.669); "
+        f"doublings accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
         for cascade in summary["cascades"]
         if "accumulates_at" in cascade
     ]

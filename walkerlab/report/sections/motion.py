@@ -58,12 +58,12 @@ def player(results: Results, tracks: dict[str, Track]) -> Block:
 
 def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
-    ends = []
+    times = []
     for stage in MODELS:
         periods = (results.summary(stage) or {}).get("step_periods_s", [])
         if len(periods) >= MOST_STEPS:
-            ends.append(sum(periods[:MOST_STEPS]))
-    return max(ends) if ends else math.inf
+            times.append(sum(periods[:MOST_STEPS]))
+    return max(times) if times else math.inf
 
 
 def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:

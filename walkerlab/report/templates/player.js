@@ -124,7 +124,8 @@ function drawWalk(picture, scene, tracks, colours) {
   c.textAlign = "center";
   for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
     const [x, y] = place(i * tick, under - 0.1 * scene.leg_m);
-    const [said, room] = [`${digits(i * tick)} m`, 0.5 * c.measureText(`${digits(i * tick)} m`).width];
+    const said = `${digits(i * tick)} m`;
+    const room = 0.5 * c.measureText(said).width;
     if (x > room && x < width - room) c.fillText(said, x, y);
   }
   picture.points = [];
