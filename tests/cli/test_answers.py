@@ -119,7 +119,7 @@ def test_families_are_told_in_sentences_with_their_bifurcations():
     flip = {"kind": "flip", "model": "rigid", "period": 1, "value": 4.0, "multiplier": [-1.0, 0.0]}
     found = {"branches": [branch, branch], "bifurcations": [flip], "cascades": [], "attractors": [], "lyapunov": []}
     lines = answer("continuation", found | {"over": "slope_deg", "unit": "deg"})
-    assert lines[0] == "2 branches of gaits over slope_deg."
+    assert lines[0] == "2 branches of gaits over slope."
     assert lines[1].replace("\u00a0", " ") == "The rigid model's gait of one step is stable from 1 deg to 4 deg."
     assert lines[-1].split() == ["flip", "rigid", "1", "4", "−1.0000"]
 

@@ -32,7 +32,7 @@ SHOWN = 6
 def answer(stage: str, summary: Summary) -> list[str]:
     """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short.
 
-    None for a stage that came to nothing: that is told as an error.
+    No lines for a stage that came to nothing: that is told as an error.
     """
     if not summary:
         return []
@@ -243,9 +243,9 @@ def stability(summary: Summary) -> list[str]:
 
 def continuation(summary: Summary) -> list[str]:
     """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
-    found = [f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {summary['over']}."]
-    over = with_unit(parameter(summary), summary["unit"])
-    rows = [["bifurcation", "model", "steps", over, "multiplier"]]
+    over = parameter(summary)
+    found = [f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {over}."]
+    rows = [["bifurcation", "model", "steps", with_unit(over, summary["unit"]), "multiplier"]]
     rows += [
         [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), complex_number(*one["multiplier"])]
         for one in summary["bifurcations"]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from walkerlab.errors import StaleError
+from walkerlab.report.outcomes import CONTACT, RIGID
 from walkerlab.stages.runs import run_named
 
 PAGE = "report.html"
-WALKS = ("contact-sim", "simulate")
+WALKS = (CONTACT, RIGID)
 """Stages that walk; the first that a run has is shown."""
 
 

@@ -209,7 +209,7 @@ class Run:
                 if not ahead.begun and nothing_compiled_yet():
                     ahead.begin(self.waiting, self.planner.config)
                 ahead.wait_for(stage)
-                self._run_here(self._begin(step, self.jobs))
+                self._run_here(self._begin(step))
                 self._draw_early(stages)
             else:
                 self._pass_over(step)
@@ -268,7 +268,7 @@ class Run:
                 if member is None:
                     return
                 self.waiting.remove(stage)
-                begun = self.running[member] = self._begin(step, self.jobs)
+                begun = self.running[member] = self._begin(step)
                 member.give(begun.task, begun.reporter)
 
     def _ready(self, stage: Stage, stages: Sequence[Stage]) -> bool:
@@ -281,7 +281,7 @@ class Run:
         self.planner.look_at_current(stage, stages)
         return self.planner.decide(stage)
 
-    def _begin(self, step: Step, jobs: int) -> Begun:
+    def _begin(self, step: Step) -> Begun:
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
         if step.damaged and step.origin is None:
@@ -291,7 +291,9 @@ class Run:
         inputs = self.planner.inputs(stage)
         digests = {name: input_digest(stage, result) for name, result in inputs.items()}
         absent = self.planner.missing_inputs(stage)
-        task = task_of(stage, self.planner.config, inputs, self.folder, jobs=jobs, key=identity.key, left_out=absent)
+        task = task_of(
+            stage, self.planner.config, inputs, self.folder, jobs=self.jobs, key=identity.key, left_out=absent
+        )
         number = self.of - len(self.left) + 1 + len(self.running)
         of = max(self.of, number)
         place = [f"{number} of {of}"] if of > 1 else []

@@ -31,7 +31,7 @@ from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 INTEGRATORS = {
     "semi_explicit_euler": Integrator(1, 25_000),
     "runge_kutta3": Integrator(3, 25_000),
-    "runge_kutta3 adaptive": Integrator(3, 45_000, adapts=True),
+    "runge_kutta3 adaptive": Integrator(3, 60_000, adapts=True),
     "discrete": Integrator(1, 45_000, for_contact_only=True),
 }
 EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
