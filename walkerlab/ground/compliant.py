@@ -8,6 +8,7 @@ import numpy as np
 
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.held import Held, IdealLock, Independent, Knees, NoKnees, always_held, no_stops
+from walkerlab.ground.merged import Unmerged, with_merged_bodies
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned
 from walkerlab.ground.walker import ContactWalker, Foot
@@ -47,7 +48,7 @@ def contact_walker(
     )
     if len(feet) != 2:
         raise ValueError(f"a walker has two feet; this assembly has {len(feet)}")
-    return ContactWalker(
+    walker = ContactWalker(
         tree=tree,
         feet=(feet[0], feet[1]),
         normal=normal,
@@ -59,7 +60,9 @@ def contact_walker(
         knees=knees_of(assembly, knee_rules or KneeRules()),
         legs=legs_of(assembly),
         blank=(0.0,) * (4 + 2 * bodies),
+        merging=Unmerged(),
     )
+    return with_merged_bodies(walker)
 
 
 def held_bodies(assembly: Assembly) -> Held | Independent:

@@ -10,6 +10,7 @@ import numpy as np
 
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.held import Independent, NoKnees
+from walkerlab.ground.merged import Unmerged
 from walkerlab.ground.motion import OnGround, all_wrenches
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import ContactWalker, Foot, foot_motion
@@ -36,9 +37,8 @@ def from_arrays(levers: Any, numbers: Any, friction: Any, state: State, angles: 
     second = Foot(load(levers, 3, angles), load(levers, 4, angles), load(levers, 5, angles), numbers[2])
     normal = NormalLaw(numbers[3], numbers[4], numbers[5], numbers[6])
     tree = Tree(0.0, angles, angles, angles, angles)
-    return ContactWalker(
-        tree, (first, second), normal, friction, 0.0, 0.0, numbers[0], Independent(), NoKnees(), LEGS, state
-    )
+    straight = (Independent(), NoKnees(), LEGS, state, Unmerged())
+    return ContactWalker(tree, (first, second), normal, friction, 0.0, 0.0, numbers[0], *straight)
 
 
 @inlined

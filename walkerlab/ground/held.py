@@ -48,14 +48,28 @@ class Knees(NamedTuple):
     release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
 
 
+class OneBends(NamedTuple):
+    """Of two knees that lock at once, one is locked, and its thigh and shank are one body."""
+
+    thighs: tuple[int, int]  # bodies; those of the locked knee are the same one
+    shanks: tuple[int, int]
+    release_at_touch: bool
+
+
+class NoneBends(NamedTuple):
+    """Both are."""
+
+    release_at_touch: bool
+
+
 @by_type
 def always_held(held: Any) -> Flags:
     """Which bodies follow others at all times."""
 
 
 @by_type
-def held_flags(held: Any, now: Any) -> Flags:
-    """Which bodies follow others now: (n) as flags, from (n) numbers in memory."""
+def held_flags(held: Any, knees: Any, knee: Any) -> Flags:
+    """Which bodies follow others now: (n) as flags, from what each knee is doing, (2,) in memory."""
 
 
 @by_type
@@ -80,7 +94,7 @@ def none_always(held: Independent) -> Flags:
 
 
 @held_flags.case(Independent)
-def none_now(held: Independent, now: Any) -> Flags:
+def none_now(held: Independent, knees: Any, knee: Any) -> Flags:
     """None."""
     return ()
 
@@ -110,12 +124,9 @@ def held_always(held: Held) -> Flags:
 
 
 @held_flags.case(Held)
-def held_now(held: Held, now: Any) -> Flags:
-    """As the memory says."""
-    flags = held.always
-    for k in range(len(flags)):
-        flags = put(flags, k, now[k] != 0)  # type: ignore[assignment]
-    return flags
+def held_now(held: Held, knees: Any, knee: Any) -> Flags:
+    """Those of couplings, and shanks below locked knees."""
+    return below_locked_knees(knees, knee, held.always)
 
 
 @gathered_matrix.case(Held)
@@ -183,6 +194,52 @@ def divide_by_held_mass(held: Any, flags: Flags, tree: Tree, M: Vector, J: Any) 
             J[size - n + k, j] = column[k]
 
 
+@by_type
+def below_locked_knees(knees: Any, knee: Any, flags: Flags) -> Flags:
+    """The flags, with those of the shanks that follow their thighs now."""
+
+
+@below_locked_knees.case(NoKnees)
+@below_locked_knees.case(OneBends)
+@below_locked_knees.case(NoneBends)
+def no_shanks(knees: Any, knee: Any, flags: Flags) -> Flags:
+    """None is a body of its own."""
+    return flags
+
+
+@below_locked_knees.case(Knees)
+def locked_shanks(knees: Knees, knee: Any, flags: Flags) -> Flags:
+    """One, or both."""
+    for k in range(2):
+        if knee[k] == LOCKED:
+            flags = put(flags, knees.shanks[k], True)  # type: ignore[assignment]
+    return flags
+
+
+@by_type
+def bends_otherwise(knees: Any, knee: Any) -> bool:
+    """Whether another knee can bend now than the walker's bodies are for: (2,) what each knee is doing."""
+
+
+@bends_otherwise.case(NoKnees)
+@bends_otherwise.case(Knees)
+def never(knees: Any, knee: Any) -> bool:
+    """They are for all that may be."""
+    return False
+
+
+@bends_otherwise.case(OneBends)
+def none_bends(knees: OneBends, knee: Any) -> bool:
+    """The other one has locked too."""
+    return bool(knee[0] == LOCKED and knee[1] == LOCKED)
+
+
+@bends_otherwise.case(NoneBends)
+def one_bends(knees: NoneBends, knee: Any) -> bool:
+    """One has been released."""
+    return bool(knee[0] != LOCKED or knee[1] != LOCKED)
+
+
 # ---- the stop of a knee ----------------------------------------------------------------------------------------------
 
 
@@ -217,36 +274,48 @@ def knee_power(knees: Any, stops: Flags, y: State, first: int) -> float:
 
 
 @no_stops.case(NoKnees)
-def without_stops(knees: NoKnees) -> Flags:
+@no_stops.case(OneBends)
+@no_stops.case(NoneBends)
+def without_stops(knees: Any) -> Flags:
     """There are none."""
     return ()
 
 
 @stop_flags.case(NoKnees)
-def without_stops_now(knees: NoKnees, now: Any) -> Flags:
+@stop_flags.case(OneBends)
+@stop_flags.case(NoneBends)
+def without_stops_now(knees: Any, now: Any) -> Flags:
     """There are none."""
     return ()
 
 
 @knee_torques.case(NoKnees)
-def without_torques(knees: NoKnees, stops: Flags, y: State, first: int, torques: Vector) -> Vector:
+@knee_torques.case(OneBends)
+@knee_torques.case(NoneBends)
+def without_torques(knees: Any, stops: Flags, y: State, first: int, torques: Vector) -> Vector:
     """As they are."""
     return torques
 
 
 @knee_gradients.case(NoKnees)
-def without_gradients(knees: NoKnees, stops: Flags, y: State, first: int, J: Any) -> None:
+@knee_gradients.case(OneBends)
+@knee_gradients.case(NoneBends)
+def without_gradients(knees: Any, stops: Flags, y: State, first: int, J: Any) -> None:
     """Nothing."""
 
 
 @knee_energy.case(NoKnees)
-def without_energy(knees: NoKnees, stops: Flags, y: State, first: int) -> float:
+@knee_energy.case(OneBends)
+@knee_energy.case(NoneBends)
+def without_energy(knees: Any, stops: Flags, y: State, first: int) -> float:
     """None."""
     return 0.0
 
 
 @knee_power.case(NoKnees)
-def without_power(knees: NoKnees, stops: Flags, y: State, first: int) -> float:
+@knee_power.case(OneBends)
+@knee_power.case(NoneBends)
+def without_power(knees: Any, stops: Flags, y: State, first: int) -> float:
     """None."""
     return 0.0
 

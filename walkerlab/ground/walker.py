@@ -35,8 +35,9 @@ class ContactWalker(NamedTuple):
     slope: float  # rad
     held: Any  # Independent or Held: which bodies follow others
     knees: Any  # NoKnees or Knees
-    legs: tuple[tuple[int, ...], tuple[int, ...]]  # bodies of either leg, from the hip down
+    legs: tuple[tuple[int, ...], tuple[int, ...]]  # bodies of either leg of the whole walker, from the hip down
     blank: State  # a state of zeros
+    merging: Any  # Unmerged, ByKnees or Merged: what it is while knees are locked
 
 
 class FootMotion(NamedTuple):

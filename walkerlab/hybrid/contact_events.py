@@ -9,7 +9,17 @@ import math
 from typing import Any, NamedTuple
 
 from walkerlab.ground.friction import Coulomb, Frictionless
-from walkerlab.ground.held import BENT, STOPPING, Knees, NoKnees, extension, extension_rate
+from walkerlab.ground.held import (
+    BENT,
+    LOCKED,
+    STOPPING,
+    Knees,
+    NoKnees,
+    NoneBends,
+    OneBends,
+    extension,
+    extension_rate,
+)
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.pinned import Pinned, floating_state
@@ -180,12 +190,14 @@ def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
 
 
 @sample_knees.case(NoKnees)
-def sample_no_knees(knees: NoKnees, y: State, j: int, finder: CrossingFinder) -> None:
+@sample_knees.case(NoneBends)
+def sample_no_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
     """Nothing."""
 
 
 @sample_knees.case(Knees)
-def sample_both_knees(knees: Knees, y: State, j: int, finder: CrossingFinder) -> None:
+@sample_knees.case(OneBends)
+def sample_both_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
     """Extension and its rate."""
     for knee in range(2):
         finder.values[EXTENSION + knee, j] = extension(knees, knee, y, 2)
@@ -226,12 +238,36 @@ def first_knee_crossing(
             at = leaves_side(finder, index, 1, at_zero[index] != 0)
         if at < best:
             best, signal = at, index
-    if releasing:
-        index = stance * PER_FOOT + CLIMB
-        at = leaves_side(finder, index, -1, at_zero[index] != 0)
-        if at < best:
-            best, signal = at, index
-    return best, signal
+    at, index = end_of_sinking(releasing, stance, at_zero, finder)
+    return (at, index) if at < best else (best, signal)
+
+
+@knee_crossing.case(OneBends)
+def only_crossing(
+    knees: OneBends, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """The bent knee gets straight."""
+    index = EXTENSION if knee[0] != LOCKED else EXTENSION + 1
+    if knee[index - EXTENSION] != BENT:
+        return NO_CROSSING, -1
+    return leaves_side(finder, index, -1, at_zero[index] != 0), index
+
+
+@knee_crossing.case(NoneBends)
+def crossing_of_the_foot(
+    knees: NoneBends, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
+) -> tuple[float, int]:
+    """The stance foot stops sinking in."""
+    return end_of_sinking(releasing, stance, at_zero, finder)
+
+
+@inlined
+def end_of_sinking(releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder) -> tuple[float, int]:
+    """Fraction of the step at which the stance foot stops sinking in, if a knee is to be released then."""
+    index = stance * PER_FOOT + CLIMB
+    if not releasing:
+        return NO_CROSSING, index
+    return leaves_side(finder, index, -1, at_zero[index] != 0), index
 
 
 @by_type

@@ -2,11 +2,12 @@
 
 from typing import Any
 
-from walkerlab.ground.held import Knees, NoKnees, divide_by_held_mass, knee_energy, turned_by
+from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, divide_by_held_mass, knee_energy, turned_by
 from walkerlab.ground.motion import OnGround, motion_gradient
 from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_events import CLIMB, EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT
 from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
+from walkerlab.hybrid.contact_rules import catches
 from walkerlab.hybrid.contact_tangent import Tangent, jump
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, tree_gradients
@@ -21,9 +22,9 @@ def cross_knee(knees: Any, observer: ContactObserver, method: Any, before: Any, 
 
 
 @cross_knee.case(NoKnees)
-def cross_nothing(
-    knees: NoKnees, observer: ContactObserver, method: Any, before: Any, after: Any, signal: int
-) -> State:
+@cross_knee.case(OneBends)
+@cross_knee.case(NoneBends)
+def cross_nothing(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, signal: int) -> State:
     """As it was."""
     return end_state(method, before)
 
@@ -36,8 +37,7 @@ def cross_some_knee(
     y = end_state(method, before)
     new, locks = y, False
     if signal >= EXTENSION:
-        knee = (signal - EXTENSION) % 2
-        locks = after.held[knees.shanks[knee]]
+        locks = signal >= EXTENSION_RATE or catches(knees.stop)
         if locks:
             new, lost = locked(after, y)
             observer.books[KNEE_STRIKES] += lost

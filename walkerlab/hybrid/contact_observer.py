@@ -3,7 +3,8 @@
 from typing import Any, NamedTuple
 
 from walkerlab.ground.energy import book_energy, dissipated_power, foot_elastic_energy
-from walkerlab.ground.held import Knees, NoKnees, knee_energy, knee_power
+from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, knee_energy, knee_power
+from walkerlab.ground.merged import store_whole
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import CLIMB, HEIGHT, PER_FOOT, feet_motion, walker_state
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
@@ -35,6 +36,7 @@ class ContactObserver(NamedTuple):
     books: Any  # (5,) J dissipated so far
     extremes: Any  # (3,) deepest penetration m, largest residual of the energy balance J, energy at the start J
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
+    merged: Any  # tangents of the walker with one and with both knees locked; () if it keeps its bodies
 
 
 @inlined
@@ -76,8 +78,7 @@ def record_samples(
     while index < observer.times.size and observer.times[index] <= method.clock[T]:
         fraction = (observer.times[index] - t) / h
         y = walker_state(system, interpolate(method, system, fraction))
-        for i in range(len(y)):
-            observer.states[index, i] = y[i]
+        store_whole(walker.merging, y, observer.states[index])
         damping, friction, stops = work_until(method, system, walker, mode, fraction)
         for channel in range(BOOKS):
             observer.sampled_books[index, channel] = observer.books[channel]
@@ -150,7 +151,9 @@ def stop_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
 
 
 @stop_work.case(NoKnees)
-def no_work(knees: NoKnees, method: Any, system: Any, fraction: float) -> float:
+@stop_work.case(OneBends)
+@stop_work.case(NoneBends)
+def no_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
     """None."""
     return 0.0
 

@@ -11,6 +11,8 @@ from walkerlab.ground.held import (
     IdealLock,
     Knees,
     NoKnees,
+    NoneBends,
+    OneBends,
     extension,
 )
 from walkerlab.ground.normal_force import NormalLaw
@@ -67,7 +69,6 @@ class Ledger(NamedTuple):
     touched: Any  # (2,) m, where its material was then
     stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
     leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
-    held: Any  # (n) which bodies follow others
     knee: Any  # (2,) what each knee is doing
     releasing: Any  # (1,) whether the trailing knee is still to be released
     knee_strike: Any  # (steps,) s, when the knee of the step's swing leg locked; -1 if it has not
@@ -257,7 +258,8 @@ def stop_catches(stop: NormalLaw) -> bool:
 
 
 @knee_stops.case(NoKnees)
-def nothing_stops(knees: NoKnees, ledger: Ledger, signal: int, t: float) -> None:
+@knee_stops.case(NoneBends)
+def nothing_stops(knees: Any, ledger: Ledger, signal: int, t: float) -> None:
     """Nothing."""
 
 
@@ -267,7 +269,8 @@ def nothing_is_released(knees: NoKnees, ledger: Ledger, knee: int) -> None:
 
 
 @is_straight.case(NoKnees)
-def always_straight(knees: NoKnees, ledger: Ledger, foot: int) -> bool:
+@is_straight.case(NoneBends)
+def always_straight(knees: Any, ledger: Ledger, foot: int) -> bool:
     """Yes."""
     return True
 
@@ -278,39 +281,54 @@ def nothing_follows(knees: NoKnees, ledger: Ledger, trailing: int) -> None:
 
 
 @note_flexion.case(NoKnees)
-def nothing_flexes(knees: NoKnees, ledger: Ledger, y: State) -> None:
+@note_flexion.case(NoneBends)
+def nothing_flexes(knees: Any, ledger: Ledger, y: State) -> None:
     """Nothing."""
 
 
 @knee_stops.case(Knees)
 def knee_locks(knees: Knees, ledger: Ledger, signal: int, t: float) -> None:
     """It locks, or meets its stop, where it latches when it turns back."""
-    knee = (signal - EXTENSION) % 2
     if signal < EXTENSION_RATE and not catches(knees.stop):
-        ledger.knee[knee] = STOPPING
+        ledger.knee[(signal - EXTENSION) % 2] = STOPPING
         return
+    note_lock(ledger, signal, t)
+
+
+@knee_stops.case(OneBends)
+def bent_knee_locks(knees: OneBends, ledger: Ledger, signal: int, t: float) -> None:
+    """At once."""
+    note_lock(ledger, signal, t)
+
+
+@inlined
+def note_lock(ledger: Ledger, signal: int, t: float) -> None:
+    """The knee of the step's swing leg is locked from now on."""
     ledger.at_zero[signal] = 0
-    ledger.knee[knee] = LOCKED
-    ledger.held[knees.shanks[knee]] = 1
+    ledger.knee[(signal - EXTENSION) % 2] = LOCKED
     ledger.knee_strike[ledger.feet[STEPS]] = t
 
 
 @release.case(Knees)
-def knee_is_released(knees: Knees, ledger: Ledger, knee: int) -> None:
+@release.case(OneBends)
+@release.case(NoneBends)
+def knee_is_released(knees: Any, ledger: Ledger, knee: int) -> None:
     """Its shank turns on its own."""
     ledger.releasing[0] = 0
     ledger.knee[knee] = RELEASED
-    ledger.held[knees.shanks[knee]] = 0
 
 
 @is_straight.case(Knees)
-def knee_is_straight(knees: Knees, ledger: Ledger, foot: int) -> bool:
+@is_straight.case(OneBends)
+def knee_is_straight(knees: Any, ledger: Ledger, foot: int) -> bool:
     """Its knee is locked."""
     return ledger.knee[foot] == LOCKED
 
 
 @follow_strike.case(Knees)
-def knee_follows(knees: Knees, ledger: Ledger, trailing: int) -> None:
+@follow_strike.case(OneBends)
+@follow_strike.case(NoneBends)
+def knee_follows(knees: Any, ledger: Ledger, trailing: int) -> None:
     """At once, or when the leading foot stops sinking in."""
     if knees.release_at_touch:
         release(knees, ledger, trailing)
@@ -319,7 +337,8 @@ def knee_follows(knees: Knees, ledger: Ledger, trailing: int) -> None:
 
 
 @note_flexion.case(Knees)
-def knees_flex(knees: Knees, ledger: Ledger, y: State) -> None:
+@note_flexion.case(OneBends)
+def knees_flex(knees: Any, ledger: Ledger, y: State) -> None:
     """Either may."""
     for knee in range(2):
         if ledger.knee[knee] == RELEASED and extension(knees, knee, y, 2) < -FLEXED:

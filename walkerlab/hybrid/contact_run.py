@@ -14,15 +14,12 @@ from walkerlab.ground.held import (
     FLEXED,
     LOCKED,
     RELEASED,
-    Held,
     Knees,
-    always_held,
     extension,
     knee_energy,
-    no_stops,
     stop_flags,
 )
-from walkerlab.ground.motion import OnGround
+from walkerlab.ground.merged import ByKnees
 from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
@@ -42,8 +39,9 @@ from walkerlab.hybrid.contact_events import (
     material_along,
 )
 from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.hybrid.contact_phases import method_by_knees, walk_by_knees
 from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
-from walkerlab.hybrid.contact_tangent import new_tangent
+from walkerlab.hybrid.contact_tangent import Tangent, new_tangent
 from walkerlab.hybrid.contact_walk import walk_part
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import kernel, uncompiled
@@ -74,6 +72,12 @@ class MethodSettings:
     def new(self, n: int) -> Any:
         """The method with memory for n equations."""
         return self.method.new(n, self.rtol, self.atol, self.budget)
+
+    def of(self, walker: ContactWalker) -> Any:
+        """The method with memory for a walker, with as few bodies as its knees allow."""
+        if isinstance(walker.merging, ByKnees):
+            return method_by_knees(walker.merging, len(walker.blank), self.new)
+        return self.new(len(walker.blank))
 
 
 @dataclass(frozen=True)
@@ -108,9 +112,9 @@ def walk_free(
 
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
     """
-    system = OnGround(walker, (True, True), always_held(walker.held), no_stops(walker.knees))
-    return walk_part(
-        system, walker, ground.terrain, ground.frame, method, finder, observer, ledger, t, y, stop_passing_after
+    terrain, frame = ground.terrain, ground.frame
+    return walk_by_knees(
+        walker.merging, walker, terrain, frame, method, finder, observer, ledger, t, y, stop_passing_after
     )
 
 
@@ -206,7 +210,6 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
         on_pad = carried_in_cell(terrain, int(cells[foot]))
         carried[foot] = on_pad and starts_carried(terrain, foot == stance)
     sides, at_zero = known_sides(walker, feet, stance, y)
-    held, knee = held_at_start(walker, stance, y)
     return Ledger(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
@@ -218,8 +221,7 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
         foothold=np.array([motion.along for motion in feet]),
         touched=np.array([material_along(walker, foot, feet[foot].along, y) for foot in range(2)]),
         stood=np.zeros((2, 2)),
-        held=held,
-        knee=knee,
+        knee=knees_at_start(walker, stance, y),
         releasing=np.zeros(1, np.int8),
         knee_strike=np.full(steps, -1.0),
         leaving=np.zeros(2, np.int8),
@@ -230,15 +232,14 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
     )
 
 
-def held_at_start(walker: ContactWalker, stance: int, y: State) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Which bodies follow others, and what each knee is doing: that of the stance leg is locked, the other is not."""
+def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
+    """What each knee is doing (2,): that of the stance leg is locked, the other is not."""
     knee = np.full(2, RELEASED, np.int8)
-    held = np.array(walker.held.always if isinstance(walker.held, Held) else (), np.int8)
     if isinstance(walker.knees, Knees):
-        held[walker.knees.shanks[stance]], knee[stance] = 1, LOCKED
+        knee[stance] = LOCKED
         if extension(walker.knees, 1 - stance, y, 2) < -FLEXED:
             knee[1 - stance] = BENT
-    return held, knee
+    return knee
 
 
 def known_sides(
@@ -302,7 +303,16 @@ def new_observer(
         np.zeros(BOOKS),
         extremes,
         new_tangent(len(walker.blank), directions),
+        merged_tangents(walker, directions),
     )
+
+
+def merged_tangents(walker: ContactWalker, directions: int) -> tuple[Tangent, ...]:
+    """Memory for the tangent while one knee is locked and while both are; none for a walker that keeps its bodies."""
+    if not isinstance(walker.merging, ByKnees):
+        return ()
+    merging = walker.merging
+    return tuple(new_tangent(len(fewer.blank), directions) for fewer in (merging.one[0], merging.both))
 
 
 def walk_contact(
@@ -365,7 +375,7 @@ def run_parts(
         release_hinge(walker, pinned.foot, ledger, y)
         if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
             return outcome, Stopped(t, y, spent)
-    method = methods.new(len(walker.blank))
+    method = methods.of(walker)
     ledger.times[AIRBORNE_SINCE] = t
     free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
     outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))

@@ -5,7 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
-from walkerlab.ground.held import held_flags, stop_flags
+from walkerlab.ground.held import bends_otherwise, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned
 from walkerlab.ground.terrain import order_matters
@@ -62,14 +62,15 @@ def in_mode(system: Any, ledger: Ledger) -> Any:
 def free_mode(system: OnGround, ledger: Ledger) -> OnGround:
     """Each foot finds ground or not."""
     walker, carried = system.walker, (ledger.carried[0] != 0, ledger.carried[1] != 0)
-    return OnGround(walker, carried, held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee))
+    held = held_flags(walker.held, walker.knees, ledger.knee)
+    return OnGround(walker, carried, held, stop_flags(walker.knees, ledger.knee))
 
 
 @in_mode.case(Pinned)
 def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
     """The hinge does not ask for ground."""
     walker = system.walker
-    held, stops = held_flags(walker.held, ledger.held), stop_flags(walker.knees, ledger.knee)
+    held, stops = held_flags(walker.held, walker.knees, ledger.knee), stop_flags(walker.knees, ledger.knee)
     return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops)
 
 
@@ -108,7 +109,7 @@ def walk_part(
 
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
 
-    Returns the outcome's number; the method stands at the end.
+    Returns the outcome's number, or GOES_ON if the walker has to go on with other bodies; the method stands at the end.
     """
     mode = in_mode(system, ledger)
     begin(method, mode, t, y, method.clock[H_NEXT])
@@ -177,6 +178,8 @@ def walk_part(
             released = is_hinged(system) and ledger.feet[STEPS] > steps
             if released or (signal == PASSING and 0 <= stop_passing_after <= ledger.feet[STEPS]):
                 return WALKED
+            if bends_otherwise(walker.knees, ledger.knee):
+                return GOES_ON
             if not is_join(signal):
                 before, mode = mode, in_mode(system, ledger)
                 y = cross_knee(walker.knees, observer, method, before, mode, signal)

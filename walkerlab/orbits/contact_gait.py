@@ -91,7 +91,7 @@ def section_points(
     for steps in WARM_UP:
         ledger = new_ledger(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, ledger, start)
-        method = replace(methods, budget=(steps + 1) * methods.budget).new(len(walker.blank))
+        method = replace(methods, budget=(steps + 1) * methods.budget).of(walker)
         finder = finder_for(method, SIGNALS)
         outcome = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
         if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.held import Held, IdealLock, Knees, stop_flags
+from walkerlab.ground.held import Held, IdealLock, Knees, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import Checkerboard, carried_in_air
 from walkerlab.ground.walker import ContactWalker
@@ -176,7 +176,7 @@ def step_from_section(
     stand_on_section(ledger, walker, laid, start, stance)
     observer = new_observer(walker, ledger, start, booked=booked, directions=z.size)
     observer.tangent.Phi[:, :] = directions(walker, start, stance)
-    method = methods.new(len(walker.blank))
+    method = methods.of(walker)
     finder = finder_for(method, SIGNALS)
     outcome = Outcome(walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1))
     end = method.y.copy()
@@ -225,7 +225,7 @@ def section_derivative(
 ) -> Floats:
     """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
     carried = (bool(ledger.carried[0]), bool(ledger.carried[1]))
-    held = tuple(bool(x) for x in ledger.held)
+    held = held_flags(walker.held, walker.knees, ledger.knee)
     system = OnGround(walker, carried, held, stop_flags(walker.knees, ledger.knee))
     rate = np.zeros(end.size)
     right_hand_side(system, 0.0, end, rate)

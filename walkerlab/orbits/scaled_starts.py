@@ -84,7 +84,7 @@ class ScaledStarts:
         """Walk from a state of the free walker."""
         ledger = new_ledger(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
         observer = new_observer(self.walker, ledger, start)
-        method = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget).new(len(start))
+        method = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget).of(self.walker)
         finder = finder_for(method, SIGNALS)
         outcome = walk_free(self.walker, self.ground, method, finder, observer, ledger, 0.0, start, NEVER)
         steps = int(ledger.feet[STEPS])

@@ -51,9 +51,17 @@ def method_named(name: str) -> Method:
     raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
 
 
+def sharing(method: Any, clock: Any, counts: Any) -> Any:
+    """The method with another's clock and counts for its own: both integrate one walk, by turns."""
+    if isinstance(method, ScipyMethod):
+        method.clock, method.counts = clock, counts
+        return method
+    return method._replace(clock=clock, counts=counts)
+
+
 def finder_for(method: Any, signals: int) -> CrossingFinder:
     """A crossing finder that fits a method's dense output."""
     return new_crossing_finder(dense_degree(method), signals)
 
 
-__all__ = ["METHODS", "Method", "ScipyMethod", "finder_for", "method_named"]
+__all__ = ["METHODS", "Method", "ScipyMethod", "finder_for", "method_named", "sharing"]

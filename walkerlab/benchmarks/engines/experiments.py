@@ -28,7 +28,7 @@ from walkerlab.benchmarks.engines.runs import (
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import Coulomb, friction_coefficient
 from walkerlab.ground.held import held_flags, no_stops
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, held_at_start, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, knees_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
 from walkerlab.mechanics.tree import mass_matrix
@@ -396,7 +396,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     foot = scene.assembly.feet[scene.stance]
     tree = tree_about(scene.assembly, Anchor(foot.body, foot.centre_m))
     walker = scene.ours
-    held = held_flags(walker.held, held_at_start(walker, scene.stance, scene.start)[0])
+    held = held_flags(walker.held, walker.knees, knees_at_start(walker, scene.stance, scene.start))
     system = Pinned(walker, tree, scene.stance, 0.0, (0.0,) * (2 * n), held, no_stops(walker.knees))
 
     def rate(t: float, y: Floats) -> Any:

@@ -154,7 +154,7 @@ class Follower:
         if signal >= EXTENSION:
             knee_stops(knees, ledger, signal, self.time_s)
             walker, carried = self.scene.ours, (bool(ledger.carried[0]), bool(ledger.carried[1]))
-            held = held_flags(walker.held, ledger.held)
+            held = held_flags(walker.held, walker.knees, ledger.knee)
             state, _ = locked(OnGround(walker, carried, held, stop_flags(knees, ledger.knee)), state)
         else:
             release(knees, ledger, 1 - int(ledger.feet[STANCE]))
@@ -172,7 +172,7 @@ class Follower:
 
     def _in_next_model(self, state: State) -> tuple[Floats, Floats]:
         """Coordinates and velocities of the walker with its knees as they are now."""
-        self.scene = self.scene.with_knees_locked(self.ledger.held)
+        self.scene = self.scene.with_knees_locked(self.ledger.knee)
         self.look = FeetAndForces(self.scene, self.ledger.carried)
         q, v = self.scene.from_base(state)
         self.feet, self.bends = self.look.feet(q, v), bends_of(self.scene, q, v)

@@ -12,9 +12,9 @@ from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton,
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.held import IdealLock
+from walkerlab.ground.held import LOCKED, IdealLock
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import Ground, held_at_start
+from walkerlab.hybrid.contact_run import Ground, knees_at_start
 from walkerlab.mechanics.assembly import masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee, Position
 from walkerlab.mechanics.standing import swing_foot
@@ -79,10 +79,10 @@ class EngineScene:
         shank, thigh = self.assembly.index(knee.shank), self.assembly.index(knee.thigh)
         return np.asarray(self.chain[shank] - self.chain[thigh])
 
-    def with_knees_locked(self, held: NDArray[np.int8]) -> EngineScene:
-        """The scene while these bodies are held."""
-        knees = self.assembly.knees
-        return replace(self, locked=tuple(knee for knee in knees if held[self.assembly.index(knee.shank)]))
+    def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
+        """The scene while each of its knees is doing this."""
+        locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
+        return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
@@ -153,7 +153,7 @@ def engine_scene(
     )
     walker = ours._replace(feet=(feet[0], feet[1]))
     scene = EngineScene(name, assembly, base, hip, gravity, ours, walker, ground, STANCE_FOOT, start)
-    return scene.with_knees_locked(held_at_start(ours, STANCE_FOOT, start)[0])
+    return scene.with_knees_locked(knees_at_start(ours, STANCE_FOOT, start))
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:

@@ -1,0 +1,251 @@
+"""A walk on compliant ground with as few bodies as its knees allow.
+
+Between a knee's lock and its release thigh and shank are one body, so the walk is one of several walkers that take
+turns: of three bodies while a knee of two can bend, of two bodies while none can. The whole walker's state is handed
+from one to the next, and so is the tangent.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.ground.held import LOCKED, NoneBends, OneBends, always_held, no_stops
+from walkerlab.ground.merged import ByKnees, Unmerged, merged, merged_levers, merged_state, place_of, store_whole
+from walkerlab.ground.motion import OnGround
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_events import CLIMB, EXTENSION, HEIGHT, PER_FOOT, Frame
+from walkerlab.hybrid.contact_knee import carry_over, locked
+from walkerlab.hybrid.contact_observer import KNEE_STRIKES, ContactObserver
+from walkerlab.hybrid.contact_rules import GOES_ON, STANCE, Ledger
+from walkerlab.hybrid.contact_tangent import Tangent
+from walkerlab.hybrid.contact_walk import walk_part
+from walkerlab.kernels import by_type, inlined
+from walkerlab.mechanics.tuples import put
+from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.registry import sharing
+from walkerlab.solvers.stepping import T, dense_degree, end_state
+from walkerlab.solvers.system import State
+from walkerlab.solvers.vectors import store
+
+
+class MethodByKnees(NamedTuple):
+    """A method with memory for a walker while one of its knees is locked, and while both are; they share their clock.
+
+    The fields of a method that are read after a walk are here too: of the whole walker.
+    """
+
+    clock: Any
+    counts: Any
+    y: Any  # (4 + 2 n)
+    one: Any
+    both: Any
+
+
+def method_by_knees(merging: ByKnees, size: int, new: Any) -> MethodByKnees:
+    """Methods from `new(equations)` for a walker whose state has `size` numbers."""
+    one, both = new(len(merging.one[0].blank)), new(len(merging.both.blank))
+    return MethodByKnees(one.clock, one.counts, np.zeros(size), one, sharing(both, one.clock, one.counts))
+
+
+@dense_degree.case(MethodByKnees)
+def dense_degree_by_knees(method: MethodByKnees) -> int:
+    """The same for both."""
+    return dense_degree(method.both)
+
+
+@by_type
+def walk_by_knees(
+    merging: Any,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    t: float,
+    y: State,
+    stop_passing_after: int,
+) -> int:
+    """Walk from state y at time t (s) with both feet free; arguments and what is returned as of `walk_part`."""
+
+
+@walk_by_knees.case(Unmerged)
+def walk_with_all_bodies(
+    merging: Unmerged,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    t: float,
+    y: State,
+    stop_passing_after: int,
+) -> int:
+    """As it is."""
+    system = free(walker, ledger, always_held(walker.held))
+    return walk_part(system, walker, terrain, frame, method, finder, observer, ledger, t, y, stop_passing_after)
+
+
+@walk_by_knees.case(ByKnees)
+def walk_with_fewer_bodies(
+    merging: ByKnees,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    method: MethodByKnees,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    t: float,
+    y: State,
+    stop_passing_after: int,
+) -> int:
+    """One walker after another, as knees lock and are released."""
+    method.clock[T] = t
+    store(y, method.y, 0)
+    released, outcome = False, GOES_ON
+    while outcome == GOES_ON:
+        if ledger.knee[0] == LOCKED and ledger.knee[1] == LOCKED:
+            fewer = merging.both
+            straight = merged(walker, fewer, fewer.held, NoneBends(walker.knees.release_at_touch))
+            seen = seen_by(observer, observer.merged[1], fewer.onto)
+            outcome = walk_merged(
+                straight, terrain, frame, method, method.both, finder, seen, ledger, stop_passing_after
+            )
+            hand_back(observer, seen, fewer.onto)
+            released = True
+        else:
+            swing = 1 if ledger.knee[0] == LOCKED else 0
+            outcome = walk_bending(
+                merging, swing, released, walker, terrain, frame, method, finder, observer, ledger, stop_passing_after
+            )
+            released = False
+    return outcome
+
+
+@inlined
+def walk_bending(
+    merging: ByKnees,
+    swing: int,
+    released: bool,
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    method: MethodByKnees,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    stop_passing_after: int,
+) -> int:
+    """Walk while the knee of leg `swing` can bend; from its release, or from where the walk starts, to its lock."""
+    fewer = merging.one[1 - swing]
+    knees = OneBends(fewer.thighs, fewer.shanks, walker.knees.release_at_touch)
+    bending = merged(walker, fewer, fewer.held, knees)
+    locking = merged(walker, fewer, merging.locking[1 - swing], knees)
+    seen = seen_by(observer, observer.merged[0], fewer.onto)
+    if released and seen.tangent.Phi.shape[1] > 0:
+        cross_release(locking, swing, seen.tangent, ledger, method)
+    outcome = walk_merged(bending, terrain, frame, method, method.one, finder, seen, ledger, stop_passing_after)
+    if outcome == GOES_ON:
+        cross_lock(locking, swing, seen, ledger, method)
+    hand_back(observer, seen, fewer.onto)
+    return outcome
+
+
+@inlined
+def free(walker: ContactWalker, ledger: Ledger, held: Any) -> OnGround:
+    """The walker with both feet free, some of its bodies held and nothing in a stop."""
+    carried = (ledger.carried[0] != 0, ledger.carried[1] != 0)
+    return OnGround(walker, carried, held, no_stops(walker.knees))
+
+
+@inlined
+def cross_lock(
+    walker: ContactWalker, swing: int, observer: ContactObserver, ledger: Ledger, method: MethodByKnees
+) -> None:
+    """The knee of leg `swing` has locked: a plastic impact."""
+    y = merged_state(walker.merging.onto, method.y, walker.blank)
+    bent, straight = lock_modes(walker, swing, ledger)
+    new, lost = locked(straight, y)
+    observer.books[KNEE_STRIKES] += lost
+    if observer.tangent.Phi.shape[1] > 0:
+        t = method.clock[T]
+        carry_over(walker.knees, observer.tangent, t, bent, straight, EXTENSION + swing, y, new, True)
+    store_whole(walker.merging, new, method.y)
+
+
+@inlined
+def cross_release(walker: ContactWalker, swing: int, tangent: Tangent, ledger: Ledger, method: MethodByKnees) -> None:
+    """The knee of leg `swing` is released: no velocity jumps, but accelerations do."""
+    y = merged_state(walker.merging.onto, method.y, walker.blank)
+    bent, straight = lock_modes(walker, swing, ledger)
+    kind = HEIGHT if walker.knees.release_at_touch else CLIMB
+    signal = ledger.feet[STANCE] * PER_FOOT + kind
+    carry_over(walker.knees, tangent, method.clock[T], straight, bent, signal, y, y, False)
+
+
+@inlined
+def lock_modes(walker: ContactWalker, swing: int, ledger: Ledger) -> tuple[OnGround, OnGround]:
+    """The walker while the knee of leg `swing` can bend, and while it is locked."""
+    always = walker.held.always
+    straight = put(always, walker.knees.shanks[swing], True)
+    return free(walker, ledger, always), free(walker, ledger, straight)
+
+
+@inlined
+def walk_merged(
+    walker: ContactWalker,
+    terrain: Any,
+    frame: Frame,
+    whole: MethodByKnees,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    ledger: Ledger,
+    stop_passing_after: int,
+) -> int:
+    """Walk with these bodies from where `whole` stands, until other knees are locked or the walk ends."""
+    onto = walker.merging.onto
+    hip_x = merged_levers(onto, frame.hip_x, walker.tree.arm_x)
+    hip_y = merged_levers(onto, frame.hip_y, walker.tree.arm_x)
+    own = Frame(frame.leg_length, frame.pendulum_time, hip_x, hip_y, frame.locate_joins)
+    t, y = whole.clock[T], merged_state(onto, whole.y, walker.blank)
+    system = free(walker, ledger, always_held(walker.held))
+    outcome = walk_part(system, walker, terrain, own, method, finder, observer, ledger, t, y, stop_passing_after)
+    store_whole(walker.merging, end_state(method, system), whole.y)
+    return outcome
+
+
+@inlined
+def seen_by(observer: ContactObserver, tangent: Tangent, onto: tuple[int, ...]) -> ContactObserver:
+    """The observer of a walk with fewer bodies, with what is known of the tangent."""
+    whole, size = observer.tangent.Phi, tangent.Phi.shape[0]
+    for i in range(whole.shape[0] - 1, -1, -1):
+        for direction in range(whole.shape[1]):
+            tangent.Phi[place_of(onto, i, size), direction] = whole[i, direction]
+    return ContactObserver(
+        observer.booked,
+        observer.times,
+        observer.states,
+        observer.carried,
+        observer.stance,
+        observer.knees,
+        observer.sampled_books,
+        observer.recorded,
+        observer.books,
+        observer.extremes,
+        tangent,
+        (),
+    )
+
+
+@inlined
+def hand_back(observer: ContactObserver, seen: ContactObserver, onto: tuple[int, ...]) -> None:
+    """The tangent of a walk with fewer bodies is that of the whole walker: bodies that are one turn alike."""
+    whole, size = observer.tangent.Phi, seen.tangent.Phi.shape[0]
+    for i in range(whole.shape[0]):
+        for direction in range(whole.shape[1]):
+            whole[i, direction] = seen.tangent.Phi[place_of(onto, i, size), direction]
