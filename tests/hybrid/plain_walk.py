@@ -198,10 +198,10 @@ def runge_kutta(walker, y, h, hinged, locked, carried):
 
 
 @njit
-def struck(walker, y, locked):
-    """The state after a plastic impact: nothing but what is locked takes an impulse."""
+def struck(walker, y, hinged, locked):
+    """The state after a plastic impact: nothing but the hinge and what is locked takes an impulse."""
     n = walker.inertias.size
-    A, b = matrices(walker, y, -1, locked)
+    A, b = matrices(walker, y, hinged, locked)
     b[:] = 0.0
     b[: 2 + n] = np.ascontiguousarray(A[: 2 + n, : 2 + n]) @ y[2 + n :]
     after = y.copy()
@@ -332,7 +332,7 @@ def walk(walker, y, steps, h, hinged):
             continue
         if event == KNEES or event == KNEES + 1:
             locked[event - KNEES] = True
-            y = struck(walker, y, locked)
+            y = struck(walker, y, hinged, locked)
             locks[lock_count] = t
             lock_count += 1
             continue
