@@ -61,13 +61,19 @@ def fixedpoint(summary: Summary) -> list[str | Rows]:
         f"On a slope of {slope} there is {stable}: steps of {fixed(summary['step_length_m'], 4)} m "
         f"in {fixed(summary['period_s'], 4)} s; the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
     )
-    sets = summary.get("equation_sets", {})
-    shown = {name: found for name, found in sets.items() if "state" in found} or {summary["equations"]: summary}
-    first = [summary["equations"], *(name for name in shown if name != summary["equations"])]
+    others = {name: one for name, one in summary.get("equation_sets", {}).items() if another_gait(one, summary)}
     names = summary.get("state_names", STATE)
-    rows = [["", *heads_of(first), "unit"], *gait_rows(names, [shown[name] for name in first])]
+    heads = heads_of([summary["equations"], *others])
+    rows = [["", *heads, "unit"], *gait_rows(names, [summary, *others.values()])]
     found = f"{count(summary['gaits_found'], 'gait')} of one step found."
     return [head, rows, found]
+
+
+def another_gait(one: Summary, summary: Summary) -> bool:
+    """Whether one set of equations has a gait that is told from another one's by the digits that are shown."""
+    if "state" not in one:
+        return False
+    return any(fixed(a, 6) != fixed(b, 6) for a, b in zip(one["state"], summary["state"], strict=True))
 
 
 def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]:
