@@ -44,7 +44,7 @@ def plot(results: Results) -> Figure:
     else:
         draw_pads(axes, sticks, pads)
         more = [Patch(label=name, **pad_look(leg)) for leg, name in enumerate(PAD_NAMES)]
-    legend_above(figure, [*entries(), *more])
+    legend_above(figure, [*entries(sticks), *more])
     return figure
 
 
