@@ -169,7 +169,10 @@ def setting(one: Distance) -> dict[str, Any]:
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:
-    """Parts of the difference in period, each from switching one thing off while the others stay."""
+    """Parts of the difference in period, each from switching one thing off while the others stay.
+
+    What is left is what they do together, and creep too where its limit was not reached.
+    """
     total = found.contact_period - found.rigid_period
     farthest = found.series[found.walked[-1]]
     parts: dict[str, float] = {}
@@ -179,10 +182,10 @@ def causes(found: LimitFindings) -> dict[str, Any]:
         parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL][-1].period
     if found.series.get(ALL_POINT):
         parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT][0].period
+    parts["rest_s" if found.without_creep is None else "together_s"] = total - sum(parts.values())
     return {
         "total_s": total,
         **parts,
-        "together_s": total - sum(parts.values()),
         "creep_uncertainty_s": None if found.without_creep is None else found.without_creep.uncertainty,
         "left_with_all_off_s": farthest[-1].period_error if farthest else None,
     }
