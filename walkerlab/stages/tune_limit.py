@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.comparison import Motion
+from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait
@@ -103,7 +105,10 @@ def limit_findings(
     if walk.samples is None or walk.steps == 0:
         return None
     legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
-    motion = Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes)
+    strikes = np.zeros(0) if walk.knee_strikes is None else walk.knee_strikes
+    motion = sampled_at_step_ends(
+        Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes, strikes)
+    )
     limit = Limit(
         scene.ground,
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
