@@ -110,8 +110,8 @@ class Motion:
 def sampled_at_step_ends(motion: Motion) -> Motion:
     """The motion with a sample at the end of every step, and on either side of every knee strike.
 
-    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after. A
-    compliant impact, or an ideal lock, takes less than the time between samples: interpolating across it would smear it.
+    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after.
+    A compliant impact or an ideal lock takes less than the time between samples: interpolating across would smear it.
     """
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
