@@ -406,6 +406,11 @@ def is_plain_compass(walker: Any) -> bool:
     return bool(walker.type == "compass" and walker.torso is None)
 
 
+def is_the_papers(walker: Any) -> bool:
+    """Whether this is the paper's own walker, to its last number."""
+    return bool(walker == CompassWalker())
+
+
 def too_light_for_contact(walker: Any) -> str:
     """Why a walker cannot stand on compliant ground; empty if it can."""
     share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
