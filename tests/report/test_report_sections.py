@@ -30,6 +30,7 @@ from walkerlab.report.blocks import PAPER, Code, Findings, Paragraph, Player, Se
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.sections import assumptions
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.tracks import Track, slip_since_touch
@@ -392,3 +393,10 @@ def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
     results = Results(config(), {"fixedpoint": stored_gaits})
     heads = [[one.title for one in found_gaits(results, sets, COORDINATES).bodies] for sets in (["corrected"], [*SETS])]
     assert heads == [[""], ["as printed", "corrected"]]
+
+
+def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
+    walk = simulate()
+    walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
+    made = assumptions.section(Results(config("contact=null"), {"simulate": walk}))
+    assert "The stance foot does not slip: needs friction (0.203)" in made.finding

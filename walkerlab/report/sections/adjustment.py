@@ -149,7 +149,7 @@ def reached(summary: Summary) -> str:
         return (
             f"To differ from the rigid walk by no more than {claim} rad in phase instead of {differ} takes {contact}."
         )
-    left = quantity(last["angle_error_rad"], "rad", 2)
+    left = quantity(last["angle_error_rad"], "rad", 3)
     return f"With {contact}, the angles still differ by {left} in phase instead of {differ}: {claim} is not reached."
 
 
