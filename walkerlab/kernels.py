@@ -49,7 +49,9 @@ SELDOM = (100_000, 50, 100)
 F = TypeVar("F", bound=Callable[..., Any])
 
 watchers: list[Callable[[str], None]] = []
-"""Told the name of the kernel that this process begins to compile, or waits for, and '' once it is there."""
+"""Told the name of the kernel that this process compiles, or waits for, and '' once none is."""
+compiling: list[str] = []
+"""The kernels that this process is compiling, each called by the one before it."""
 
 
 PACKAGE = Path(__file__).parent
@@ -205,6 +207,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         found = super().load_overload(signature, context)
         if found is None:
             self._held[str(signature)] = lock
+            compiling.append(self._kernel)
         else:
             _finished(lock)
         return found
@@ -215,7 +218,10 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
             with _lock(self._kernel):  # one index for all signatures
                 super().save_overload(signature, data)
         finally:
-            _finished(self._held.pop(str(signature), None))
+            lock = self._held.pop(str(signature), None)
+            if lock is not None:
+                compiling.remove(self._kernel)
+            _finished(lock)
 
 
 def _lock(name: str) -> Any:
@@ -227,11 +233,11 @@ def _lock(name: str) -> Any:
 
 
 def _finished(lock: Any) -> None:
-    """Give a kernel's lock back, if it was held, and say that it is there."""
+    """Give a kernel's lock back, if it was held, and say which one is compiled on: the one that called it, or none."""
     if lock is not None:
         lock.release()
     for tell in watchers:
-        tell("")
+        tell(compiling[-1] if compiling else "")
 
 
 @contextlib.contextmanager

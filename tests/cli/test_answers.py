@@ -3,7 +3,7 @@
 import pytest
 
 from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
-from walkerlab.cli.text import aligned, described_summary, width
+from walkerlab.cli.text import COLUMNS, aligned, described_summary, width
 from walkerlab.hybrid.outcome import Outcome
 
 GAIT = {
@@ -33,6 +33,11 @@ def row(lines, head):
     return found.removeprefix(head).split()
 
 
+def cells(lines):
+    """The words of each line."""
+    return [line.split() for line in lines]
+
+
 def test_multipliers_are_written_as_complex_numbers():
     lines = answer("fixedpoint", GAIT)
     assert row(lines, "multiplier 1") == ["0.3633", "+", "0.4596i"]
@@ -41,18 +46,24 @@ def test_multipliers_are_written_as_complex_numbers():
 
 
 def test_what_is_right_is_named_only_beside_what_is_misprinted():
-    assert answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}})[2].split() == ["value", "unit"]
+    assert ["value", "unit"] in cells(answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}}))
     printed = {**GAIT, "equations": "as-printed"}
-    assert answer("fixedpoint", printed)[2].split() == ["as", "printed", "unit"]
+    assert ["as", "printed", "unit"] in cells(answer("fixedpoint", printed))
 
 
 def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
     printed = {**GAIT, "equations": "as-printed", "state": [-0.2022, 0.1674, -0.6006, -0.8466]}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert lines[0].startswith("On a slope of 0.0174 rad (0.997°) there is a stable gait")
-    assert lines[2].split() == ["corrected", "as", "printed", "unit"]
-    assert lines[3].split() == ["θ₁", "−0.204200", "−0.202200", "rad"]
+    assert ["corrected", "as", "printed", "unit"] in cells(lines)
+    assert row(lines, "θ₁") == ["−0.204200", "−0.202200", "rad"]
     assert "0.70360123456789" not in "\n".join(lines)
+
+
+def test_a_misprint_that_makes_no_difference_has_no_column():
+    printed = {**GAIT, "equations": "as-printed", "energy_drift_J": 1e-15}
+    lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
+    assert ["value", "unit"] in cells(lines)
 
 
 def test_a_walker_with_more_angles_has_its_own_names():
@@ -117,7 +128,8 @@ def test_a_stage_that_came_to_nothing_has_nothing_to_tell(stage):
 def test_families_are_told_in_sentences_with_their_bifurcations():
     branch = {"model": "rigid", "period": 1, "stable_ranges": [[1.0, 4.0]]}
     flip = {"kind": "flip", "model": "rigid", "period": 1, "value": 4.0, "multiplier": [-1.0, 0.0]}
-    found = {"branches": [branch, branch], "bifurcations": [flip], "cascades": [], "attractors": [], "lyapunov": []}
+    none = {"cascades": [], "attractors": [], "lyapunov": []}
+    found = {"branches": [branch, branch], "bifurcations": [flip], "first_doubling": {"rigid": 4.0}, **none}
     lines = answer("continuation", found | {"over": "slope_deg", "unit": "deg"})
     assert lines[0] == "2 branches of gaits over slope."
     assert lines[1].replace("\u00a0", " ") == "The rigid model's gait of one step is stable from 1 deg to 4 deg."
@@ -130,7 +142,7 @@ def test_engines_are_told_by_what_was_concluded():
         "versions": {"drake": "1.5"},
         "conclusions": {"kneed": {"own-law": "Closest.", "same-law": ""}},
     }
-    assert answer("engines", summary) == ["1 run in drake 1.5.", "", "kneed, own-law: Closest."]
+    assert answer("engines", summary) == ["1 run in drake 1.5.", "kneed, own-law: Closest."]
 
 
 def test_how_far_a_start_may_change_is_told_in_signs():
@@ -158,13 +170,39 @@ def test_columns_line_up_under_letters_with_dots():
     assert width(first) == width(second) == 5
 
 
-def test_the_verdict_of_a_run_is_three_lines():
+def test_the_verdict_of_a_run_is_three_paragraphs():
     numbers = {"verdicts": {"reproduced": 3, "explained": 1}, "paper_numbers": []}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
+    judged = "5 of 5 extreme cases and known problems ended as expected."
+    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", "Of 4 numbers that the paper prints,")
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
-    assert len(said) == 3
-    assert said[1] == "The rigid model walks all 20000 steps."
-    assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [
-        "5 of 5 extreme cases and known problems ended as expected."
-    ]
-    assert said[2].startswith("Of 4 numbers that the paper prints, 3 are reproduced and 1 is explained.")
+    assert [head for line in said for head in begun if line.startswith(head)] == [*begun]
+    assert " ".join(said).endswith(f"1 is explained. {judged}")
+    assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [judged]
+
+
+LONG = "word " * 60
+SAYS_MUCH = {
+    "fixedpoint": {"slope_rad": 0.3, "reason": LONG},
+    "simulate": WALK | {"outcome": "fell", "advice": LONG},
+    "tune": {
+        "adjustment": {"needed": True, "found": False, "reason": LONG},
+        "gait": {"found": False, "reason": "none"},
+        "map": {"walks_share": 0.0, "cells": 4},
+    },
+    "accuracy": {"rows": [], "best": {"rigid": {"1e-6": "dop853"}}, "conclusions": {"rigid": LONG}},
+    "stability": {
+        "passed": 0,
+        "failed": 1,
+        "cases": [{"family": "start", "name": "slow", "outcome": "fell", "ok": False, "note": LONG}],
+        "known": [],
+    },
+    "engines": {"rows": [], "versions": {"drake": "1.5"}, "conclusions": {"kneed": {"own-law": LONG}}},
+}
+
+
+@pytest.mark.parametrize("stage", SAYS_MUCH)
+def test_whatever_stage_speaks_its_paragraphs_have_lines_of_one_length(stage):
+    lines = answer(stage, SAYS_MUCH[stage])
+    assert sum(line.count("word") for line in lines) == 60
+    assert max(map(len, lines)) <= COLUMNS

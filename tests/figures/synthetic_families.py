@@ -83,6 +83,7 @@ def families(curves=True):
              "stable_ranges": [[FLIP, END]], "ends": []},
         ],
         "bifurcations": [{"kind": "flip", "period": 1, "value": FLIP, "multiplier": [-1.0, 0.0], "model": "rigid"}],
+        "first_doubling": {"rigid": FLIP},
         "lyapunov": [{"model": "rigid", "value": 4.7, "exponent": 0.2, "uncertainty": 0.01}],
         "cascades": [],
         "limits": [],

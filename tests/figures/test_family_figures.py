@@ -7,7 +7,6 @@ from synthetic_families import END, FLIP, families
 from walkerlab.figures import figure_13, figure_14, figure_16
 from walkerlab.figures.bifurcation_diagram import MODELS, STYLES, curve_of
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.first_doubling import first_doubling
 
 FIGURES = [figure_13.FIGURE, figure_14.FIGURE, figure_16.FIGURE]
 
@@ -53,15 +52,6 @@ def test_the_captions_say_where_gaits_change():
     assert "first doubles its period at 4 deg" in figure_13.FIGURE.caption(results)
     assert "a flip at 4." in figure_14.FIGURE.caption(results)
     assert figure_16.FIGURE.caption(results).startswith("Curves of flips of the rigid model's gaits")
-
-
-def test_the_gait_that_walks_doubles_its_period_first_where_it_ceases_to_be_stable():
-    found = families()["continuation"].summary
-    unstable = {"model": "rigid", "period": 1, "stable_ranges": []}
-    flips = [*found["bifurcations"], {**found["bifurcations"][0], "value": 1.5}]
-    more = {**found, "branches": [*found["branches"], unstable], "bifurcations": flips}
-    assert first_doubling(more, "rigid") == FLIP
-    assert first_doubling(more, "contact") is None
 
 
 def test_the_plane_is_shaded_by_what_walks_settle_on():

@@ -1,5 +1,7 @@
 """The geometry of the stick diagrams: legs keep their length, feet stand where they stand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -7,6 +9,7 @@ from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact
 
 from walkerlab.figures import figure_02, figure_06
 from walkerlab.figures.canvas import styled
+from walkerlab.figures.stick_diagram import entries, stick_diagram
 from walkerlab.figures.style import LEGS
 
 ROUNDING = 1e-12
@@ -51,6 +54,20 @@ def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
     assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
     assert sticks.time[between].max() == sticks.time[-1]
     assert "not completed" in figure_02.FIGURE.caption(results)
+
+
+def test_the_slope_is_told_above_the_torso_which_has_a_name():
+    bare = figure_02.sticks_of(rigid_alone())
+    sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
+    with styled():
+        figure, axes = stick_diagram(sticks)
+        figure.draw_without_rendering()
+    (label,) = [text for text in axes.texts if text.get_text().startswith("walking direction")]
+    bottom = axes.transData.inverted().transform(label.get_window_extent())[0, 1]
+    assert bottom > sticks.in_plane(sticks.head)[:, 1].max()
+    assert axes.get_ylim()[1] > axes.transData.inverted().transform(label.get_window_extent())[1, 1]
+    assert "torso" in [entry.get_label() for entry in entries(sticks)]
+    assert "torso" not in [entry.get_label() for entry in entries(bare)]
 
 
 def drawn(figure, results):

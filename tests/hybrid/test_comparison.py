@@ -6,7 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.distance import directed_hausdorff
 
 from walkerlab.hybrid.comparison import (
+    IMPACT_PHASE,
     Motion,
+    between_impacts,
     difference_in_phase,
     difference_in_time,
     hausdorff,
@@ -156,3 +158,29 @@ def test_distance_of_polylines_is_that_of_their_points_when_they_are_dense():
 def test_phase_plane_has_angle_and_velocity_of_the_leg():
     motion = walk()
     assert_allclose(phase_plane(motion, 1), np.column_stack((motion.angle[:, 1], motion.velocity[:, 1])))
+
+
+def locking(at, interval=0.003):
+    """A walk of one step whose velocity jumps from -1 to 1 at a knee strike between samples."""
+    time = np.append(np.arange(0.0, 1.0, interval), 1.0)
+    angle, velocity = np.abs(time - at), np.sign(time - at)
+    return Motion(
+        time, np.column_stack((angle, angle)), np.column_stack((velocity, velocity)), time[-1:], np.array([at])
+    )
+
+
+def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
+    motion = sampled_at_step_ends(locking(0.5005))
+    times = np.linspace(0.49, 0.51, 400)
+    angle, velocity = motion.at(times)
+    assert_allclose(angle[:, 0], np.abs(times - 0.5005), atol=1e-9)
+    assert_allclose(velocity[:, 0], np.where(times < 0.5005, -1.0, 1.0), atol=1e-9)
+
+
+def test_knees_that_lock_a_moment_apart_are_no_difference_between_impacts():
+    one, other = (sampled_at_step_ends(locking(at)) for at in (0.5045, 0.5155))
+    apart = difference_in_phase(one, other, PHASES)
+    smooth = between_impacts(one, other, PHASES)
+    assert apart.largest_velocity.max() == pytest.approx(2.0)
+    assert np.abs(apart.velocity[smooth]).max() < 1e-9
+    assert (~smooth).sum() == (PHASES < IMPACT_PHASE).sum() + ((PHASES >= 0.5045) & (PHASES <= 0.5155)).sum()

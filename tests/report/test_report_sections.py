@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from synthetic_results import (
+    COORDINATES,
     EVERYTHING,
     LENGTH,
     PAPER_ROWS,
     PERIOD,
     SLOPE,
+    column,
     compare,
     config,
     contact_sim,
@@ -23,13 +25,16 @@ from synthetic_results import (
     stored,
 )
 
+from walkerlab.config.loader import load
 from walkerlab.report.blocks import PAPER, Code, Findings, Paragraph, Player, Section, Shares, Table
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
-from walkerlab.report.sections.gaits import coordinate
+from walkerlab.report.sections import assumptions
+from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.tracks import Track, slip_since_touch
+from walkerlab.store.content import Group, Variable
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
@@ -361,3 +366,37 @@ def test_the_paragraph_under_the_title_names_config_change_slope_and_equations()
     said = plain(" ".join(lead(Results(config("slope_deg=3", "equations=as-printed")), "paper@slope_deg=3")))
     for part in ("Config paper", "changed by slope_deg=3", "0.05236 rad (3°)", "as the paper prints them", "2 strides"):
         assert part in said
+
+
+def test_the_paragraph_under_the_title_lists_what_a_walker_has():
+    torso = {"mass_kg": 0.5, "above_hip_m": 0.2}
+    kneed, compass = (load(Path(name)).config for name in ("kneed", "torso"))
+    said = plain(" ".join(lead(Results(load(Path("kneed"), [f"walker.torso={torso}"]).config), "kneed")))
+    assert "a walker with kneed legs of 1 m, point feet and a torso of 0.5 kg, 2.1 kg in all, on a slope of" in said
+    said = plain(" ".join(lead(Results(compass), "torso")))
+    assert "legs of 1 m and 5 kg each, a hip of 5 kg and a torso of 5 kg, on a slope of 0.0174 rad (0.997°). It" in said
+    assert "torso" not in " ".join(lead(Results(kneed), "kneed"))
+
+
+def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
+    gaits = Group(
+        {
+            "period_s": column([0.6, 0.7], "gait"),
+            "step_length_m": column([0.3, 0.4], "gait"),
+            "state": Variable(np.zeros((2, 4)), ("gait", "coordinate"), "rad", "state"),
+            "spectral_radius": column([2.0, 0.5], "gait"),
+            "stable": column([False, True], "gait"),
+        },
+        {"chosen": 1},
+    )
+    stored_gaits = stored("fixedpoint", {"corrected/gaits": gaits, "as-printed/gaits": gaits})
+    results = Results(config(), {"fixedpoint": stored_gaits})
+    heads = [[one.title for one in found_gaits(results, sets, COORDINATES).bodies] for sets in (["corrected"], [*SETS])]
+    assert heads == [[""], ["as printed", "corrected"]]
+
+
+def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
+    walk = simulate()
+    walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
+    made = assumptions.section(Results(config("contact=null"), {"simulate": walk}))
+    assert "The stance foot does not slip: needs friction (0.203)" in made.finding

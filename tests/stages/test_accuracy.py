@@ -12,6 +12,7 @@ from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
 from walkerlab.labels import labels_of
 from walkerlab.scene.rigid import compass, rigid_walker
+from walkerlab.stages import accuracy
 from walkerlab.stages.accuracy import best_methods, conclusion, summary_of
 from walkerlab.store.columns import rows_group
 
@@ -182,3 +183,8 @@ def test_a_walk_that_ends_early_has_no_reference():
     lying = replace(TRIAL, start=(-1.6, 1.6, 0.0, 0.0))
     with pytest.raises((WalkEndsError, ValueError)):
         reference_for(lying)
+
+
+def test_a_walk_that_ends_early_is_said_to_start_off_the_gait():
+    entry = accuracy.without(RigidTrial(None, None, 1, None), WalkEndsError("the walk ends early (fell)"))
+    assert entry["why"] == "from 0.98 of the start's velocities the walk ends early (fell)"

@@ -2,6 +2,7 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
+from walkerlab.stages.continuation_results import first_doubling
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -57,6 +59,24 @@ def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_de
         assert 3.0 <= one["value"] <= 5.0
     for one in said["lyapunov"]:
         assert set(one) >= {"value", "exponent", "uncertainty"}
+
+
+def test_the_summary_has_where_the_gait_that_walks_first_doubles_its_period(in_degrees):
+    said = in_degrees.summary
+    (walks,) = [branch for branch in said["branches"] if branch["period"] == 1 and branch["stable_range"]]
+    assert said["first_doubling"] == {"rigid": walks["stable_range"][1]}
+
+
+def test_a_flip_of_a_gait_that_is_unstable_on_both_sides_is_no_first_doubling():
+    walks = SimpleNamespace(period=1, stable_ranges=((1.0, 4.0),), bifurcations=(flip_at(4.0),))
+    unstable = SimpleNamespace(period=1, stable_ranges=(), bifurcations=(flip_at(1.5),))
+    doubled = SimpleNamespace(period=2, stable_ranges=((2.0, 3.0),), bifurcations=(flip_at(3.0),))
+    assert first_doubling((unstable, doubled, walks)) == 4.0
+    assert first_doubling((unstable, doubled)) is None
+
+
+def flip_at(value):
+    return SimpleNamespace(kind="flip", value=value)
 
 
 def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_degrees):

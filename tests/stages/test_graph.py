@@ -12,7 +12,7 @@ from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
-from walkerlab.config.reads import dotted_keys, only
+from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_keys, only
 from walkerlab.config.schema import Config
 from walkerlab.stages.graph import PIPELINE, STAGES, Graph, Stage, results_of
 from walkerlab.stages.plan import config_slice
@@ -73,6 +73,15 @@ def test_a_change_of_the_paper_config_changes_the_keys_of_the_cases_that_stand_o
     monkeypatch.setattr(files, "BUILTIN_FOLDER", tmp_path)
     after = config_slice(config, PIPELINE[stage])
     assert list(differences("", before, after)) == ["paper.walker.hip_mass_kg 10.0 -> 11.0"]
+
+
+def test_the_papers_cases_are_judged_for_the_papers_own_walker_alone():
+    stability = PIPELINE["stability"]
+    takes = {name: stability.takes_under(load(Path(name)).config) for name in ("paper", "simplest", "torso", "kneed")}
+    assert takes.pop("paper") is CompassCasesConfig
+    assert set(takes.values()) == {SceneCasesConfig}
+    assert stability.takes_under(load(sets=["slope_deg=3"]).config) is CompassCasesConfig
+    assert stability.takes_under(load(sets=["walker.hip_mass_kg=9"]).config) is SceneCasesConfig
 
 
 def test_the_fixed_stages_are_there_in_order():

@@ -156,6 +156,13 @@ def test_without_contact_block_the_stage_refuses_and_drawings_leave_it_out(toy):
     assert not (report.run_dir / "bounce.h5").exists()
 
 
+def test_a_walker_that_can_have_no_contact_is_not_advised_to_add_some(toy):
+    with pytest.raises(ConfigError, match="next to no mass") as refused:
+        toy.execute("bounce", config="simplest")
+    assert refused.value.exit_code == 3
+    assert "Add" not in refused.value.advice
+
+
 def test_no_answer_is_kept_with_what_was_found_and_told_again(toy):
     first = toy.execute("drop", STEEP)
     again = toy.execute("drop", STEEP)

@@ -1,6 +1,7 @@
 """The adjustment: not needed on the paper's contact, found where it is, and words where there is none."""
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
+from walkerlab.orbits.rigid_limit import ALL, NORMAL, Distance, Extrapolation, Setting
 from walkerlab.report.blocks import Findings
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
 from walkerlab.stages import fixedpoint, tune
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.tune_limit import LimitFindings, causes
 
 
 @functools.cache
@@ -167,10 +170,43 @@ def test_the_page_tells_of_the_kneed_adjustment_in_its_own_words():
     assert "link" not in made.finding
 
 
-def test_the_page_names_a_shanks_angle_as_such():
-    (starts,) = (
-        block
-        for block in adjustment.section(Results(load(Path("kneed")).config, {"tune": kneed()})).blocks
-        if getattr(block, "caption", "").startswith("The start before")
+def tables_of(summary):
+    made = adjustment.section(Results(load(Path("kneed")).config, {"tune": replace(kneed(), summary=summary)}))
+    return {block.caption: block for block in made.blocks if hasattr(block, "caption")}
+
+
+def test_a_start_that_stays_as_it_is_has_no_table_of_before_and_after():
+    assert not {"The start before and after the adjustment", "The procedure, walk by walk"} & set(
+        tables_of(kneed().summary)
     )
-    assert [row[0].text for row in starts.bodies[0].rows][2] == "θ₁, shank (rad)"
+
+
+def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_there():
+    row = kneed().summary["table2"]["dtheta_2"]
+    changed = kneed().summary | {
+        "adjustment": kneed().summary["adjustment"] | {"needed": True},
+        "table2": kneed().summary["table2"] | {"dtheta_torso": row},
+    }
+    tables = tables_of(changed)
+    names = [row[0].text for row in tables["The start before and after the adjustment"].bodies[0].rows]
+    assert (names[2], names[-1]) == ("θ₁, shank (rad)", "θ̇, torso (rad/s)")
+    walks = [row[0].text for row in tables["The procedure, walk by walk"].bodies[0].rows]
+    assert walks == ["from the rigid state", "from the adjusted start"]
+
+
+def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together():
+    limit = LimitFindings((ALL,), 0.7, 0.71, {ALL: [], NORMAL: [at_period(0.712)]}, None)
+    told = causes(limit)
+    assert "together_s" not in told
+    assert told["rest_s"] == pytest.approx(0.012)
+    said = adjustment.caused({"causes": told}).replace("\u00a0", " ")
+    assert said.startswith(
+        "Its period differs from the rigid gait's by 10 ms. With each cause switched off alone, −2 ms"
+    )
+    assert "12 ms (120 %) from creep in the friction law and what they do together, which could not" in said
+    told = causes(replace(limit, without_creep=Extrapolation(0.701, 1e-6)))
+    assert told["together_s"] == pytest.approx(0.003)
+
+
+def at_period(period):
+    return Distance(Setting(NORMAL, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.cli.text import aligned, described_summary
+from walkerlab.cli.text import aligned, described_summary, paragraph
 from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.report.gait_diagram import parameter
 from walkerlab.report.numbers import count, fixed, length, listed, number, quantity, told_apart
-from walkerlab.report.outcomes import LOOKED_FORWARD_TO, ends, walks
+from walkerlab.report.outcomes import LOOKED_FORWARD_TO, MODELS, ends, walks
 from walkerlab.report.sections.basin import shares
 from walkerlab.report.sections.families import findings as families
 from walkerlab.report.sections.gaits import STATE, complex_number, heads_of, multiplier, symbol
@@ -21,10 +20,10 @@ from walkerlab.report.sections.models import CHANNELS
 from walkerlab.report.symbols import in_signs
 
 Summary = Mapping[str, Any]
-Answer = Callable[[Summary], list[str]]
+Rows = Sequence[Sequence[str]]
+Answer = Callable[[Summary], list[str | Rows]]
+"""Paragraphs, and rows of tables."""
 
-COLUMNS = 100
-"""Width of a paragraph, in characters."""
 SHOWN = 6
 """So many of a long row of numbers are shown."""
 
@@ -36,10 +35,23 @@ def answer(stage: str, summary: Summary) -> list[str]:
     """
     if not summary:
         return []
-    return ANSWERS[stage](summary) if stage in ANSWERS else list(described_summary(summary, short=True))
+    return laid_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(described_summary(summary, short=True))
 
 
-def fixedpoint(summary: Summary) -> list[str]:
+def laid_out(blocks: Iterable[str | Rows]) -> list[str]:
+    """Paragraphs in lines, and tables in columns with an empty line before and after them."""
+    lines: list[str] = []
+    after_table = False
+    for block in blocks:
+        table = not isinstance(block, str)
+        if block:
+            lines += [""] if lines and (table or after_table) else []
+            lines += paragraph(block) if isinstance(block, str) else aligned(block)
+            after_table = table
+    return lines
+
+
+def fixedpoint(summary: Summary) -> list[str | Rows]:
     """The gait under both sets of equations, side by side."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
@@ -49,13 +61,19 @@ def fixedpoint(summary: Summary) -> list[str]:
         f"On a slope of {slope} there is {stable}: steps of {fixed(summary['step_length_m'], 4)} m "
         f"in {fixed(summary['period_s'], 4)} s; the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
     )
-    sets = summary.get("equation_sets", {})
-    shown = {name: found for name, found in sets.items() if "state" in found} or {summary["equations"]: summary}
-    first = [summary["equations"], *(name for name in shown if name != summary["equations"])]
+    others = {name: one for name, one in summary.get("equation_sets", {}).items() if another_gait(one, summary)}
     names = summary.get("state_names", STATE)
-    rows = [["", *heads_of(first), "unit"], *gait_rows(names, [shown[name] for name in first])]
+    heads = heads_of([summary["equations"], *others])
+    rows = [["", *heads, "unit"], *gait_rows(names, [summary, *others.values()])]
     found = f"{count(summary['gaits_found'], 'gait')} of one step found."
-    return [head, "", *aligned(rows), "", found]
+    return [head, rows, found]
+
+
+def another_gait(one: Summary, summary: Summary) -> bool:
+    """Whether one set of equations has a gait that is told from another one's by the digits that are shown."""
+    if "state" not in one:
+        return False
+    return any(fixed(a, 6) != fixed(b, 6) for a, b in zip(one["state"], summary["state"], strict=True))
 
 
 def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]:
@@ -93,10 +111,10 @@ def unit_of(key: str) -> str:
     return "" if unit == "1" else unit
 
 
-def walk(model: str, summary: Summary) -> list[str]:
-    """How a walk of the rigid or the contact model went, step by step."""
+def walk(model: str, summary: Summary) -> list[str | Rows]:
+    """How a model's walk went, step by step."""
     steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
-    head = f"The {model} model {walks(steps, summary['outcome'])}"
+    head = f"The {model} {walks(steps, summary['outcome'])}"
     if periods:
         head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
     rows = [["step", *map(str, shown_places(steps)), ""]] if steps else []
@@ -106,11 +124,8 @@ def walk(model: str, summary: Summary) -> list[str]:
     if summary.get("slips_m"):
         rows.append(["slip", *elided([fixed(1e3 * value, 2) for value in summary["slips_m"]]), "mm"])
     own = [[words, said] for words, said in walk_measures(summary) if said]
-    advice = (
-        [f"advice: {summary['advice']}"] if summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO else []
-    )
-    steps_taken = ["", *aligned(rows)] if rows else []
-    return [f"{head}.", *steps_taken, "", *aligned(own), *advice]
+    advised = summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO
+    return [f"{head}.", rows, own, f"advice: {summary['advice']}" if advised else ""]
 
 
 def walk_measures(summary: Summary) -> list[tuple[str, str]]:
@@ -149,7 +164,7 @@ def elided(values: Sequence[Any]) -> list[Any]:
     return [*values[:SHOWN], "…", *values[-2:]]
 
 
-def tune(summary: Summary) -> list[str]:
+def tune(summary: Summary) -> list[str | Rows]:
     """Whether other initial velocities are needed, and what the contact model's own gait is."""
     change, gait, cells = summary["adjustment"], summary["gait"], summary["map"]
     if not change["needed"]:
@@ -173,10 +188,10 @@ def tune(summary: Summary) -> list[str]:
     for name, margin in change.get("margins", {}).items():
         beyond = f"; beyond: {margin['beyond']}" if margin["beyond"] else ", as far as searched"
         rows.append([in_signs(name), f"walks to a factor of {number(margin['factor'], 4)}{beyond}"])
-    return [head, "", *aligned(rows)]
+    return [head, rows]
 
 
-def compare(summary: Summary) -> list[str]:
+def compare(summary: Summary) -> list[str | Rows]:
     """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
     if "verdicts" not in summary:
         return models_compared(summary)
@@ -191,10 +206,10 @@ def compare(summary: Summary) -> list[str]:
         [*(row[key] for key in about), *(number(row[key]) for key in columns), row["unit"], row["verdict"]]
         for row in summary["paper_numbers"]
     ]
-    return [f"{head}.", "", *aligned(rows)]
+    return [f"{head}.", rows]
 
 
-def models_compared(summary: Summary) -> list[str]:
+def models_compared(summary: Summary) -> list[str | Rows]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
     steps, outcomes = summary["steps"], summary["outcomes"]
     rows = [["last step", "period (s)", "length (m)", "outcome"]]
@@ -206,10 +221,10 @@ def models_compared(summary: Summary) -> list[str]:
     head = f"The rigid model {rigid}, " + (
         "and so does the contact model" if contact == rigid else f"the contact model {contact}"
     )
-    return [f"{head}.", "", *aligned(rows)]
+    return [f"{head}.", rows]
 
 
-def accuracy(summary: Summary) -> list[str]:
+def accuracy(summary: Summary) -> list[str | Rows]:
     """Which method is fastest at which error, a line a scene."""
     rows = [["scene", *(f"at {level}" for level in levels(summary["best"]))]]
     rows += [
@@ -217,7 +232,7 @@ def accuracy(summary: Summary) -> list[str]:
         for scene, best in summary["best"].items()
     ]
     head = f"{len(summary['rows'])} runs measured; the fastest method by the error that is asked for:"
-    return [head, "", *aligned(rows), "", *summary["conclusions"].values()]
+    return [head, rows, *summary["conclusions"].values()]
 
 
 def levels(best: Mapping[str, Mapping[str, str]]) -> list[str]:
@@ -225,7 +240,7 @@ def levels(best: Mapping[str, Mapping[str, str]]) -> list[str]:
     return list(dict.fromkeys(level for scene in best.values() for level in scene))
 
 
-def stability(summary: Summary) -> list[str]:
+def stability(summary: Summary) -> list[str | Rows]:
     """How many cases ended as they should, and those that did not."""
     total = summary["passed"] + summary["failed"]
     head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
@@ -238,32 +253,32 @@ def stability(summary: Summary) -> list[str]:
         for known in summary["known"]
         if not known["ok"]
     ]
-    return [head, "", *aligned(rows), *said]
+    return [head, rows, *said]
 
 
-def continuation(summary: Summary) -> list[str]:
+def continuation(summary: Summary) -> list[str | Rows]:
     """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
     over = parameter(summary)
-    found = [f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {over}."]
+    found = f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {over}."
     rows = [["bifurcation", "model", "steps", with_unit(over, summary["unit"]), "multiplier"]]
     rows += [
         [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), complex_number(*one["multiplier"])]
         for one in summary["bifurcations"]
     ]
-    return [*found, *families(summary), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+    return [found, *families(summary), rows if len(rows) > 1 else []]
 
 
-def basin(summary: Summary) -> list[str]:
+def basin(summary: Summary) -> list[str | Rows]:
     """How much walks, and to what."""
     rows = [["attractor", "cells", "steps to reach it"]]
     rows += [
         [count(row["period"], "step"), str(row["cells"]), number(row.get("median_steps_to_settle"), 3)]
         for row in summary["attractors"]
     ]
-    return [*textwrap.wrap(in_signs(shares(summary).text), COLUMNS), *(["", *aligned(rows)] if len(rows) > 1 else [])]
+    return [in_signs(shares(summary).text), rows if len(rows) > 1 else []]
 
 
-def engines(summary: Summary) -> list[str]:
+def engines(summary: Summary) -> list[str | Rows]:
     """What was concluded of each scene; every run is in `show`."""
     told = [
         f"{scene}, {experiment}: {text}"
@@ -272,24 +287,23 @@ def engines(summary: Summary) -> list[str]:
         if text
     ]
     ran = listed(f"{name} {version}" for name, version in summary["versions"].items())
-    return [f"{count(len(summary['rows']), 'run')} in {ran}.", "", *told]
+    return [f"{count(len(summary['rows']), 'run')} in {ran}.", *told]
 
 
-def plot(summary: Summary) -> list[str]:
+def plot(summary: Summary) -> list[str | Rows]:
     """The figures."""
     figures = summary["figures"]
-    return [f"{count(len(figures), 'figure')} drawn.", "", *(f"{one['svg']}  {one['title']}" for one in figures)]
+    return [f"{count(len(figures), 'figure')} drawn.", [[one["svg"], one["title"]] for one in figures]]
 
 
-def report(summary: Summary) -> list[str]:
+def report(summary: Summary) -> list[str | Rows]:
     """What is on the page."""
     return [f"The page has {count(len(summary['figures']), 'figure')} and {count(len(summary['tables']), 'table')}."]
 
 
 ANSWERS: dict[str, Answer] = {
     "fixedpoint": fixedpoint,
-    "simulate": partial(walk, "rigid"),
-    "contact-sim": partial(walk, "contact"),
+    **{stage: partial(walk, model.lower()) for stage, model in MODELS.items()},
     "tune": tune,
     "compare": compare,
     "accuracy": accuracy,
@@ -303,17 +317,15 @@ ANSWERS: dict[str, Answer] = {
 
 
 def verdict(results: Mapping[str, Summary]) -> list[str]:
-    """What a whole run has found, in three lines at most: the gait, both walks, and what of the paper holds."""
-    lines = []
-    if "fixedpoint" in results:
-        lines.append(fixedpoint(results["fixedpoint"])[0])
-    models = [(words, results[name]) for name, words in WALKS.items() if name in results]
-    said = [f"the {words} model {walks(one['steps'], one['outcome'])}" for words, one in models]
-    if said:
-        lines.append(f"{'; '.join(said)}."[:1].upper() + f"{'; '.join(said)}."[1:])
-    last = [compare(results["compare"])[0]] if "verdicts" in results.get("compare", {}) else []
-    last += [stability(results["stability"])[0]] if "stability" in results else []
-    return [*lines, " ".join(last)] if last else lines
+    """What a whole run has found, in three paragraphs at most: the gait, both walks, and what of the paper holds."""
+    walked = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
+    said = "; the ".join(f"{model} {walks(one['steps'], one['outcome'])}" for model, one in walked)
+    of_the_paper = "verdicts" in results.get("compare", {})
+    judged = [*(["compare"] if of_the_paper else []), *(["stability"] if "stability" in results else [])]
+    gait = headline("fixedpoint", results) if "fixedpoint" in results else ""
+    return laid_out([gait, f"The {said}." if said else "", " ".join(headline(stage, results) for stage in judged)])
 
 
-WALKS = {"simulate": "rigid", "contact-sim": "contact"}
+def headline(stage: str, results: Mapping[str, Summary]) -> str:
+    """What the answer of a stage begins with."""
+    return str(ANSWERS[stage](results[stage])[0])

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from walkerlab.errors import StaleError
-from walkerlab.report.outcomes import CONTACT, RIGID
+from walkerlab.report.outcomes import MODELS
 from walkerlab.stages.runs import run_named
 
 PAGE = "report.html"
-WALKS = (CONTACT, RIGID)
-"""Stages that walk; the first that a run has is shown."""
 
 
 def page_of(run: Path, runs: Path) -> Path:
@@ -23,5 +21,6 @@ def page_of(run: Path, runs: Path) -> Path:
 
 
 def walk_in(folder: Path) -> str:
-    """The stage whose walk is meant if none is named."""
-    return next((stage for stage in WALKS if (folder / f"{stage}.h5").is_file()), WALKS[0])
+    """The stage whose walk is meant if none is named: the contact model's before the rigid model's."""
+    rigid, contact = MODELS
+    return rigid if (folder / f"{rigid}.h5").is_file() and not (folder / f"{contact}.h5").is_file() else contact

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 INDENT = "  "
+COLUMNS = 100
+"""Width of a paragraph, in characters."""
 LONGEST_ROW, ENDS = 12, 4
 """Of more values in a row, so many are shown of either end."""
 LONGEST_CELL = 100
@@ -51,6 +54,11 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     long = [key for key in columns if key not in shown]
     lines = aligned([shown, *([cells[key][row] for key in shown] for row in range(len(rows)))])
     return [*lines, f"with --json also: {', '.join(long)}"] if long else lines
+
+
+def paragraph(text: str) -> list[str]:
+    """Prose in lines of equal length at most; no word is cut, however long."""
+    return textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False)
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -139,15 +139,6 @@ class TuneConfig(GroundConfig, Protocol):
     def tune(self) -> schema.Tune: ...
 
 
-class WalkerKind(Protocol):
-    """What tells the paper's compass from other walkers."""
-
-    @property
-    def type(self) -> str: ...
-    @property
-    def torso(self) -> object: ...
-
-
 class OwnCases(Protocol):
     """The config's own cases."""
 
@@ -159,7 +150,7 @@ class CompassCasesConfig(Protocol):
     """What `stability` takes where the walker is the paper's compass: cases stand on the paper's config."""
 
     @property
-    def walker(self) -> WalkerKind: ...
+    def walker(self) -> schema.Walker: ...
     @property
     def stability(self) -> OwnCases: ...
 

@@ -16,7 +16,6 @@ from walkerlab.config.fields import Block, key
 from walkerlab.config.stability import Case, Stability
 from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
-    LIGHTEST_CONTACT,
     CompassWalker,
     Kneed,
     PartsWalker,
@@ -24,6 +23,7 @@ from walkerlab.config.walkers import (
     Walker,
     is_plain_compass,
     rigid_bodies,
+    too_light_for_contact,
 )
 
 __all__ = [
@@ -308,15 +308,10 @@ class Config(Block):
     @classmethod
     def _feet_have_mass(cls, value: Contact | None, info: ValidationInfo) -> Contact | None:
         walker = info.data.get("walker")
-        if value is not None and isinstance(walker, CompassWalker):
-            share = walker.leg_mass_kg / walker.total_mass_kg
-            if share < LIGHTEST_CONTACT:
-                raise PydanticCustomError(
-                    "massless",
-                    "the walker's feet have next to no mass ({share} of the whole): on compliant ground they would "
-                    "have to be infinitely fast; leave the contact block out, or give the legs mass",
-                    {"share": f"{share:.1g}"},
-                )
+        why = "" if value is None or walker is None else too_light_for_contact(walker)
+        if why:
+            advised = "leave the contact block out, or give the legs mass"
+            raise PydanticCustomError("massless", "{why}; {advised}", {"why": why, "advised": advised})
         return value
 
     @field_validator("outputs")

@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.fields import Block, key
+from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
@@ -403,6 +404,33 @@ def rigid_bodies(walker: Any) -> int:
 def is_plain_compass(walker: Any) -> bool:
     """Whether this is the walker of Appendix A."""
     return bool(walker.type == "compass" and walker.torso is None)
+
+
+def is_the_papers(walker: Any) -> bool:
+    """Whether this is the paper's own walker, to its last number."""
+    return bool(walker == CompassWalker())
+
+
+def too_light_for_contact(walker: Any) -> str:
+    """Why a walker cannot stand on compliant ground; empty if it can."""
+    share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
+    if share >= LIGHTEST_CONTACT:
+        return ""
+    return (
+        f"the walker's feet have next to no mass ({share:.1g} of the whole): on compliant ground they would have to be "
+        "infinitely fast"
+    )
+
+
+def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:
+    """What to say where what is asked for needs contact, and the config has none.
+
+    instead  what to do about a block that is missing
+    """
+    why = too_light_for_contact(walker)
+    if why:
+        return ConfigError(f"{asked} needs contact, but {why}.", "Stay with the rigid model, or give the legs mass.")
+    return ConfigError(f"{asked} needs a contact block, and the config has none.", instead)
 
 
 def arc_within(radius: float, longest: float | None, name: str) -> float:

@@ -19,7 +19,7 @@ def plot(results: Results) -> Figure:
     sticks = sticks_of(results)
     figure, axes = stick_diagram(sticks)
     draw_slope(axes, sticks)
-    legend_above(figure, entries())
+    legend_above(figure, entries(sticks))
     return figure
 
 

@@ -44,7 +44,7 @@ def plot(results: Results) -> Figure:
     else:
         draw_pads(axes, sticks, pads)
         more = [Patch(label=name, **pad_look(leg)) for leg, name in enumerate(PAD_NAMES)]
-    legend_above(figure, [*entries(), *more])
+    legend_above(figure, [*entries(sticks), *more])
     return figure
 
 
@@ -76,7 +76,7 @@ def caption(results: Results) -> str:
     result, sticks = results[CONTACT_STAGE], sticks_of(results)
     asked = result.identity.config_slice
     radius = sole_radius(asked["walker"])
-    feet = f"ball feet of {1e3 * radius:.3g} mm radius" if radius else "point feet"
+    feet = f"round feet of {1e3 * radius:.3g} mm radius" if radius else "point feet"
     ground = f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
     if TERRAIN not in result.groups:
         ground = PLANES[asked["contact"]["terrain"]]

@@ -59,7 +59,8 @@ def caption(results: Results) -> str:
     cut, extent = shown(walks)
     means = ", ".join(f"{walk.look.label} {mean_energy(walk):.5g} J" for walk in cut)
     return (
-        f"Kinetic, potential and mechanical energy{extent}. Time mean of the mechanical energy: {means}. "
+        f"Energies of the whole walker{extent}, the potential one from the current stance foot. "
+        f"Time mean of the mechanical energy: {means}. "
         f"{IMPACTS if any(walk.look is CONTACT for walk in walks) else ''}{sentence(walks)}"
     )
 

@@ -19,7 +19,6 @@ from walkerlab.figures.bifurcation_diagram import (
     label_of,
 )
 from walkerlab.figures.canvas import blank, legend_above
-from walkerlab.figures.first_doubling import first_doubling
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Results
 from walkerlab.figures.style import BLACK, GREY
@@ -106,10 +105,10 @@ def caption(results: Results) -> str:
     summary = results[STAGE].summary
     unit = f" {summary['unit']}" if summary["unit"] not in ("", "1") else ""
     said = ["Gaits over the parameter: solid where small disturbances die out, dashed where they grow."]
-    for model in MODELS:
-        first = first_doubling(summary, model)
-        if first is not None:
-            said.append(f"The {model} model's gait of one step first doubles its period at {first:.6g}{unit}.")
+    said += [
+        f"The {model} model's gait of one step first doubles its period at {first:.6g}{unit}."
+        for model, first in summary["first_doubling"].items()
+    ]
     said += [
         f"A cascade of the {cascade['model']} model from {cascade['flips'][0]:.6g}{unit} on accumulates at "
         f"{cascade['accumulates_at']:.6g}{unit}, the last ratio of its flips' distances being "

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from walkerlab.figures.canvas import blank, legend_above, png_of, settle, styled, svg_of
 from walkerlab.figures.style import BLUE, ORANGE
+from walkerlab.figures.walks import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.store.content import Content, Group
 
-WALKS: Final = ("simulate", "contact-sim")
 ROWS: Final = (("angle", "angle (rad)"), ("mechanical_J", "energy (J)"))
 LOOKS: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "linewidth": 1.3},
@@ -24,7 +24,7 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
 
     names  of the runs
     """
-    shown = [stage for stage in WALKS if trajectory(first, stage) and trajectory(second, stage)]
+    shown = [stage for stage in (RIGID_STAGE, CONTACT_STAGE) if trajectory(first, stage) and trajectory(second, stage)]
     if not shown:
         return None
     title = f"{names[0]} and {names[1]}"

@@ -63,6 +63,11 @@ class Sticks:
     head: Array | None = None
 
     @property
+    def top(self) -> Array:
+        """The highest point that is drawn (samples, 2): the torso's end, or the hip."""
+        return self.hip if self.head is None else self.head
+
+    @property
     def leg_length(self) -> float:
         """Largest distance of a foot from the hip (m)."""
         return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
@@ -149,7 +154,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     shown = slice(0, int(max(at_strikes.max(), between.max())) + 1)
     axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
     mark_landings(axes, sticks)
-    show_direction(axes, sticks, sticks.hip[shown])
+    show_direction(axes, sticks, sticks.top[shown])
     return figure, axes
 
 
@@ -157,9 +162,8 @@ def framed(sticks: Sticks) -> tuple[Figure, Axes]:
     """Axes of equal scales that fit the cycle, and a figure that fits the axes."""
     at_strikes, between = sticks.postures()
     rows = np.concatenate((at_strikes, between))
-    seen = [sticks.hip[rows, None], sticks.feet[rows]]
-    seen += [] if sticks.head is None else [sticks.head[rows, None]]
-    points = sticks.in_plane(np.concatenate(seen, axis=1)).reshape(-1, 2)
+    seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
+    points = sticks.in_plane(seen).reshape(-1, 2)
     length = sticks.leg_length
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
@@ -217,7 +221,7 @@ def mark_landings(axes: Axes, sticks: Sticks) -> None:
 
 
 def show_direction(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """An arrow along the slope over the hip's path (samples, 2), and the slope in numbers."""
+    """An arrow along the slope over the path of the walker's highest point (samples, 2), and the slope in numbers."""
     length = sticks.leg_length
     height = path[:, 1].max() + 0.09 * length
     middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
@@ -237,7 +241,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
     axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
 
 
-def entries() -> list[Artist]:
+def entries(sticks: Sticks) -> list[Artist]:
     """Legend entries of the legs and of what else the walker is made of."""
     legs = [
         Line2D([], [], color=look.colour, linestyle=look.style, linewidth=1.6, marker=look.marker, label=look.label)
@@ -246,7 +250,8 @@ def entries() -> list[Artist]:
     strike = Line2D([], [], color=GREY, linewidth=FULL, label="at heel strike")
     between = Line2D([], [], color=GREY, linewidth=FAINT, label="between")
     hip = Line2D([], [], color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0, label="hip")
-    return [*legs, strike, between, hip]
+    torso = [] if sticks.head is None else [Line2D([], [], color=BLACK, linewidth=1.6, label="torso")]
+    return [*legs, strike, between, hip, *torso]
 
 
 def cycle_caption(sticks: Sticks) -> str:
@@ -255,4 +260,5 @@ def cycle_caption(sticks: Sticks) -> str:
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
     measures = ", ".join(f"{period:.4g} s and {length:.4g} m" for period, length in steps)
     unfinished = "" if strikes.size == CYCLE else "; the cycle was not completed"
-    return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down."
+    torso = "" if sticks.head is None else ", the torso up to its centre of mass"
+    return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down{torso}."

@@ -7,7 +7,7 @@ of the orbits does not know of time at all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 Array = NDArray[np.float64]
 
 LEGS = 2
-JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a heel strike
+JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a strike
 PHASES = 401  # samples of a step
 IMPACT_PHASE = 0.02  # of a step: by then a compliant impact is over
 FINENESS = 5e-3  # of an orbit's range: how finely orbits are drawn to measure between them
@@ -28,16 +28,18 @@ AT_ONCE = 256  # points of an orbit that are measured at once
 class Motion:
     """The legs of a walk in time, SI units.
 
-    time       (samples,) strictly rising
-    angle      (samples, leg)
-    velocity   (samples, leg)
-    step_ends  (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
+    time          (samples,) strictly rising
+    angle         (samples, leg)
+    velocity      (samples, leg)
+    step_ends     (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
+    knee_strikes  (strikes,) times at which a knee locks and velocities jump; of straight legs, none
     """
 
     time: Array
     angle: Array
     velocity: Array
     step_ends: Array
+    knee_strikes: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def steps(self) -> int:
@@ -80,9 +82,18 @@ class Motion:
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
         """Angles and velocities at phases of a step: 0 just after the impact that began it, 1 just before the next."""
-        start = self.time[0] if step == 0 else self.step_ends[step - 1]
-        end = self.step_ends[step]
+        start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
+
+    def span(self, step: int) -> tuple[float, float]:
+        """When a step begins and ends (s)."""
+        return float(self.time[0] if step == 0 else self.step_ends[step - 1]), float(self.step_ends[step])
+
+    def knee_phases(self, step: int) -> Array:
+        """(strikes,) phases of a step at which a knee locks."""
+        start, end = self.span(step)
+        inside = self.knee_strikes[(self.knee_strikes > start) & (self.knee_strikes < end)]
+        return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
         """The last two completed steps, with both impacts; ValueError if there are not two."""
@@ -93,32 +104,40 @@ class Motion:
         inside = self.time[(self.time > start) & (self.time < end)]
         time = np.concatenate(([start], inside, [end]))
         angle, velocity = self.at(time)
-        return Motion(time, angle, velocity, self.step_ends[-2:])
+        return replace(self, time=time, angle=angle, velocity=velocity, step_ends=self.step_ends[-2:])
 
 
 def sampled_at_step_ends(motion: Motion) -> Motion:
-    """The motion with a sample at the end of every step, continued from the three samples before where there is none.
+    """The motion with a sample at the end of every step, and on either side of every knee strike.
 
-    A compliant impact takes less than the time between samples: interpolating across a touch would smear it into the
-    step before.
+    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after.
+    A compliant impact or an ideal lock takes less than the time between samples: interpolating across would smear it.
     """
-    missing = [end for end in motion.step_ends if end not in motion.time and np.searchsorted(motion.time, end) >= 3]
-    if not missing:
+    side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
+    added = [
+        (end, slice(place - 3, place))
+        for end in motion.step_ends
+        if end not in motion.time and (place := np.searchsorted(motion.time, end)) >= 3
+    ]
+    for strike in motion.knee_strikes:
+        place = np.searchsorted(motion.time, strike)
+        if 3 <= place <= motion.time.size - 3 and strike not in motion.time:
+            added += [(strike - side, slice(place - 3, place)), (strike, slice(place, place + 3))]
+    if not added:
         return motion
-    rows = [continued(motion, end) for end in missing]
-    time = np.concatenate((motion.time, missing))
+    rows = [continued(motion, known, at) for at, known in added]
+    time = np.concatenate((motion.time, [at for at, _ in added]))
     order = np.argsort(time)
     angle = np.concatenate((motion.angle, [row[0] for row in rows]))
     velocity = np.concatenate((motion.velocity, [row[1] for row in rows]))
-    return Motion(time[order], angle[order], velocity[order], motion.step_ends)
+    return replace(motion, time=time[order], angle=angle[order], velocity=velocity[order])
 
 
-def continued(motion: Motion, end: float) -> tuple[Array, Array]:
-    """Angles and velocities (leg,) at `end`, by the parabola through the last three samples before it."""
-    last = int(np.searchsorted(motion.time, end))
-    known = motion.time[last - 3 : last]
-    weights = [np.prod([(end - other) / (one - other) for other in known if other != one]) for one in known]
-    return np.asarray(weights @ motion.angle[last - 3 : last]), np.asarray(weights @ motion.velocity[last - 3 : last])
+def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
+    """Angles and velocities (leg,) at a time, by the parabola through three known samples beside it."""
+    times = motion.time[known]
+    weights = [np.prod([(at - other) / (one - other) for other in times if other != one]) for one in times]
+    return np.asarray(weights @ motion.angle[known]), np.asarray(weights @ motion.velocity[known])
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +182,20 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> Diffe
     angle = np.stack([ours[0] - theirs[0] for ours, theirs in pairs])
     velocity = np.stack([ours[1] - theirs[1] for ours, theirs in pairs])
     return Difference(angle, velocity)
+
+
+def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
+    """(step, phase) where both walks move smoothly: past the impact at a step's start, and off their knees' strikes.
+
+    Knees that lock at slightly other phases differ by the whole jump between them, however alike the motions are.
+    """
+    clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
+    for step, row in enumerate(clear):
+        strikes, others = walk.knee_phases(step), reference.knee_phases(step)
+        if strikes.size == others.size:
+            for pair in zip(strikes, others, strict=True):
+                row &= (phases < min(pair)) | (phases > max(pair))
+    return clear
 
 
 def orbit_distances(walk: Motion, reference: Motion) -> Array:

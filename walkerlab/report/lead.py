@@ -7,7 +7,8 @@ from typing import Any
 
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
-from walkerlab.report.numbers import count, length, number, quantity
+from walkerlab.config.walkers import is_plain_compass
+from walkerlab.report.numbers import count, length, listed, number, quantity
 from walkerlab.report.results import Results
 
 
@@ -28,34 +29,32 @@ def scene(config: Config, run: str) -> str:
     start = "its periodic gait" if config.start == "fixed-point" else f"the state {state(config.start)}"
     models = "as a rigid model alone" if config.contact is None else "as a rigid model and as one with contact"
     return (
-        f"Config {config.name}{changed}: {walker_in_words(config.walker)} on a slope of {number(config.slope_rad)} rad "
-        f"({number(math.degrees(config.slope_rad), 3)}°){equations(config)}. "
+        f"Config {config.name}{changed}: {walker_in_words(config.walker)}, on a slope of "
+        f"{number(config.slope_rad)} rad ({number(math.degrees(config.slope_rad), 3)}°){equations(config)}. "
         f"It is to walk {count(config.strides, 'stride')} ({2 * config.strides} steps) from {start}, {models}."
     )
 
 
-WALKERS = {
-    "compass": "a compass walker",
-    "straight-legs": "a walker with straight legs",
-    "kneed": "a walker with knees",
-    "parts": "a walker described by its parts",
-}
+LEGS = {"straight-legs": "straight legs", "kneed": "kneed legs", "parts": "legs"}
+"""What kind of legs a type of walker has."""
 
 
 def walker_in_words(walker: Any) -> str:
     """Kind, size and mass of a walker."""
-    torso = "" if walker.torso is None else f" and a torso of {quantity(walker.torso.mass_kg, 'kg')}"
+    torso = [] if walker.torso is None else [f"a torso of {quantity(walker.torso.mass_kg, 'kg')}"]
     if walker.type == "compass":
-        of_legs = f"{length(walker.leg_length_m)} and {quantity(walker.leg_mass_kg, 'kg')}"
-        return f"a compass walker with legs of {of_legs} and a hip of {quantity(walker.hip_mass_kg, 'kg')}{torso}"
+        hip = f"a hip of {quantity(walker.hip_mass_kg, 'kg')}"
+        legs = f"legs of {length(walker.leg_length_m)} and {quantity(walker.leg_mass_kg, 'kg')} each"
+        return f"a compass walker with {listed([legs, hip, *torso])}"
+    legs = f"{LEGS[walker.type]} of {length(walker.leg_length_m)}"
     feet = f"feet of radius {length(walker.foot_radius_m)}" if walker.foot_radius_m else "point feet"
     whole = quantity(walker.total_mass_kg, "kg")
-    return f"{WALKERS[walker.type]} with legs of {length(walker.leg_length_m)}, {feet}, {whole} in all{torso}"
+    return f"a walker with {listed([legs, feet, *torso])}, {whole} in all"
 
 
 def equations(config: RigidConfig) -> str:
     """Which equations of motion, where there is more than one set of them."""
-    if config.walker.type != "compass":
+    if not is_plain_compass(config.walker):
         return ""
     if config.equations == "as-printed":
         return ", with the equations of motion as the paper prints them, misprint of eq. A.5 included"

@@ -78,7 +78,7 @@ def of_adjustment(config: RigidConfig) -> tuple[LeftOut, ...]:
 
 def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[LeftOut, ...]:
     """What the verification of another walker than the paper's compass does without."""
-    if of_the_compass(config.walker):
+    if of_the_paper(config.walker):
         return ()
     return (
         left_out(
@@ -95,6 +95,13 @@ def of_the_compass(walker: object) -> bool:
     from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
 
     return is_plain_compass(walker)
+
+
+def of_the_paper(walker: object) -> bool:
+    """Whether a walker is the paper's own."""
+    from walkerlab.config.walkers import is_the_papers  # not for the help of the command line
+
+    return is_the_papers(walker)
 
 
 def of_legs(config: RigidConfig) -> Iterator[LeftOut]:

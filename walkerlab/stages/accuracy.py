@@ -79,7 +79,8 @@ def hinge_left_out(config: ContactConfig) -> list[dict[str, Any]]:
 
 def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
     """A scene that nothing can be measured on."""
-    return {"what": f"accuracy of the scene {trial.name}", "why": str(why)}
+    start = f"from {OFF_THE_GAIT} of the start's velocities " if isinstance(trial, RigidTrial) else ""
+    return {"what": f"accuracy of the scene {trial.name}", "why": f"{start}{why}"}
 
 
 def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:

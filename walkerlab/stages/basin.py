@@ -12,6 +12,7 @@ import numpy as np
 
 from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.reads import BasinConfig, RigidConfig
+from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
@@ -144,7 +145,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
     """The contact model at the tolerances of `tune`'s map."""
     if config.contact is None:
-        raise ConfigError("basin.model: contact needs a contact block, and the config has none.", "Add one.")
+        raise without_contact("basin.model: contact", config.walker, "Add one.")
     # Imported here: it brings interpolation along, which the rigid model's basin does without.
     from walkerlab.stages.tune import BUDGET_FACTOR, LEAST_BUDGET, MAP_ATOL, MAP_RTOL, free_scene
 

@@ -147,7 +147,14 @@ def motion_of(walk: Content) -> Motion | None:
     trajectory = walk.groups.get("trajectory")
     if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < SAMPLES_OF_A_MOTION:
         return None
-    motion = Motion(trajectory["time"], trajectory["angle"], trajectory["velocity"], step_ends(walk))
+    strikes = walk.summary.get("knee_strikes_s", walk.summary.get("knee_strike_times_s", []))
+    motion = Motion(
+        trajectory["time"],
+        trajectory["angle"],
+        trajectory["velocity"],
+        step_ends(walk),
+        np.array([strike for strike in strikes if strike > 0.0]),
+    )
     return sampled_at_step_ends(motion)
 
 

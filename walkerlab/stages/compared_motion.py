@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.hybrid.comparison import (
     IMPACT_PHASE,
@@ -14,6 +15,7 @@ from walkerlab.hybrid.comparison import (
     Array,
     Difference,
     Motion,
+    between_impacts,
     difference_in_phase,
     difference_in_time,
     orbit_distances,
@@ -76,14 +78,15 @@ def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
         return Comparison(errors, groups, (without("differences in phase, and of the orbits", "step"),))
     phases = np.linspace(0.0, 1.0, PHASES)
     aligned = difference_in_phase(contact, rigid, phases)
-    between = part(aligned, slice(None), phases >= IMPACT_PHASE)
+    smooth = between_impacts(contact, rigid, phases)
     groups["aligned"] = in_phase(phases, aligned)
-    errors = Errors(errors.raw, of_legs(aligned), of_legs(between))
+    errors = Errors(errors.raw, of_legs(aligned), of_legs(part(aligned, smooth)))
     if min(rigid.steps, contact.steps) < LAST_STRIDE:
         return Comparison(errors, groups, (without("difference of the last stride, and of the orbits", "stride"),))
     orbit = orbit_distances(contact, rigid)
     groups["orbit"] = orbit_group(orbit)
-    settled = part(between, slice(-LAST_STRIDE, None), slice(None))
+    last = slice(-LAST_STRIDE, None)
+    settled = part(Difference(aligned.angle[last], aligned.velocity[last]), smooth[last])
     return Comparison(
         Errors(errors.raw, errors.aligned, errors.between_impacts, of_legs(settled), tuple(orbit.tolist())), groups
     )
@@ -94,9 +97,9 @@ def without(what: str, needed: str) -> dict[str, str]:
     return {"what": what, "why": f"no {needed} was completed by both models"}
 
 
-def part(difference: Difference, steps: Any, phases: Any) -> Difference:
-    """Some steps and phases of a difference in phase."""
-    return Difference(difference.angle[steps][:, phases], difference.velocity[steps][:, phases])
+def part(difference: Difference, where: NDArray[np.bool_]) -> Difference:
+    """A difference at some of its steps and phases."""
+    return Difference(difference.angle[where], difference.velocity[where])
 
 
 def of_legs(difference: Difference) -> LegErrors:

@@ -11,6 +11,7 @@ import numpy as np
 
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
+from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
@@ -171,7 +172,7 @@ def wanted_models(block: Continuation) -> tuple[str, ...]:
 def models_of(block: Continuation, config: ContinuationConfig, asked: Question) -> tuple[str, ...]:
     """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
     if block.model != RIGID and config.contact is None:
-        raise ConfigError("the contact model needs a contact block, and the config has none", "Use --model rigid.")
+        raise without_contact("the contact model", config.walker, "Use --model rigid.")
     wanted = wanted_models(block)
     refuse_values(asked)
     refuse_second(asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import pairwise
@@ -53,6 +54,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "to": asked.most,
         "branches": [branch_summary(one.model, branch) for one in found for branch in one.branches],
         "bifurcations": [row for one in found for row in bifurcation_rows(one)],
+        "first_doubling": {one.model: flip for one in found if (flip := first_doubling(one.branches)) is not None},
         "lyapunov": [{"model": one.model, **asdict(exponent)} for one in found for exponent in one.exponents],
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
@@ -90,6 +92,21 @@ def bifurcation_rows(followed: Followed) -> Iterator[dict[str, Any]]:
                 "model": followed.model,
                 "branch": number,
             }
+
+
+def first_doubling(branches: Sequence[Branch]) -> float | None:
+    """The least flip at which a gait of one step ceases to be stable; None if there is none.
+
+    branches  of one model; one that is unstable on both sides of a flip does not count
+    """
+    flips = [
+        one.value
+        for branch in branches
+        if branch.period == 1
+        for one in branch.bifurcations
+        if one.kind == "flip" and any(math.isclose(one.value, end) for pair in branch.stable_ranges for end in pair)
+    ]
+    return min(flips, default=None)
 
 
 def limit_rows(followed: Followed) -> Iterator[dict[str, Any]]:

@@ -24,7 +24,7 @@ from walkerlab.config.reads import (
     WalksConfig,
     dotted_keys,
 )
-from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_compass, of_verification
+from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_paper, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 def known_and_start(config: SceneConfig) -> tuple[str, ...]:
     """The known problems, and for other walkers than the paper's compass, judged in their own scene, its start."""
-    return ("known-problems", *(() if of_the_compass(config.walker) else gait_for_start_or_pads(config)))
+    return ("known-problems", *(() if of_the_paper(config.walker) else gait_for_start_or_pads(config)))
 
 
 def engines_installed() -> Mapping[str, str]:
@@ -127,7 +127,7 @@ class Stage:
 
     def takes_under(self, config: RigidConfig) -> type | None:
         """What its result depends on under a config."""
-        return self.takes if self.takes_of_scene is None or of_the_compass(config.walker) else self.takes_of_scene
+        return self.takes if self.takes_of_scene is None or of_the_paper(config.walker) else self.takes_of_scene
 
     @property
     def optional(self) -> bool:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.config.walkers import without_contact
+from walkerlab.errors import NoAnswer
 from walkerlab.stages.ahead import Ahead
 from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
@@ -146,12 +147,8 @@ def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[St
 
 def refuse_unsuited(stage: Stage, config: Config) -> None:
     """Raise ConfigError if a stage is asked for that the config leaves out."""
-    unsuited = why_unsuited(stage, config)
-    if unsuited is not None:
-        raise ConfigError(
-            f"{stage.name} needs a contact block, and the config has none.",
-            "Add one to the config; `walkerlab schema` lists its keys.",
-        )
+    if why_unsuited(stage, config) is not None:
+        raise without_contact(stage.name, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
 
 @dataclass(frozen=True)

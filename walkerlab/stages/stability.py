@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_the_papers
 from walkerlab.labels import labels_of
 from walkerlab.scene.contact import pads_pitch
 from walkerlab.scene.left_out import of_verification
@@ -57,7 +57,7 @@ def run(
 
 def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
     """Whether the walker is another one than the paper's compass."""
-    return not is_plain_compass(config.walker)
+    return not is_the_papers(config.walker)
 
 
 def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.comparison import Motion
+from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait
@@ -103,7 +105,10 @@ def limit_findings(
     if walk.samples is None or walk.steps == 0:
         return None
     legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
-    motion = Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes)
+    strikes = np.zeros(0) if walk.knee_strikes is None else walk.knee_strikes
+    motion = sampled_at_step_ends(
+        Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes, strikes)
+    )
     limit = Limit(
         scene.ground,
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
@@ -169,7 +174,10 @@ def setting(one: Distance) -> dict[str, Any]:
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:
-    """Parts of the difference in period, each from switching one thing off while the others stay."""
+    """Parts of the difference in period, each from switching one thing off while the others stay.
+
+    What is left is what they do together, and creep too where its limit was not reached.
+    """
     total = found.contact_period - found.rigid_period
     farthest = found.series[found.walked[-1]]
     parts: dict[str, float] = {}
@@ -179,10 +187,10 @@ def causes(found: LimitFindings) -> dict[str, Any]:
         parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL][-1].period
     if found.series.get(ALL_POINT):
         parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT][0].period
+    parts["rest_s" if found.without_creep is None else "together_s"] = total - sum(parts.values())
     return {
         "total_s": total,
         **parts,
-        "together_s": total - sum(parts.values()),
         "creep_uncertainty_s": None if found.without_creep is None else found.without_creep.uncertainty,
         "left_with_all_off_s": farthest[-1].period_error if farthest else None,
     }

@@ -51,7 +51,8 @@ def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
     def on(**changes: float) -> Config:
         return config.model_copy(update={"contact": ground.model_copy(update=changes)})
 
-    yield case("stiffness-times-100", "nearer to rigid", "ground"), on(stiffness=SOFTER * ground.stiffness)
+    stiffer = case("stiffness-times-100", "nearer to rigid; no more damped, so feet may bounce", "ground")
+    yield stiffer, on(stiffness=SOFTER * ground.stiffness)
     yield case("stiffness-over-100", "feet sink deeper", "ground"), on(stiffness=ground.stiffness / SOFTER)
     yield case("damping-over-100", "feet bounce", "ground", agreement=1e-3), on(damping=ground.damping / SOFTER)
     creep = {name: getattr(ground, name) / STICKIER for name in ("stiction_velocity", "friction_velocity")}

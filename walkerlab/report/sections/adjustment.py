@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,14 +10,16 @@ from walkerlab.report.blocks import COSTS, Block, Cell, Column, Paragraph, Secti
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone, walks
 from walkerlab.report.results import Results
+from walkerlab.report.sections.gaits import symbol
 from walkerlab.report.symbols import in_signs
 
 STAGE = "tune"
 CAUSES = {
-    "creep_s": "creep in the friction law makes",
+    "creep_s": "creep in the friction law",
     "penetration_and_finite_impact_s": "penetration and the finite impact",
     "foot_radius_s": "the round foot",
-    "together_s": "what they make together",
+    "together_s": "what they do together",
+    "rest_s": "creep in the friction law and what they do together, which could not be told apart",
 }
 """Parts of the difference in period, and what they are called in a sentence."""
 CHANNELS = {
@@ -28,8 +29,6 @@ CHANNELS = {
     "knee_stop": ("the knees' stops", 3),
 }
 """Where a step dissipates energy, by the names under which it is stored: what that is called, and digits to show."""
-BODY = re.compile(r"_(?=[a-z]+$)")
-"""Where the name of a coordinate goes on with that of a body: theta_1_shank."""
 POINT_FEET = "all, point foot"
 """The series of a walker whose feet are points in the rigid model and balls in the contact model."""
 NOTHING = 1e-9
@@ -42,12 +41,16 @@ def section(results: Results) -> Section | None:
     summary = results.summary(STAGE)
     if summary is None or "adjustment" not in summary:
         return None
-    blocks: list[Block] = [Paragraph(verdict(results, summary)), starts_table(results, summary)]
+    changed = results.of_the_paper or summary["adjustment"]["needed"]
+    blocks: list[Block] = [Paragraph(verdict(results, summary))]
+    if changed:
+        blocks.append(starts_table(results, summary))
     if summary["gait"]["found"]:
         blocks.append(gait_table(summary, results.summary("fixedpoint")))
     if summary["adjustment"].get("margins"):
         blocks.append(margins_table(summary))
-    blocks.append(walks_table(results, summary))
+    if changed:
+        blocks.append(walks_table(results, summary))
     return Section("adjustment", "The parameter adjustment", tuple(blocks), needed(summary))
 
 
@@ -115,12 +118,12 @@ def caused(summary: Summary) -> str:
     if not causes or not causes["total_s"]:
         return ""
     total = causes["total_s"]
-    parts = listed(
-        f"{name} {milliseconds(causes[key])} ({number(100.0 * causes[key] / total, 3)} %)"
-        for key, name in CAUSES.items()
-        if causes.get(key) is not None
-    )
-    return f"Its period differs from the rigid gait's by {milliseconds(total)}: {parts}, each switched off alone."
+    made = {key: causes[key] for key in CAUSES if causes.get(key) is not None}
+    sizes = [f"{milliseconds(part)} ({number(100.0 * part / total, 3)} %)" for part in made.values()]
+    first, *others = [f"from {CAUSES[key]}" for key in made]
+    parts = listed([f"{sizes[0]} come {first}", *(" ".join(pair) for pair in zip(sizes[1:], others, strict=True))])
+    differs = f"Its period differs from the rigid gait's by {milliseconds(total)}"
+    return f"{differs}. With each cause switched off alone, {parts}."
 
 
 def reached(summary: Summary) -> str:
@@ -146,7 +149,7 @@ def reached(summary: Summary) -> str:
         return (
             f"To differ from the rigid walk by no more than {claim} rad in phase instead of {differ} takes {contact}."
         )
-    left = quantity(last["angle_error_rad"], "rad", 2)
+    left = quantity(last["angle_error_rad"], "rad", 3)
     return f"With {contact}, the angles still differ by {left} in phase instead of {differ}: {claim} is not reached."
 
 
@@ -166,7 +169,7 @@ def starts_table(results: Results, summary: Summary) -> Table:
     if not results.of_the_paper:
         rows = [
             [
-                in_signs(f"{BODY.sub(r', ', name)} ({row['unit']})"),
+                f"{symbol(name)} ({row['unit']})",
                 *(number(row[key], 6) for key in ("ours_rigid", "ours_adjusted")),
             ]
             for name, row in summary["table2"].items()
@@ -249,7 +252,7 @@ def walks_table(results: Results, summary: Summary) -> Table:
     """The procedure, walk by walk."""
     names = {
         "hinged": "first step with a revolute joint, from the rigid state",
-        "released": "without the joint, from the rigid state",
+        "released": f"{'without the joint, ' if 'hinged' in summary['procedure'] else ''}from the rigid state",
         "adjusted": "from the adjusted start",
     }
     rows: list[list[str | Cell]] = [

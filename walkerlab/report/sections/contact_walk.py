@@ -89,7 +89,7 @@ def slipping(summary: Mapping[str, Any]) -> list[Row]:
             ["slip, step by step", span(slips, "mm", 3), "of the stance foot's material, from its touch to its lift"]
         )
     if summary.get("rolling_per_step_m"):
-        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the ball foot, which is no slip"])
+        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the round foot, which is no slip"])
     return rows
 
 

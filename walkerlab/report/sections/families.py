@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.figures.first_doubling import first_doubling
 from walkerlab.labels import with_unit
 from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
 from walkerlab.report.gait_diagram import gait_diagram, parameter
@@ -44,11 +43,10 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
                 f"The {model} model's gait of one step is stable from {quantity(widest[0], unit, 4)} to "
                 f"{quantity(widest[1], unit, 6)}."
             )
-    shift = first_doubling(summary, "contact"), first_doubling(summary, "rigid")
-    if shift[0] is not None and shift[1] is not None:
-        said.append(
-            f"Compliance and creep of the ground move its first flip by {quantity(shift[0] - shift[1], unit, 3)}."
-        )
+    doubling = summary["first_doubling"]
+    if doubling.keys() >= set(MODELS):
+        shift = doubling["contact"] - doubling["rigid"]
+        said.append(f"Compliance and creep of the ground move its first flip by {quantity(shift, unit, 3)}.")
     said += [
         f"From the gait of {count(cascade['period'], 'step')} at {quantity(cascade['flips'][0], unit, 6)} on, the "
         f"{cascade['model']} model's period doubles {len(cascade['flips'])} times, the distances between doublings "

@@ -115,8 +115,10 @@ def complex_number(real: float, imaginary: float) -> str:
 
 def found_gaits(results: Results, sets: Iterable[str], names: Sequence[str]) -> Table | None:
     """All gaits that the search found, if it was more than one of a set."""
-    groups = {name: results.group("fixedpoint", f"{name}/gaits") for name in sets}
-    bodies = [body(gait_rows(group), SETS[name]) for name, group in groups.items() if group is not None]
+    found = {name: results.group("fixedpoint", f"{name}/gaits") for name in sets}
+    groups = {name: group for name, group in found.items() if group is not None}
+    named = list(groups) != ["corrected"]  # what is right needs no name while nothing misprinted stands beside it
+    bodies = [body(gait_rows(group), SETS[name] if named else "") for name, group in groups.items()]
     if all(len(one.rows) < 2 for one in bodies):
         return None
     heads = ("gait", "T (s)", "S (m)", *map(symbol, names), "spectral radius")
