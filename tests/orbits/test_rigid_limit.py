@@ -1,5 +1,7 @@
 """Orders and limits of series that are known exactly, and what a setting changes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,12 @@ def test_the_order_and_the_limit_of_a_power_law_are_found(order, ratio):
 def test_a_series_that_does_not_converge_has_no_limit():
     assert extrapolated(distances([0.7, 0.71, 0.73, 0.77], 2.0)) is None
     assert extrapolated(distances([0.7, 0.71], 2.0)) is None
+
+
+def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
+    made = distances([0.7 + 0.01 * 2.0**-i for i in range(6)], 2.0)
+    rounded = [replace(made[-1], period=made[-1].period + noise, numerical_period=1e-6) for noise in (3e-7, -5e-7)]
+    assert extrapolated([*made, *rounded]) == extrapolated(made)
 
 
 @pytest.mark.parametrize("name", [ALL, STICTION])

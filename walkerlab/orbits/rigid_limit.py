@@ -19,9 +19,9 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import (
-    IMPACT_PHASE,
     PHASES,
     Motion,
+    between_impacts,
     difference_in_phase,
     difference_in_time,
     sampled_at_step_ends,
@@ -178,9 +178,11 @@ class Limit:
         if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         angle, velocity = motion_of_legs(walk.samples.states, walker)
-        motion = sampled_at_step_ends(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s))
+        strikes = walk.knee_strike_s[walk.knee_strike_s > 0.0]
+        motion = sampled_at_step_ends(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, strikes))
         phases = np.linspace(0.0, 1.0, PHASES)
-        aligned = difference_in_phase(motion, self.rigid.motion, phases[phases >= IMPACT_PHASE])
+        aligned = difference_in_phase(motion, self.rigid.motion, phases)
+        smooth = between_impacts(motion, self.rigid.motion, phases)
         _, raw = difference_in_time(motion, self.rigid.motion)
         return Distance(
             distance.setting,
@@ -190,8 +192,8 @@ class Limit:
             distance.period_error,
             distance.length_error,
             distance.numerical_period,
-            angle=float(aligned.largest_angle.max()),
-            velocity=float(aligned.largest_velocity.max()),
+            angle=float(np.abs(aligned.angle[smooth]).max()),
+            velocity=float(np.abs(aligned.velocity[smooth]).max()),
             raw_angle=float(raw.largest_angle.max()),
             raw_velocity=float(raw.largest_velocity.max()),
             numerical_time=float(abs(walk.touch_time_s[-1] - check.touch_time_s[-1])),
@@ -242,8 +244,14 @@ class Extrapolation:
 
 
 def extrapolated(distances: list[Distance]) -> Extrapolation | None:
-    """The limit by Aitken's method on the last settings; None if they do not converge."""
+    """The limit by Aitken's method on the last settings that still tell; None if they do not converge.
+
+    A change of the period below its numerical error tells nothing, and neither does what follows.
+    """
     periods = np.array([one.period for one in distances])
+    errors = np.array([one.numerical_period for one in distances])
+    silent = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])
+    periods = periods[: silent[0] + 1] if silent.size else periods
     if periods.size < 4:
         return None
     estimates = [aitken(*periods[-4 + i : -1 + i if i == 0 else None]) for i in range(2)]

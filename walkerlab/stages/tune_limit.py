@@ -31,7 +31,7 @@ from walkerlab.orbits.rigid_limit import (
     observed_orders,
 )
 from walkerlab.paper.printed import ANGLE_ERROR
-from walkerlab.scene.contact import ContactScene, start_state
+from walkerlab.scene.contact import ContactScene, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
@@ -137,7 +137,8 @@ def limit_findings(
 def point_footed(config: RigidConfig, walker: ContactWalker) -> ContactWalker:
     """The same walker on the same ground, with points for feet as the rigid model has them."""
     parts = assembly_of(config.walker, rigid=True)
-    return contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad)
+    rules = knee_rules(config.walker)
+    return contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
