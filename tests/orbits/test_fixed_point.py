@@ -10,9 +10,10 @@ from walkerlab.hybrid.rigid_walk import EVENTS
 from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, branches, choice
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.gait import Gait
+from walkerlab.orbits.random_starts import NEW, NOWHERE, follow_starts, known_gaits
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
-from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton, newton_from_each
+from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton
 from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.dop853 import new_dop853
@@ -288,17 +289,50 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     assert starts_from_seeds(2.0) == after_others
 
 
+def led(map_, starts, gaits=()):
+    where = np.zeros(len(starts), np.int64)
+    follow_starts(map_, known_gaits(map_, list(gaits)), starts, where)
+    return where.tolist()
+
+
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
 def test_a_gait_is_come_near_with_fewer_derivatives_than_it_is_solved_with(walker):
     map_ = shooting(walker)
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
-    start = gait * [1.02, 0.96, 1.03]
-    ends, derivatives = [], []
-    for approaching in (False, True):
-        z, found = start.reshape(1, 3).copy(), np.zeros((1, 4))
-        newton_from_each(map_, z, 1e-6, approaching, found)
-        assert found[0, 2] < 1e-6
-        ends.append(z[0])
-        derivatives.append(int(map_.method.counts[RHS]))
-    np.testing.assert_allclose(ends, [gait, gait], atol=1e-5)
-    assert derivatives[1] <= derivatives[0] / 3
+    solved, near = gait * [1.02, 0.96, 1.03], gait * [[1.02, 0.96, 1.03]]
+    newton(map_, solved, 1e-6)
+    work = int(map_.method.counts[RHS])
+    assert led(map_, near) == [NEW]
+    np.testing.assert_allclose([solved, near[0]], [gait, gait], atol=1e-5)
+    assert int(map_.method.counts[RHS]) <= work / 3
+
+
+def test_a_start_near_a_known_gait_is_followed_no_further():
+    map_ = shooting(PAPER)
+    gaits = [np.array(gait.state)[[1, 2, 3]] for gait in find_gaits(PAPER).gaits]
+    derivatives = []
+    for gait in gaits:
+        newton(map_, gait, 1e-12)
+        derivatives.append(map_.DP.copy())
+    starts = np.array(gaits) * [1.001, 0.999, 1.001]
+    before = starts.copy()
+    assert led(map_, starts, zip(gaits, derivatives, strict=True)) == [0, 1]
+    np.testing.assert_array_equal(starts, before)
+
+
+def test_a_start_that_does_not_walk_or_comes_to_stand_leads_nowhere():
+    together = -PAPER.slope + 1e-4
+    assert led(shooting(PAPER), np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NOWHERE, NOWHERE]
+
+
+@pytest.mark.parametrize("degrees", [0.5445378151260504, 2.7453781512605043, 7.147058823529412])
+def test_what_is_known_of_two_gaits_hides_no_third_that_a_start_leads_to(degrees):
+    walker = assembled(on_slope(degrees))
+    ignorant = Search(walker, SearchSettings())
+    ignorant.draw(np.random.default_rng(0))
+    search = Search(walker, SearchSettings())
+    search.follow_seeds()
+    search.draw(np.random.default_rng(0))
+    periods = [sorted(round(found.gait.period, 6) for found in one.found) for one in (ignorant, search)]
+    assert len(periods[0]) >= 2
+    assert periods[1] == periods[0]

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from multiprocessing import forkserver, get_all_start_methods
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,14 @@ def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
     assert said[13].startswith("its worker died: BrokenProcessPool")
     twice = swept.content[""]["twice"]
     assert np.nansum(twice) == sum(2 * seed for seed in range(5, 17) if seed not in (7, 13))
+
+
+@pytest.mark.skipif("forkserver" not in get_all_start_methods(), reason="workers are forked from no server here")
+def test_workers_are_forked_from_a_process_that_may_begin_before_there_are_points():
+    ENGINES["local"].begin(Order(workers=1))
+    begun = forkserver._forkserver._forkserver_pid
+    with ENGINES["local"].opened(Order(workers=1)) as pool:
+        assert pool.executor.submit(os.getppid).result() == begun
 
 
 def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):

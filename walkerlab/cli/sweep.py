@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -88,10 +90,6 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             template = request.template
             texts = [axis_of_text(text) for text in over or ()]
             question = question_of(template.base.config.sweep, texts, stage, zipped, sample, seed)
-            asked = Sweep(question, template, request.folder, graph)
-            if dry_run:
-                show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
-                return
             order = Order(
                 workers=jobs,
                 address=address,
@@ -99,9 +97,21 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 folder=request.folder.path,
                 options=options_of(engine_option or ()),
             )
+            if not dry_run:
+                chosen.begin(order)
+            asked = Sweep(question, template, request.folder, graph)
+            if dry_run:
+                show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
+                return
+            load_meanwhile("walkerlab.sweeps.drawing")
             work = Work(chosen, order, chunk_seconds, not no_wait, force, where(graph))
             swept = asked.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
+
+
+def load_meanwhile(module: str) -> None:
+    """Import what is needed at the end while others compute."""
+    threading.Thread(target=importlib.import_module, args=(module,)).start()
 
 
 def question_of(

@@ -13,21 +13,24 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import EVENTS
 from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.orbits.gait import Gait, measured
+from walkerlab.orbits.random_starts import (
+    LEAST_START,
+    MOST_START,
+    NEW,
+    SHORTEST_STEP,
+    follow_starts,
+    known_gaits,
+)
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.slope_branch import Branch
 from walkerlab.orbits.small_slope import Vector, seeds
-from walkerlab.orbits.step_map import Shooting, new_shooting, newton, newton_from_each, variation_size
+from walkerlab.orbits.step_map import Shooting, new_shooting, newton, variation_size
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 
 RANDOM_START = "random start"
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
-LOOKED_RESIDUAL = 1e-6  # of a random search that has come near a gait
 SAME = 1e-5  # relative distance of states below which two searches found one gait
-# ranges of random starting values: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance
-# leg, and of a shank whose knee was free at heel strike
-LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class Found:
     """A gait with what led to it."""
 
     z: Vector
+    DP: Vector  # derivative of the step map there
     gait: Gait
     by: list[str]
 
@@ -142,15 +146,22 @@ class Search:
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def draw(self, generator: np.random.Generator) -> None:
-        """Solve the step map from random starting values."""
+        """Solve the step map from random starting values, unless they lead to a gait that was followed."""
         d, settings = len(self.walker.picked), self.settings
         starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (settings.random_starts, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
-        found = np.zeros((len(starts), 4))
-        newton_from_each(self.looking, starts, LOOKED_RESIDUAL, True, found)
-        apart = np.abs(starts[:, 0] + self.walker.slope + self.walker.lean) > SMALLEST_ANGLE
-        for z in starts[apart & (found[:, 2] < LOOKED_RESIDUAL)]:
-            self.keep(z, RANDOM_START)
+        known = known_gaits(self.looking, [(found.z, found.DP) for found in self.found])
+        led = np.zeros(len(starts), np.int64)
+        follow_starts(self.looking, known, starts, led)
+        for z, gait in zip(starts, led, strict=True):
+            if gait >= 0:
+                self.found[gait].by.append(RANDOM_START)
+            elif gait == NEW and not self.stands(z):
+                self.keep(z, RANDOM_START)
+
+    def stands(self, z: Vector) -> bool:
+        """Whether the legs are together."""
+        return abs(float(z[0]) + self.walker.slope + self.walker.lean) < SMALLEST_ANGLE
 
     def keep(self, z: Vector, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
@@ -160,14 +171,14 @@ class Search:
         status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
         if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
             return False
-        if self.walker.slope == 0.0 and abs(z[0] + self.walker.lean) < SMALLEST_ANGLE:
+        if self.walker.slope == 0.0 and self.stands(z):
             return False
         if self.known(z, by):
             return True
         gait = measured(self.walker, self.units, self.method, z, self.solving.DP)
         if gait is None or gait.residual > self.settings.residual:
             return False
-        self.found.append(Found(z, gait, [by]))
+        self.found.append(Found(z, self.solving.DP.copy(), gait, [by]))
         return True
 
     def known(self, z: Vector, by: str) -> bool:

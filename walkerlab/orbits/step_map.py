@@ -158,38 +158,6 @@ def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
     return status, period
 
 
-def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
-    """`solved_from` one start z (d,), which is overwritten."""
-    found = np.zeros((1, 4))
-    newton_from_each(shooting, z.reshape(1, -1), tolerance, False, found)
-    status, period, residual, evaluations = found[0].tolist()
-    return int(status), period, residual, int(evaluations)
-
-
-@kernel
-def newton_from_each(shooting: Shooting, starts: Any, tolerance: float, approaching: bool, found: Any) -> None:
-    """`solved_from` many starts, or `approach` from them.
-
-    One kernel for both: each holds the walk with its variational equations, which takes seconds to compile.
-
-    starts       (starts, d); overwritten with the best states found
-    approaching  whether to come near a solution is enough
-    found        (starts, 4) what `solved_from` returns, of which `approach` knows the residual; written
-    """
-    z = shooting.start
-    for i in range(len(starts)):
-        for j in range(z.size):
-            z[j] = starts[i, j]
-        status, period, residual, evaluations = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL, 0
-        if approaching:
-            residual = approach(shooting, z, tolerance)
-        else:
-            status, period, residual, evaluations = solved_from(shooting, z, tolerance)
-        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = status, period, residual, evaluations
-        for j in range(z.size):
-            starts[i, j] = z[j]
-
-
 @kernel
 def residual_alone(shooting: Shooting, z: Any) -> float:
     """Residual of the step from z (d,), without its derivative: a fraction of the work."""
@@ -206,8 +174,8 @@ def residual_alone(shooting: Shooting, z: Any) -> float:
     return residual_of(shooting, z, status)
 
 
-@inlined
-def solved_from(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
+@kernel
+def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
     """Solve P(z) = z by Newton's method with the exact derivative, halving moves that make the residual grow.
 
     A halved move is tried without the derivative, which only a state from which Newton's method goes on needs.
@@ -244,58 +212,10 @@ def solved_from(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, floa
 
 
 @inlined
-def approach(shooting: Shooting, z: Any, tolerance: float) -> float:
-    """Come near a solution of P(z) = z with few derivatives, each of which takes as long as five steps.
-
-    After a full move that makes the residual smaller, Broyden's update of the derivative serves for the next one
-    (Broyden 1965, his first method); else it is computed anew, and moves with it are halved until they do. A start that
-    does not walk to a heel strike is given up.
-
-    z  (d,) start; overwritten with the best state found
-
-    Returns the residual there.
-    """
-    clear_counts(shooting.method)
-    best, move = shooting.best, shooting.move
-    best_residual, scale, evaluations = residual_alone(shooting, z), 1.0, 1
-    stale, exact = True, False
-    while tolerance < best_residual < NO_RESIDUAL and evaluations < MOST_EVALUATIONS:
-        if stale:
-            status, _ = step_with_jacobian(shooting, z)
-            if status != WALKED:
-                break
-            stale, exact, scale = False, True, 1.0
-        if scale == 1.0:
-            for i in range(z.size):
-                best[i] = z[i]
-            if not newton_move(shooting, z, move):
-                break
-        for i in range(z.size):
-            z[i] = best[i] + scale * move[i]
-        residual = residual_alone(shooting, z)
-        evaluations += 1
-        if residual < best_residual:
-            stale, exact, best_residual = scale < 1.0, False, residual
-            if not stale:
-                update(shooting, z, move)
-        else:
-            for i in range(z.size):
-                z[i] = best[i]
-            stale, scale = not exact, 0.5 * scale
-            if scale < SMALLEST_MOVE:
-                break
-    return best_residual
-
-
-@inlined
-def update(shooting: Shooting, z: Any, move: Any) -> None:
-    """Broyden's update of the derivative in `DP` after a full move (d,) to z (d,)."""
-    square = 0.0
-    for i in range(move.size):
-        square += move[i] * move[i]
-    for i in range(move.size):
-        for j in range(move.size):
-            shooting.DP[i, j] += (shooting.z_next[i] - z[i]) * move[j] / square
+def copied(numbers: Any, to: Any) -> None:
+    """Copy numbers (d,)."""
+    for i in range(numbers.size):
+        to[i] = numbers[i]
 
 
 @inlined

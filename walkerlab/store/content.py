@@ -63,10 +63,11 @@ class Group:
     def __post_init__(self) -> None:
         """Check the names and attributes, and that a dimension has one length."""
         object.__setattr__(self, "attrs", {name: plain(value) for name, value in self.attrs.items()})
-        for name in (*self.variables, *self.attrs, *self.sizes):
+        sizes = self.sizes
+        for name in (*self.variables, *self.attrs, *sizes):
             check_name(name)
         for name, variable in self.variables.items():
-            if name in self.sizes and variable.dims != (name,):
+            if name in sizes and variable.dims != (name,):
                 raise ValueError(f"{name!r} is a dimension and a variable with other dimensions, {variable.dims}")
         for name, value in self.attrs.items():
             if not isinstance(value, Attribute):
@@ -210,22 +211,22 @@ def check_name(name: str) -> None:
 
 def plain(value: Any) -> Any:
     """The value in JSON's own types; ValueError if a number is not finite, TypeError if it is no JSON."""
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        check_text(*value)
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"not a finite number: {value}")
+        return float(value)
     if isinstance(value, str):
         check_text(value)
         return str(value)
     if value is None or isinstance(value, bool | int):
         return value
-    if isinstance(value, float) and math.isfinite(value):
-        return float(value)
-    if isinstance(value, float):
-        raise ValueError(f"not a finite number: {value}")
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping):
+        check_text(*value)
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
     raise TypeError(f"not a JSON value: {value!r}")
 
 

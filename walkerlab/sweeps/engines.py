@@ -55,10 +55,12 @@ class Engine:
 
     opened   a context that gives a pool and closes it
     chunk_s  how long a chunk is to take, s: long against what a chunk costs the engine
+    begin    begins what takes a while and needs no points yet; `opened` does it too
     """
 
     opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
     chunk_s: float
+    begin: Callable[[Order], object] = lambda _order: None
 
 
 @contextlib.contextmanager
@@ -66,13 +68,8 @@ def local(order: Order) -> Iterator[Pool]:
     """Processes of this machine, one thread each; they end with this one, in whatever way it ends."""
     from concurrent.futures import ProcessPoolExecutor
 
-    refuse_address("local", order)
     workers = order.workers or os.cpu_count() or 1
-    method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-    context = get_context(method)
-    if method == "forkserver":
-        # Loaded once, by the process that all workers are forked from.
-        context.set_forkserver_preload(["walkerlab.sweeps.chunk", *order.modules])
+    context = begin_local(order)
     with one_thread_each():
         # The server that workers are forked from may be older than what the environment says now.
         given = (order.modules, dict(os.environ))
@@ -81,6 +78,20 @@ def local(order: Order) -> Iterator[Pool]:
             yield Pool(executor, workers)
         finally:
             executor.shutdown(wait=False, cancel_futures=True)
+
+
+def begin_local(order: Order) -> Any:
+    """The context that local workers are begun in; where they are forked, from a process that loads what all need."""
+    refuse_address("local", order)
+    if "forkserver" not in get_all_start_methods():
+        return get_context("spawn")
+    from multiprocessing import forkserver
+
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["walkerlab.sweeps.chunk", *order.modules])
+    with one_thread_each():
+        forkserver.ensure_running()
+    return context
 
 
 @contextlib.contextmanager
@@ -232,7 +243,7 @@ def number_if_it_is_one(text: str) -> str | int:
 
 
 ENGINES: dict[str, Engine] = {
-    "local": Engine(local, chunk_s=5.0),
+    "local": Engine(local, chunk_s=5.0, begin=begin_local),
     "dask": Engine(dask, chunk_s=10.0),
     "slurm": Engine(slurm, chunk_s=60.0),
 }

@@ -28,10 +28,10 @@ def said_in(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 def said_of(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """The same of one value."""
-    if isinstance(value, Mapping):
-        yield from said_in(value, f"{name}.")
-    elif isinstance(value, bool | int | float | str):
+    if isinstance(value, bool | int | float | str):
         yield name, value
+    elif isinstance(value, Mapping):
+        yield from said_in(value, f"{name}.")
     elif isinstance(value, list) and value:
         if all(isinstance(item, str) for item in value):
             yield name, "; ".join(value)

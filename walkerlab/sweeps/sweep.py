@@ -225,5 +225,6 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
 
 
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
-    """The modules that computing a stage takes."""
+    """The modules that computing a stage takes; ConfigError for a stage that cannot be swept."""
+    refuse_unknown_stage(stage, graph)
     return tuple(one.module for one in graph.needed_for(stage, config))
