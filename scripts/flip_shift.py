@@ -16,6 +16,7 @@ import argparse
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from walkerlab.config.loader import load
@@ -38,10 +39,10 @@ class Ground(NamedTuple):
     rubbed: float = 1.0  # times its coefficients of friction
 
 
-def config_of(ground: Ground, *more: str) -> Config:
-    """The paper's walker on another ground; `more` is set besides, as on the command line."""
-    own = load().config.contact
-    assert own is not None, "the paper's walker has a contact block"
+def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
+    """A built-in config's walker on another ground; `more` is set besides, as on the command line."""
+    own = load(Path(of)).config.contact
+    assert own is not None, "the config has a contact block"
     changed = {
         "stiffness": own.stiffness * ground.stiffer,
         "damping": own.damping * ground.damped,
@@ -52,7 +53,7 @@ def config_of(ground: Ground, *more: str) -> Config:
         "dynamic_friction": own.dynamic_friction * ground.rubbed,
     }
     sets = [f"contact.{name}={value!r}" for name, value in changed.items()]
-    return load(sets=[*sets, f"walker.foot_radius_m={ground.radius!r}", *more]).config
+    return load(Path(of), [*sets, f"walker.foot_radius_m={ground.radius!r}", *more]).config
 
 
 def question(config: Config) -> Question:
