@@ -25,7 +25,6 @@ from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.registry import sharing
 from walkerlab.solvers.stepping import T, dense_degree, end_state
 from walkerlab.solvers.system import State
-from walkerlab.solvers.vectors import store
 
 
 class MethodByKnees(NamedTuple):
@@ -105,7 +104,7 @@ def walk_with_fewer_bodies(
 ) -> int:
     """One walker after another, as knees lock and are released."""
     method.clock[T] = t
-    store(y, method.y, 0)
+    store_whole(merging, y, method.y)
     released, outcome = False, GOES_ON
     while outcome == GOES_ON:
         if ledger.knee[0] == LOCKED and ledger.knee[1] == LOCKED:
