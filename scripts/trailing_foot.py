@@ -20,8 +20,8 @@ from flip_shift import Ground, config_of
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.ground.held import NoneBends, always_held, no_stops
-from walkerlab.ground.merged import ByKnees, merged, merged_state
+from walkerlab.ground.held import NoKnees, NoneBends, always_held, no_stops
+from walkerlab.ground.merged import ByKnees, as_fewer, merged_state
 from walkerlab.ground.motion import OnGround, motion_gradient
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import feet_motion
@@ -63,10 +63,12 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[ContactWalker
     methods = MethodSettings(method_named("radau5"), 1e-10, 1e-13, 10**7)
     y = walk_contact(trial.walker, trial.ground, None, TRAILING, trial.start, methods, 1, None, False).end_state
     walker = trial.walker
-    if not isinstance(walker.merging, ByKnees):
+    if isinstance(walker.knees, NoKnees):
         return walker, y
+    assert isinstance(walker.merging, ByKnees), "knees lock ideally"
+    assert not walker.knees.release_at_touch, "both are still locked as the foot sinks in"
     both = walker.merging.both
-    straight = merged(walker, both, both.held, NoneBends(walker.knees.release_at_touch))
+    straight = as_fewer(walker, both, both.held, NoneBends(walker.knees.release_at_touch))
     return straight, merged_state(both.onto, np.array(y), straight.blank)
 
 

@@ -7,7 +7,7 @@ from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.energy import book_energy
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.held import Independent, NoneBends, OneBends
-from walkerlab.ground.merged import ByKnees, Unmerged, merged, merged_levers, merged_state, place_of, store_whole
+from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, merged_state, place_of, store_whole
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, with_torso
@@ -47,7 +47,7 @@ def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, locked
     expected = derivative(OnGround(walker, BOTH, held, (False, False)), 0.0, y)
     fewer = walker.merging.both if len(locked) == 2 else walker.merging.one[locked[0]]
     knees = NoneBends(False) if len(locked) == 2 else OneBends(fewer.thighs, fewer.shanks, False)
-    small = merged(walker, fewer, fewer.held, knees)
+    small = as_fewer(walker, fewer, fewer.held, knees)
     z = merged_state(fewer.onto, np.array(y), small.blank)
     always = () if isinstance(fewer.held, Independent) else fewer.held.always
     rate = derivative(OnGround(small, BOTH, always, ()), 0.0, z)

@@ -1,5 +1,7 @@
 """Differences of two walks: in time, in phase, and of their orbits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -175,6 +177,13 @@ def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
     angle, velocity = motion.at(times)
     assert_allclose(angle[:, 0], np.abs(times - 0.5005), atol=1e-9)
     assert_allclose(velocity[:, 0], np.where(times < 0.5005, -1.0, 1.0), atol=1e-9)
+
+
+def test_a_strike_is_not_continued_across_another():
+    late = replace(locking(0.9975), step_ends=np.array([0.9985]))
+    assert not np.isin([0.9975, 0.9985], sampled_at_step_ends(late).time).any()
+    apart = replace(locking(0.9), step_ends=np.array([0.9985]))
+    assert np.isin([0.9, 0.9985], sampled_at_step_ends(apart).time).all()
 
 
 def test_knees_that_lock_a_moment_apart_are_no_difference_between_impacts():

@@ -2,7 +2,8 @@
 
 With absolute angles such a body's angular velocity is a weighted sum of others', omega = E z with constant E. The
 equations of the walker become E'ME dz = E'r, and are solved in place: what acts on a held body is handed to those it
-follows, and its own row becomes the identity. Which bodies are held may change while the walker walks.
+follows, and its own row becomes the identity. Which bodies are held may change while the walker walks. A shank that an
+ideal lock holds is no body of its own once both feet are free: see merged.py.
 """
 
 from typing import Any, NamedTuple
@@ -57,7 +58,7 @@ class OneBends(NamedTuple):
 
 
 class NoneBends(NamedTuple):
-    """Both are."""
+    """Both knees are locked, and thigh and shank of either leg are one body."""
 
     release_at_touch: bool
 
@@ -218,13 +219,16 @@ def locked_shanks(knees: Knees, knee: Any, flags: Flags) -> Flags:
 
 @by_type
 def bends_otherwise(knees: Any, knee: Any) -> bool:
-    """Whether another knee can bend now than the walker's bodies are for: (2,) what each knee is doing."""
+    """Whether the walker has to go on with other bodies, since a knee locked or was released.
+
+    knee  (2,) what each knee is doing
+    """
 
 
 @bends_otherwise.case(NoKnees)
 @bends_otherwise.case(Knees)
 def never(knees: Any, knee: Any) -> bool:
-    """They are for all that may be."""
+    """Its bodies serve any."""
     return False
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.ground.held import Held, IdealLock, Independent, Knees
 from walkerlab.ground.walker import ContactWalker, Foot
 from walkerlab.kernels import by_type, inlined
+from walkerlab.mechanics.rigid import merged_tree, numbers
 from walkerlab.mechanics.tree import Tree
 from walkerlab.mechanics.tuples import Vector, put
 from walkerlab.solvers.system import State
@@ -23,7 +24,7 @@ class Unmerged(NamedTuple):
 
 
 class Fewer(NamedTuple):
-    """The bodies of a walker of which some are one."""
+    """A walker some of whose bodies are one."""
 
     onto: tuple[int, ...]  # (n) which of these each body of the whole walker is
     tree: Tree
@@ -35,21 +36,27 @@ class Fewer(NamedTuple):
 
 
 class ByKnees(NamedTuple):
-    """While knees are locked the walker moves as one of fewer bodies; the knee of one leg at least always is."""
+    """While knees are locked the walker moves as one of fewer bodies.
+
+    At least one knee always is: that of the stance leg, since a foot that comes down on a bent knee ends the walk.
+    """
 
     one: tuple[Fewer, Fewer]  # knee 0, or knee 1, is locked
     both: Fewer
-    locking: tuple[Held, Held]  # of `one`: what holds the shank of the other knee as well, as that locks
+    locking: tuple[Held, Held]  # of `one`: what holds the shank of the other knee as well, when it locks
 
 
 class Merged(NamedTuple):
-    """The walker is such a one."""
+    """This walker already has fewer bodies."""
 
     onto: tuple[int, ...]  # (n) which of its bodies each body of the whole walker is
 
 
 def with_merged_bodies(walker: ContactWalker) -> ContactWalker:
-    """The walker, told what to walk as while its knees are locked; a stop keeps its angle, and so its bodies."""
+    """The walker, told what to walk as while its knees are locked.
+
+    One with compliant stops keeps its bodies, since a latched stop keeps its angle.
+    """
     if not isinstance(walker.knees, Knees) or not isinstance(walker.knees.stop, IdealLock):
         return walker
     one = (with_locked(walker, (0,)), with_locked(walker, (1,)))
@@ -67,16 +74,12 @@ def with_locked(walker: ContactWalker, locked: Sequence[int]) -> Fewer:
     E = np.eye(len(kept))[list(onto)]
 
     def summed(row: Vector) -> Vector:
-        return tuple(float(x) for x in np.array(row) @ E)
+        return numbers(np.array(row) @ E)
 
-    def both_ways(square: Vector) -> Vector:
-        return tuple(float(x) for x in (E.T @ np.array(square).reshape(n, n) @ E).ravel())
-
-    tree = walker.tree
     feet = tuple(Foot(summed(f.lever_x), summed(f.lever_y), summed(f.rolling), f.radius) for f in walker.feet)
     return Fewer(
         onto=onto,
-        tree=Tree(tree.mass, both_ways(tree.cosine), both_ways(tree.sine), summed(tree.arm_x), summed(tree.arm_y)),
+        tree=merged_tree(walker.tree, E),
         feet=(feet[0], feet[1]),
         held=held_among(walker.held, kept, E),
         thighs=(onto[knees.thighs[0]], onto[knees.thighs[1]]),
@@ -92,7 +95,7 @@ def held_among(held: Held, kept: list[int], E: NDArray[np.float64]) -> Held | In
     if not always.any():
         return Independent()
     weights = (np.array(held.weights).reshape(n, n)[kept] @ E) * always[:, None]
-    return Held(tuple(float(x) for x in weights.ravel()), tuple(bool(x) for x in always))
+    return Held(numbers(weights.ravel()), tuple(bool(x) for x in always))
 
 
 def held_by_knee(fewer: Fewer, knee: int) -> Held:
@@ -102,11 +105,11 @@ def held_by_knee(fewer: Fewer, knee: int) -> Held:
     if isinstance(fewer.held, Held):
         weights, always = np.array(fewer.held.weights).reshape(n, n), fewer.held.always
     weights[fewer.shanks[knee], fewer.thighs[knee]] = 1.0
-    return Held(tuple(float(x) for x in weights.ravel()), always)
+    return Held(numbers(weights.ravel()), always)
 
 
 @inlined
-def merged(walker: ContactWalker, fewer: Fewer, held: Any, knees: Any) -> ContactWalker:
+def as_fewer(walker: ContactWalker, fewer: Fewer, held: Any, knees: Any) -> ContactWalker:
     """The walker with so many bodies, what is held of them and the knees that are left, on the same ground."""
     return ContactWalker(
         fewer.tree,
@@ -158,17 +161,20 @@ def place_of(onto: tuple[int, ...], i: int, size: int) -> int:
 
 @inlined
 def merged_state(onto: tuple[int, ...], whole: Any, y: State) -> State:
-    """The merged walker's state of the whole one's numbers; of y only the length matters."""
+    """The merged walker's state of the whole one's numbers; of y only the length matters.
+
+    Bodies that are one turn alike up to rounding; of each group the first tells.
+    """
     for i in range(whole.size - 1, -1, -1):
         y = put(y, place_of(onto, i, len(y)), whole[i])
     return y
 
 
 @inlined
-def merged_levers(onto: tuple[int, ...], levers: Vector, merged: Vector) -> Vector:
-    """E'd of one row of levers; of `merged` only the length matters."""
-    for k in range(len(merged)):
-        merged = put(merged, k, 0.0)
+def merged_levers(onto: tuple[int, ...], levers: Vector, summed: Vector) -> Vector:
+    """E'd of one row of levers; of `summed` only the length matters."""
+    for k in range(len(summed)):
+        summed = put(summed, k, 0.0)
     for k in range(len(onto)):
-        merged = put(merged, onto[k], merged[onto[k]] + levers[k])
-    return merged
+        summed = put(summed, onto[k], summed[onto[k]] + levers[k])
+    return summed

@@ -34,7 +34,7 @@ class ContactWalker(NamedTuple):
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # rad
     held: Any  # Independent or Held: which bodies follow others
-    knees: Any  # NoKnees or Knees
+    knees: Any  # NoKnees, Knees, OneBends or NoneBends
     legs: tuple[tuple[int, ...], tuple[int, ...]]  # bodies of either leg of the whole walker, from the hip down
     blank: State  # a state of zeros
     merging: Any  # Unmerged, ByKnees or Merged: what it is while knees are locked

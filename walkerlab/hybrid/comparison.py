@@ -110,7 +110,8 @@ class Motion:
 def sampled_at_step_ends(motion: Motion) -> Motion:
     """The motion with a sample at the end of every step, and on either side of every knee strike.
 
-    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after.
+    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after,
+    unless another strike lies among them.
     A compliant impact or an ideal lock takes less than the time between samples: interpolating across would smear it.
     """
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
@@ -123,6 +124,8 @@ def sampled_at_step_ends(motion: Motion) -> Motion:
         place = np.searchsorted(motion.time, strike)
         if 3 <= place <= motion.time.size - 3 and strike not in motion.time:
             added += [(strike - side, slice(place - 3, place)), (strike, slice(place, place + 3))]
+    strikes = np.concatenate((motion.step_ends, motion.knee_strikes))
+    added = [(at, known) for at, known in added if not jumps_among(motion.time[known], at, strikes, 2.0 * side)]
     if not added:
         return motion
     rows = [continued(motion, known, at) for at, known in added]
@@ -131,6 +134,12 @@ def sampled_at_step_ends(motion: Motion) -> Motion:
     angle = np.concatenate((motion.angle, [row[0] for row in rows]))
     velocity = np.concatenate((motion.velocity, [row[1] for row in rows]))
     return replace(motion, time=time[order], angle=angle[order], velocity=velocity[order])
+
+
+def jumps_among(times: Array, at: float, strikes: Array, close: float) -> bool:
+    """Whether a strike other than the one at `at` (s), or closer to it than `close`, lies between it and the times."""
+    between = (strikes > min(times[0], at)) & (strikes < max(times[-1], at)) & (np.abs(strikes - at) > close)
+    return bool(between.any())
 
 
 def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ class ContactObserver(NamedTuple):
 
     booked: bool  # whether to keep the books
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 8)
+    states: Any  # (samples, 4 + 2 n) of the whole walker
     carried: Any  # (samples, 2)
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing

@@ -1,7 +1,7 @@
 """A walk on compliant ground with as few bodies as its knees allow.
 
 Between a knee's lock and its release thigh and shank are one body, so the walk is one of several walkers that take
-turns: of three bodies while a knee of two can bend, of two bodies while none can. The whole walker's state is handed
+turns: of one body fewer while one knee can bend, of two fewer while none can. The whole walker's state is handed
 from one to the next, and so is the tangent.
 """
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.held import LOCKED, NoneBends, OneBends, always_held, no_stops
-from walkerlab.ground.merged import ByKnees, Unmerged, merged, merged_levers, merged_state, place_of, store_whole
+from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, merged_state, place_of, store_whole
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import CLIMB, EXTENSION, HEIGHT, PER_FOOT, Frame
@@ -109,7 +109,7 @@ def walk_with_fewer_bodies(
     while outcome == GOES_ON:
         if ledger.knee[0] == LOCKED and ledger.knee[1] == LOCKED:
             fewer = merging.both
-            straight = merged(walker, fewer, fewer.held, NoneBends(walker.knees.release_at_touch))
+            straight = as_fewer(walker, fewer, fewer.held, NoneBends(walker.knees.release_at_touch))
             seen = seen_by(observer, observer.merged[1], fewer.onto)
             outcome = walk_merged(
                 straight, terrain, frame, method, method.both, finder, seen, ledger, stop_passing_after
@@ -142,8 +142,8 @@ def walk_bending(
     """Walk while the knee of leg `swing` can bend; from its release, or from where the walk starts, to its lock."""
     fewer = merging.one[1 - swing]
     knees = OneBends(fewer.thighs, fewer.shanks, walker.knees.release_at_touch)
-    bending = merged(walker, fewer, fewer.held, knees)
-    locking = merged(walker, fewer, merging.locking[1 - swing], knees)
+    bending = as_fewer(walker, fewer, fewer.held, knees)
+    locking = as_fewer(walker, fewer, merging.locking[1 - swing], knees)
     seen = seen_by(observer, observer.merged[0], fewer.onto)
     if released and seen.tangent.Phi.shape[1] > 0:
         cross_release(locking, swing, seen.tangent, ledger, method)

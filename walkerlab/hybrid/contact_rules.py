@@ -339,7 +339,7 @@ def knee_follows(knees: Any, ledger: Ledger, trailing: int) -> None:
 @note_flexion.case(Knees)
 @note_flexion.case(OneBends)
 def knees_flex(knees: Any, ledger: Ledger, y: State) -> None:
-    """Either may."""
+    """Those that can bend."""
     for knee in range(2):
         if ledger.knee[knee] == RELEASED and extension(knees, knee, y, 2) < -FLEXED:
             ledger.knee[knee] = BENT

@@ -74,7 +74,7 @@ class MethodSettings:
         return self.method.new(n, self.rtol, self.atol, self.budget)
 
     def of(self, walker: ContactWalker) -> Any:
-        """The method with memory for a walker, with as few bodies as its knees allow."""
+        """The method with memory for a walker with both feet free, with as few bodies as its knees allow."""
         if isinstance(walker.merging, ByKnees):
             return method_by_knees(walker.merging, len(walker.blank), self.new)
         return self.new(len(walker.blank))
@@ -330,7 +330,7 @@ def walk_contact(
 
     pinned      the hinged first step, or None
     stance      the foot that carries the first step
-    start       state of the free walker (8); its angles and angular velocities start the hinged one
+    start       state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
     methods     how to integrate
     interval_s  time between samples, or None for none
     booked      whether to keep the energy's books

@@ -53,7 +53,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     torso, knees = torso_rows(assembly, places), knee_rows(places)
     n = len(places.names)
     free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
-    tree = merged(tree_about(assembly, root), places.members)
+    tree = merged_tree(tree_about(assembly, root), places.members)
     return Standing(
         tree=tree,
         centrifugal=tree,
@@ -134,7 +134,7 @@ def links(torso: dict[int, Floats], knees: dict[int, Floats], n: int) -> Indepen
     return InLine(every, others, (0.0,) * (n - 1), (0.0,) * (n - 1) ** 2)
 
 
-def merged(tree: Tree, members: Floats) -> Tree:
+def merged_tree(tree: Tree, members: Floats) -> Tree:
     """The tree of places: bodies that turn as one are one."""
     bodies = len(members)
     A, B = np.reshape(tree.cosine, (bodies, bodies)), np.reshape(tree.sine, (bodies, bodies))

@@ -80,7 +80,7 @@ class EngineScene:
         return np.asarray(self.chain[shank] - self.chain[thigh])
 
     def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
-        """The scene while each of its knees is doing this."""
+        """The scene with those knees locked that are LOCKED."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
