@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from walkerlab.kernels import by_type, kernel, uncompiled, watched
+from walkerlab.kernels import by_type, compiling, kernel, uncompiled, watched
 
 
 class Circle(NamedTuple):
@@ -54,6 +54,7 @@ def test_memory_comes_with_the_arguments():
     with pytest.raises(TypingError):
         allocating(3)
     assert gc.get_threshold() == thresholds  # as before, also where nothing could be compiled
+    assert not compiling
     assert uncompiled(allocating)(3) == 0.0
 
 

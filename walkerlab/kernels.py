@@ -50,8 +50,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 watchers: list[Callable[[str], None]] = []
 """Told the name of the kernel that this process compiles, or waits for, and '' once none is."""
-compiling: list[str] = []
-"""The kernels that this process is compiling, each called by the one before it."""
+compiling: list[tuple["KernelCache", str]] = []
+"""The kernels that this process is compiling, with their signatures; each is called by the one before it."""
 
 
 PACKAGE = Path(__file__).parent
@@ -192,7 +192,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         super().__init__(py_func)
         locator = self._impl.locator
         self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
-        self._kernel = py_func.__name__
+        self.kernel = py_func.__name__
         self._held: dict[str, Any] = {}
 
     def load_overload(self, signature: Any, context: Any) -> Any:
@@ -201,13 +201,13 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         if found is not None or str(signature) in self._held:
             return found
         for tell in watchers:
-            tell(self._kernel)
-        lock = _lock(f"{self._kernel} {signature}")
+            tell(self.kernel)
+        lock = _lock(f"{self.kernel} {signature}")
         lock.acquire()
         found = super().load_overload(signature, context)
         if found is None:
             self._held[str(signature)] = lock
-            compiling.append(self._kernel)
+            compiling.append((self, str(signature)))
         else:
             _finished(lock)
         return found
@@ -215,13 +215,17 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def save_overload(self, signature: Any, data: Any) -> None:
         """Store what was compiled."""
         try:
-            with _lock(self._kernel):  # one index for all signatures
+            with _lock(self.kernel):  # one index for all signatures
                 super().save_overload(signature, data)
         finally:
-            lock = self._held.pop(str(signature), None)
-            if lock is not None:
-                compiling.remove(self._kernel)
-            _finished(lock)
+            self.finish(str(signature))
+
+    def finish(self, signature: str) -> None:
+        """The kernel is compiled, or cannot be."""
+        lock = self._held.pop(signature, None)
+        if lock is not None:
+            compiling.remove((self, signature))
+        _finished(lock)
 
 
 def _lock(name: str) -> Any:
@@ -237,7 +241,7 @@ def _finished(lock: Any) -> None:
     if lock is not None:
         lock.release()
     for tell in watchers:
-        tell(compiling[-1] if compiling else "")
+        tell(compiling[-1][0].kernel if compiling else "")
 
 
 @contextlib.contextmanager
@@ -266,6 +270,11 @@ class _KernelCompiler(Compiler):  # type: ignore[misc]
         gc.set_threshold(*SELDOM)
         try:
             return super().compile_extra(func)
+        except Exception:
+            if compiling and compiling[-1][0].kernel == func.__name__:
+                cache, signature = compiling[-1]
+                cache.finish(signature)
+            raise
         finally:
             gc.set_threshold(*usual)
 
