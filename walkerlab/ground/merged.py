@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from walkerlab.ground.held import Held, IdealLock, Independent, Knees
 from walkerlab.ground.walker import ContactWalker, Foot
 from walkerlab.kernels import by_type, inlined
-from walkerlab.mechanics.rigid import merged_tree, numbers
-from walkerlab.mechanics.tree import Tree
-from walkerlab.mechanics.tuples import Vector, put
+from walkerlab.mechanics.tree import Tree, merged_tree
+from walkerlab.mechanics.tuples import Vector, numbers, put
 from walkerlab.solvers.system import State
 
 

@@ -11,7 +11,8 @@ from walkerlab.mechanics.assembly import Anchor, levers, tree_about
 from walkerlab.mechanics.links import Independent, InLine, Links
 from walkerlab.mechanics.parts import Assembly, Revolute
 from walkerlab.mechanics.standing import SHANK, STANCE, SWING, NoKnee, Standing, SwingKnee, on_slope
-from walkerlab.mechanics.tree import Tree
+from walkerlab.mechanics.tree import merged_tree
+from walkerlab.mechanics.tuples import numbers
 
 Floats = NDArray[np.float64]
 ALIKE = 1e-12  # relative difference up to which two legs are alike
@@ -132,24 +133,6 @@ def links(torso: dict[int, Floats], knees: dict[int, Floats], n: int) -> Indepen
         return every
     others = links({k - 1: np.delete(row, SHANK) for k, row in torso.items()}, {}, n - 1)
     return InLine(every, others, (0.0,) * (n - 1), (0.0,) * (n - 1) ** 2)
-
-
-def merged_tree(tree: Tree, members: Floats) -> Tree:
-    """The tree of places: bodies that turn as one are one."""
-    bodies = len(members)
-    A, B = np.reshape(tree.cosine, (bodies, bodies)), np.reshape(tree.sine, (bodies, bodies))
-    return Tree(
-        mass=tree.mass,
-        cosine=numbers((members.T @ A @ members).ravel()),
-        sine=numbers((members.T @ B @ members).ravel()),
-        arm_x=numbers(np.array(tree.arm_x) @ members),
-        arm_y=numbers(np.array(tree.arm_y) @ members),
-    )
-
-
-def numbers(values: Floats) -> tuple[float, ...]:
-    """An array as compiled code takes constants."""
-    return tuple(float(value) for value in values)
 
 
 def hip_of(assembly: Assembly) -> Revolute:

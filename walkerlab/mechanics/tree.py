@@ -8,9 +8,12 @@ With sines and cosines of the angles, Delta = theta_l - theta_k:
 
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.mechanics.tuples import Vector, put
+from walkerlab.mechanics.tuples import Vector, numbers, put
 
 
 class Tree(NamedTuple):
@@ -79,3 +82,16 @@ def tree_gradients(tree: Tree, s: Vector, c: Vector, y: Vector, first: int, alph
             J[row, first + l] += along
             J[row, first + k] -= along
             J[row, rates + l] += 2.0 * omega * (A * sin_d - B * cos_d)
+
+
+def merged_tree(tree: Tree, members: NDArray[np.float64]) -> Tree:
+    """The tree of fewer bodies: which of them each of the n is says `members` (n, fewer), in ones and zeros."""
+    n = len(members)
+    A, B = np.reshape(tree.cosine, (n, n)), np.reshape(tree.sine, (n, n))
+    return Tree(
+        mass=tree.mass,
+        cosine=numbers((members.T @ A @ members).ravel()),
+        sine=numbers((members.T @ B @ members).ravel()),
+        arm_x=numbers(np.array(tree.arm_x) @ members),
+        arm_y=numbers(np.array(tree.arm_y) @ members),
+    )

@@ -2,13 +2,20 @@
 
 from typing import Any
 
+import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import overload
+from numpy.typing import NDArray
 
 from walkerlab.kernels import PART_FLAGS, inlined
 from walkerlab.solvers.lanes import holds_lanes, in_lanes
 
 Vector = tuple[float, ...]
+
+
+def numbers(values: NDArray[np.float64]) -> Vector:
+    """An array as compiled code takes constants."""
+    return tuple(float(value) for value in values)
 
 
 def put(vector: Vector, index: int, value: float) -> Vector:

@@ -7,9 +7,9 @@ updates serve between them (Broyden 1965, his first method). What is found is so
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.kernels import inlined, kernel
-from walkerlab.orbits.small_slope import Vector
 from walkerlab.orbits.step_map import (
     MOST_EVALUATIONS,
     NO_RESIDUAL,
@@ -22,6 +22,8 @@ from walkerlab.orbits.step_map import (
     step_with_jacobian,
 )
 from walkerlab.solvers.stepping import T, clear_counts
+
+Floats = NDArray[np.float64]
 
 # angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
 # free at heel strike
@@ -40,7 +42,7 @@ class KnownGaits(NamedTuple):
     inverse: Any  # (gaits, d, d) of I - DP there
 
 
-def known_gaits(shooting: Shooting, gaits: list[tuple[Vector, Vector]]) -> KnownGaits:
+def known_gaits(shooting: Shooting, gaits: list[tuple[Floats, Floats]]) -> KnownGaits:
     """Gaits by state (d,) and derivative (d, d) of the step map there."""
     d = shooting.move.size
     z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
