@@ -107,7 +107,7 @@ class Motion:
         return replace(self, time=time, angle=angle, velocity=velocity, step_ends=self.step_ends[-2:])
 
 
-def sampled_at_step_ends(motion: Motion) -> Motion:
+def sampled_at_strikes(motion: Motion) -> Motion:
     """The motion with a sample at the end of every step, and on either side of every knee strike.
 
     Where there is none, it is continued from the three samples before, and behind a knee strike from the three after,

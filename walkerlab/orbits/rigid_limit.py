@@ -24,7 +24,7 @@ from walkerlab.hybrid.comparison import (
     between_impacts,
     difference_in_phase,
     difference_in_time,
-    sampled_at_step_ends,
+    sampled_at_strikes,
 )
 from walkerlab.hybrid.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
@@ -179,7 +179,7 @@ class Limit:
             return distance
         angle, velocity = motion_of_legs(walk.samples.states, walker)
         strikes = walk.knee_strike_s[walk.knee_strike_s > 0.0]
-        motion = sampled_at_step_ends(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, strikes))
+        motion = sampled_at_strikes(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, strikes))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases)
         smooth = between_impacts(motion, self.rigid.motion, phases)

@@ -12,7 +12,7 @@ from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
+from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
@@ -155,7 +155,7 @@ def motion_of(walk: Content) -> Motion | None:
         step_ends(walk),
         np.array([strike for strike in strikes if strike > 0.0]),
     )
-    return sampled_at_step_ends(motion)
+    return sampled_at_strikes(motion)
 
 
 def step_ends(walk: Content) -> Any:

@@ -12,7 +12,7 @@ from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.comparison import Motion, sampled_at_step_ends
+from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait
@@ -106,7 +106,7 @@ def limit_findings(
         return None
     legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
     strikes = np.zeros(0) if walk.knee_strikes is None else walk.knee_strikes
-    motion = sampled_at_step_ends(
+    motion = sampled_at_strikes(
         Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes, strikes)
     )
     limit = Limit(

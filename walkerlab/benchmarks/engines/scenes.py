@@ -13,6 +13,7 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import LOCKED, IdealLock
+from walkerlab.ground.merged import Unmerged
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import Ground, knees_at_start
 from walkerlab.mechanics.assembly import masses, total_mass
@@ -151,7 +152,7 @@ def engine_scene(
         for foot, part in zip(ours.feet, assembly.feet, strict=True)
         for d in (levers_from(assembly, base, hip, part.body, part.centre_m),)
     )
-    walker = ours._replace(feet=(feet[0], feet[1]))
+    walker = ours._replace(feet=(feet[0], feet[1]), merging=Unmerged())
     scene = EngineScene(name, assembly, base, hip, gravity, ours, walker, ground, STANCE_FOOT, start)
     return scene.with_knees_locked(knees_at_start(ours, STANCE_FOOT, start))
 
