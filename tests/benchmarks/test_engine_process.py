@@ -1,11 +1,14 @@
 """An engine's crash, exception or endless loop ends its own task and nothing else."""
 
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 from crashing_tasks import Answers, Crashes, Raises, Sleeps
 
 from walkerlab.benchmarks.engines import process
+from walkerlab.benchmarks.engines.adapter import Stepping
+from walkerlab.benchmarks.engines.experiments import lost_row
 from walkerlab.benchmarks.engines.process import Lost, OwnProcess
 
 
@@ -48,3 +51,10 @@ def test_who_stops_waiting_ends_what_runs(own):
         assert isinstance(waiting.result(30.0), Lost)
     with pytest.raises(RuntimeError, match="nobody waits"):
         own.do(Answers(2), 1.0)
+
+
+def test_a_lost_run_took_no_time_that_anybody_knows():
+    scene = SimpleNamespace(name="compass")
+    row = lost_row(scene, "engine", "1.0", "own-law", Stepping("rule", 1e-4), "rule", 1.0, Lost("it crashed"))
+    assert row.wall_s is None
+    assert row.error is None

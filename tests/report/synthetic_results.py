@@ -138,6 +138,7 @@ def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
         "static_penetration_m": 5.88e-5,
         "damping_ratio": 3.71,
         "pitch_m": LENGTH,
+        "friction": "creeping friction of its own kind",
     }
     return stored("contact-sim", {"trajectory": trajectory}, walk(outcome, steps, **(numbers | changed)))
 

@@ -400,3 +400,7 @@ def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
     made = assumptions.section(Results(config("contact=null"), {"simulate": walk}))
     assert "The stance foot does not slip: needs friction (0.203)" in made.finding
+
+
+def test_the_page_names_the_law_of_friction_that_walked():
+    assert "there is creeping friction of its own kind." in texts(sections()["contact"])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
 from walkerlab.ground.compliant import STANCE_FOOT, contact_walker
-from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.friction import Coulomb, Frictionless, switching_count
 from walkerlab.ground.motion import OnGround
-from walkerlab.hybrid.contact_events import MATERIAL, STICKS_FORWARD, feet_motion, joins
+from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL, feet_motion
 from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.mechanics.parts import Assembly, Body, Particle
 from walkerlab.scene import left_out
@@ -136,8 +136,8 @@ def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
 
 
 def test_frictionless_ground_has_four_joins_less():
-    assert joins(Coulomb(0.9, 0.7, 0.1, 1.0)) == MATERIAL
-    assert joins(Frictionless()) == STICKS_FORWARD == MATERIAL - 4
+    assert switching_count(Coulomb(0.9, 0.7, 0.1, 1.0)) == MATERIAL - FRICTION_SWITCHES == 4
+    assert switching_count(Frictionless()) == 0
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,9 @@ def test_what_an_output_is_said_to_take_is_what_it_takes(walks, stage, numbers, 
 def test_what_a_scene_is_said_to_save_is_what_it_saves():
     said = left_out.of_contact_walk(load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config)
     saved = {entry["what"]: entry["saves"] for entry in said}
-    assert saved["tangential velocity and friction force"].startswith(f"{MATERIAL - STICKS_FORWARD} of the {MATERIAL} ")
+    assert saved["tangential velocity and friction force"].startswith(
+        f"{MATERIAL - FRICTION_SWITCHES} of the {MATERIAL} "
+    )
     scene = contact_scene(load(None, ("contact.stance=pinned",)).config, 0.3714)
     free, hinged = len(scene.walker.blank), len(scene.pinned.blank)
     assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")

@@ -182,6 +182,7 @@ def test_a_walk_that_ends_before_its_first_step_is_an_answer_that_can_be_stored(
     summary = content.summary
     assert summary["outcome"] != "walked"
     assert summary["steps"] == 0
+    assert summary["rolling_per_step_m"] is None
     assert summary["step_periods_s"] == []
     assert summary["slip_per_step_m"] == 0.0
     assert len(summary["advice"]) > 20

@@ -5,7 +5,6 @@ from __future__ import annotations
 from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import Ground
 from walkerlab.mechanics.standing import swing_foot
@@ -30,13 +29,7 @@ def near_rigid_trial(
     normal = walker.normal._replace(
         stiffness=STIFFER * walker.normal.stiffness, damping=STIFFER * walker.normal.damping
     )
-    friction = walker.friction
-    if isinstance(friction, Coulomb):
-        friction = friction._replace(
-            stiction_velocity=SLOWER * friction.stiction_velocity,
-            friction_velocity=SLOWER * friction.friction_velocity,
-        )
-    stiffer = walker._replace(normal=normal, friction=friction)
+    stiffer = walker._replace(normal=normal, friction=walker.friction.with_creep(SLOWER))
     return trial_of(scene, stiffer, state, steps, "contact-near-rigid")
 
 

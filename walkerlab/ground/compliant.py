@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.friction import FrictionLaw
 from walkerlab.ground.held import Held, IdealLock, Independent, Knees, NoKnees, always_held, no_stops
 from walkerlab.ground.merged import Unmerged, with_merged_bodies
 from walkerlab.ground.normal_force import NormalLaw
@@ -29,7 +29,7 @@ class KneeRules:
 def contact_walker(
     assembly: Assembly,
     normal: NormalLaw,
-    friction: Coulomb | Frictionless,
+    friction: FrictionLaw,
     gravity: float,
     slope: float,
     knee_rules: KneeRules | None = None,

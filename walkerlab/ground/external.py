@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.friction import FrictionLaw
 from walkerlab.ground.held import Independent, NoKnees
 from walkerlab.ground.merged import Unmerged
 from walkerlab.ground.motion import OnGround, all_wrenches
@@ -23,7 +23,7 @@ from walkerlab.solvers.vectors import load
 LEGS = ((0,), (1,))  # of no consequence to the feet
 
 
-def in_arrays(walker: ContactWalker) -> tuple[Any, Any, Coulomb | Frictionless]:
+def in_arrays(walker: ContactWalker) -> tuple[Any, Any, FrictionLaw]:
     """Levers (6, n) and numbers of a walker as arrays, and its friction: a call with these takes a microsecond."""
     rows = [row for foot in walker.feet for row in (foot.lever_x, foot.lever_y, foot.rolling)]
     numbers = np.array([walker.slope, walker.feet[0].radius, walker.feet[1].radius, *walker.normal])

@@ -1,9 +1,57 @@
-"""Tangential force of the ground: ADAMS's Coulomb friction without true stick, or none."""
+"""Tangential force of the ground: ADAMS's Coulomb friction without true stick, or none.
 
-from typing import Any, NamedTuple
+A law is a class of its parameters with what `FrictionLaw` lists, a case of each compiled function below, and a name in
+`FRICTION_LAWS`. Nothing outside this file asks which law it is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple, Protocol, Self
 
 from walkerlab.ground.smooth_step import smooth_step
 from walkerlab.kernels import by_type
+
+
+class FrictionLaw(Protocol):
+    """What a law declares beside its force."""
+
+    @classmethod
+    def of(cls, contact: Any) -> Self:
+        """The law with the parameters of a contact block, a `config.contact.ContactSI`."""
+
+    @property
+    def largest(self) -> float:
+        """The largest coefficient."""
+
+    @property
+    def rising_until(self) -> float:
+        """Slip velocity (m/s) up to which the coefficient grows; infinite if there is no friction."""
+
+    @property
+    def sliding_from(self) -> float:
+        """Slip velocity (m/s) from which on the coefficient is that of a sliding foot."""
+
+    def with_creep(self, factor: float) -> Self:
+        """The law whose slip velocities are this many times as large."""
+
+    def in_words(self) -> str:
+        """The law with its parameters, as the end of 'there is'."""
+
+
+@by_type
+def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
+    """Tangential over normal force at a slip velocity (m/s), against the slip, and its derivative (s/m)."""
+
+
+@by_type
+def switching_count(law: Any) -> int:
+    """How many event functions tell where the coefficient follows another formula: at most four."""
+
+
+@by_type
+def sample_switching(law: Any, slip: float, values: Any, first: int, j: int) -> None:
+    """These event functions at a slip velocity (m/s) into values[first:, j]."""
 
 
 class Coulomb(NamedTuple):
@@ -14,14 +62,43 @@ class Coulomb(NamedTuple):
     stiction_velocity: float  # [v_s] m/s
     friction_velocity: float  # [v_d] m/s
 
+    @classmethod
+    def of(cls, contact: Any) -> Coulomb:
+        """The law with the parameters of a contact block, a `config.contact.ContactSI`."""
+        return cls(
+            contact.static_friction,
+            contact.dynamic_friction,
+            contact.stiction_velocity_m_s,
+            contact.friction_velocity_m_s,
+        )
 
-class Frictionless(NamedTuple):
-    """A ground that pushes but does not hold."""
+    @property
+    def largest(self) -> float:
+        """The static coefficient."""
+        return self.static
 
+    @property
+    def rising_until(self) -> float:
+        """The stiction velocity, m/s."""
+        return self.stiction_velocity
 
-@by_type
-def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
-    """Tangential over normal force at a slip velocity (m/s), against the slip, and its derivative (s/m)."""
+    @property
+    def sliding_from(self) -> float:
+        """The friction velocity, m/s."""
+        return self.friction_velocity
+
+    def with_creep(self, factor: float) -> Coulomb:
+        """The law whose slip velocities are this many times as large."""
+        return self._replace(
+            stiction_velocity=factor * self.stiction_velocity, friction_velocity=factor * self.friction_velocity
+        )
+
+    def in_words(self) -> str:
+        """The law with its parameters, as the end of 'there is'."""
+        return (
+            f"Coulomb friction as ADAMS has it, with a coefficient of {self.static:g} at a slip of "
+            f"{self.stiction_velocity:g} m/s and {self.dynamic:g} from {self.friction_velocity:g} m/s on"
+        )
 
 
 @friction_coefficient.case(Coulomb)
@@ -40,7 +117,74 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
     return (-mu if slip > 0.0 else mu), -slope
 
 
+@switching_count.case(Coulomb)
+def coulomb_switching_count(law: Coulomb) -> int:
+    """Either velocity, in either direction."""
+    return 4
+
+
+@sample_switching.case(Coulomb)
+def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int, j: int) -> None:
+    """The velocities at which one formula follows another."""
+    values[first, j] = slip - law.stiction_velocity
+    values[first + 1, j] = slip + law.stiction_velocity
+    values[first + 2, j] = slip - law.friction_velocity
+    values[first + 3, j] = slip + law.friction_velocity
+
+
+class Frictionless(NamedTuple):
+    """A ground that pushes but does not hold."""
+
+    @classmethod
+    def of(cls, contact: Any) -> Frictionless:  # noqa: ARG003
+        """No parameters."""
+        return cls()
+
+    @property
+    def largest(self) -> float:
+        """No force at all."""
+        return 0.0
+
+    @property
+    def rising_until(self) -> float:
+        """Never reached."""
+        return math.inf
+
+    @property
+    def sliding_from(self) -> float:
+        """A foot always slides."""
+        return 0.0
+
+    def with_creep(self, factor: float) -> Frictionless:  # noqa: ARG002
+        """The same: there is no creep."""
+        return self
+
+    def in_words(self) -> str:
+        """As the end of 'there is'."""
+        return "no friction"
+
+
 @friction_coefficient.case(Frictionless)
 def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
-    """Nothing."""
+    """Zero."""
     return 0.0, 0.0
+
+
+@switching_count.case(Frictionless)
+def no_switching_count(law: Frictionless) -> int:
+    """One formula holds everywhere."""
+    return 0
+
+
+@sample_switching.case(Frictionless)
+def sample_no_switching(law: Frictionless, slip: float, values: Any, first: int, j: int) -> None:
+    """There is none to sample."""
+
+
+FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none": Frictionless}
+"""The laws by the words of the config's contact.friction."""
+
+
+def steepest_change(law: FrictionLaw, slip: float) -> float:
+    """How far the coefficient may change within a slip velocity (m/s): by its slope where the foot is at rest."""
+    return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

@@ -29,7 +29,7 @@ class ContactWalker(NamedTuple):
     tree: Tree
     feet: tuple[Foot, Foot]
     normal: NormalLaw
-    friction: Any  # Coulomb or Frictionless
+    friction: Any  # a FrictionLaw
     gravity_along: float  # m/s^2
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # rad

@@ -8,7 +8,7 @@ others are joins of the force law, where its derivatives jump: a step that ends 
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.friction import sample_switching, switching_count
 from walkerlab.ground.held import (
     BENT,
     LOCKED,
@@ -32,7 +32,7 @@ from walkerlab.solvers.system import State
 
 # signals of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
-STICKS_FORWARD, STICKS_BACKWARD, SLIDES_FORWARD, SLIDES_BACKWARD = range(5, 9)
+FRICTION_SWITCHES = 5  # up to four, of the friction law
 MATERIAL, CLIMB = 9, 10  # no events: where the foot's material is, and how fast its height grows
 PER_FOOT = 11
 # signals of the walker
@@ -181,7 +181,7 @@ def sample_foot(
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
     values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
-    sample_slip(walker.friction, motion.slip, first, j, finder)
+    sample_switching(walker.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 
 @by_type
@@ -270,43 +270,6 @@ def end_of_sinking(releasing: bool, stance: int, at_zero: Any, finder: CrossingF
     return leaves_side(finder, index, -1, at_zero[index] != 0), index
 
 
-@by_type
-def sample_slip(law: Any, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
-    """A foot's friction signals at node j."""
-
-
-@sample_slip.case(Coulomb)
-def sample_coulomb_slip(law: Coulomb, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
-    """The velocities at which the friction's pieces join."""
-    values = finder.values
-    values[first + STICKS_FORWARD, j] = slip - law.stiction_velocity
-    values[first + STICKS_BACKWARD, j] = slip + law.stiction_velocity
-    values[first + SLIDES_FORWARD, j] = slip - law.friction_velocity
-    values[first + SLIDES_BACKWARD, j] = slip + law.friction_velocity
-
-
-@sample_slip.case(Frictionless)
-def sample_no_slip(law: Frictionless, slip: float, first: int, j: int, finder: CrossingFinder) -> None:
-    """Nothing joins."""
-
-
-@by_type
-def joins(law: Any) -> int:
-    """How many signals a foot has that matter with this friction law."""
-
-
-@joins.case(Coulomb)
-def coulomb_joins(law: Coulomb) -> int:
-    """All."""
-    return MATERIAL
-
-
-@joins.case(Frictionless)
-def frictionless_joins(law: Frictionless) -> int:
-    """Those without slip."""
-    return STICKS_FORWARD
-
-
 @inlined
 def earliest_crossing(
     system: Any,
@@ -343,7 +306,9 @@ def earliest_crossing(
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
         inside = feels_ground(system, carried[foot] != 0, lowest)
-        last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
+        last = RELEASE
+        if inside and frame.locate_joins:
+            last = FRICTION_SWITCHES + switching_count(walker.friction)
         for index in range(first, first + last):
             if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
                 continue

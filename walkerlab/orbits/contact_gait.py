@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.terrain import stride_measure
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, SIGNALS
@@ -69,15 +68,15 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
     """Why no gait can exist on this ground, by the balance of momentum and of energy alone, and what to change."""
     if walker.slope <= 0.0:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
-    friction = walker.friction
-    if isinstance(friction, Frictionless):
+    friction, wanted = walker.friction.largest, math.tan(walker.slope)
+    if friction == 0.0:
         return (
             "without friction nothing holds the walker back: it gathers speed along the slope",
             "Give the feet friction: contact.friction: coulomb.",
         )
-    if friction.static < math.tan(walker.slope):
+    if friction < wanted:
         return (
-            f"static friction {friction.static:.3g} is below the slope's {math.tan(walker.slope):.3g}: "
+            f"static friction {friction:.3g} is below the slope's {wanted:.3g}: "
             "on average the ground cannot hold the walker's weight along the slope",
             "Raise contact.static_friction, or choose a gentler slope.",
         )
@@ -121,18 +120,13 @@ def softened(walker: ContactWalker, rigidity: float) -> ContactWalker:
     The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
     """
     stiffer, stickier = STIFFER**rigidity, STICKIER**rigidity
-    normal, friction = walker.normal, walker.friction
-    if isinstance(friction, Coulomb):
-        friction = friction._replace(
-            stiction_velocity=friction.stiction_velocity / stickier,
-            friction_velocity=friction.friction_velocity / stickier,
-        )
+    normal = walker.normal
     harder = normal._replace(
         stiffness=normal.stiffness * stiffer,
         damping=normal.damping * math.sqrt(stiffer),
         full_damping_penetration=normal.full_damping_penetration * stiffer ** (-1.0 / normal.exponent),
     )
-    return walker._replace(normal=harder, friction=friction)
+    return walker._replace(normal=harder, friction=walker.friction.with_creep(1.0 / stickier))
 
 
 def follow_from_rigid(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import (
     PHASES,
@@ -69,18 +68,13 @@ def series_of(name: str, every: int = 1) -> list[Setting]:
 
 def with_contact_of(walker: ContactWalker, setting: Setting) -> ContactWalker:
     """The walker on another ground."""
-    normal, friction = walker.normal, walker.friction
+    normal = walker.normal
     normal = normal._replace(
         stiffness=normal.stiffness * setting.stiffness,
         damping=normal.damping * setting.damping,
         full_damping_penetration=normal.full_damping_penetration * setting.stiffness ** (-1.0 / normal.exponent),
     )
-    if isinstance(friction, Coulomb):
-        friction = friction._replace(
-            stiction_velocity=friction.stiction_velocity * setting.stiction,
-            friction_velocity=friction.friction_velocity * setting.stiction,
-        )
-    return walker._replace(normal=normal, friction=friction)
+    return walker._replace(normal=normal, friction=walker.friction.with_creep(setting.stiction))
 
 
 @dataclass(frozen=True)
@@ -91,6 +85,8 @@ class Distance:
     angle, velocity   largest difference in phase over the walk, between impacts; raw at the same time
     numerical_time    s, change of the last touch's time with the tolerance a hundred times tighter
     wall_s            s, processor time of the walk, the least of several
+
+    What is of walks is None where no walk is compared.
     """
 
     setting: Setting
@@ -105,8 +101,8 @@ class Distance:
     raw_angle: float | None = None
     raw_velocity: float | None = None
     numerical_time: float | None = None
-    evaluations: int = 0
-    wall_s: float = 0.0
+    evaluations: int | None = None
+    wall_s: float | None = None
 
 
 @dataclass(frozen=True)

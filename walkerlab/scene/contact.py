@@ -17,7 +17,7 @@ from walkerlab.ground.compliant import (
     contact_walker,
     pinned_walker,
 )
-from walkerlab.ground.friction import Coulomb, Frictionless
+from walkerlab.ground.friction import FRICTION_LAWS, FrictionLaw
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import AfterMidSwing, Checkerboard, Plane
@@ -179,12 +179,9 @@ def normal_law(contact: Contact) -> NormalLaw:
     return NormalLaw(si.stiffness_N_per_m_e, si.exponent, si.damping_N_s_m, si.full_damping_penetration_m)
 
 
-def friction_law(contact: Contact) -> Coulomb | Frictionless:
+def friction_law(contact: Contact) -> FrictionLaw:
     """The friction in SI; no friction is a law of its own, not a coefficient of zero."""
-    if contact.friction == "none":
-        return Frictionless()
-    si = contact.in_si()
-    return Coulomb(si.static_friction, si.dynamic_friction, si.stiction_velocity_m_s, si.friction_velocity_m_s)
+    return FRICTION_LAWS[contact.friction].of(contact.in_si())
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
@@ -230,4 +227,5 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
         "static_penetration_m": static_penetration(scene),
         "damping_ratio": damping_ratio(scene),
         "pitch_m": scene.pitch_m,
+        "friction": scene.walker.friction.in_words(),
     }

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.held import Knees
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.hybrid.contact_run import (
@@ -106,11 +105,11 @@ def standing(scene: ContactScene) -> tuple[float, ...]:
 
 def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
     """Say so if the tolerance on velocities (m/s) leaves friction to chance."""
-    law = scene.walker.friction
-    if isinstance(law, Coulomb) and atol > RESOLVED * law.stiction_velocity:
+    rising = scene.walker.friction.rising_until
+    if atol > RESOLVED * rising:
         progress.note(
-            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against contact.stiction_velocity, "
-            f"{law.stiction_velocity:g} m/s: friction, and how the walk ends, may be chance; lower atol"
+            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against the slip velocity of the largest "
+            f"friction, {rising:g} m/s: friction, and how the walk ends, may be chance; lower atol"
         )
 
 
@@ -151,7 +150,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
         "slips_m": slips.tolist(),
-        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else 0.0,
+        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else None,
         "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, result.dissipated_J),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.friction import Coulomb
+from walkerlab.ground.friction import steepest_change
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
@@ -108,20 +108,10 @@ def momentum_balance(ready: Prepared, config: WalksConfig, case: Case) -> Balanc
     held = momentum(samples, config) / scale
     apart = np.abs(held - held[0] - impulse(samples.time_s, given))
     steps = int(walk.work[ACCEPTED])
+    # in a state between the solver's own the slip is known to its tolerance, with another sign in every step
     slip = config.solver.contact.atol + config.solver.contact.rtol * speed
-    push = friction_between(ready, slip) * config.gravity_m_s2 * walk.end_time_s / speed
+    push = steepest_change(ready.scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
     return Balance(float(apart.max()), float(change.sum()), push / max(1, steps) ** 0.5, steps)
-
-
-def friction_between(ready: Prepared, slip: float) -> float:
-    """How far the friction coefficient may change within a slip velocity (m/s): by its steepest slope, at no slip.
-
-    In a state between the solver's own the slip is known to its tolerance, with another sign in every step.
-    """
-    law = ready.scene.walker.friction
-    if not isinstance(law, Coulomb):
-        return 0.0
-    return float(law.static * min(1.0, 1.5 * slip / law.stiction_velocity))
 
 
 def samples_of(walk: ContactWalkResult) -> ContactSamples:

@@ -26,7 +26,7 @@ from walkerlab.benchmarks.engines.runs import (
     pinned_model,
 )
 from walkerlab.benchmarks.engines.scenes import EngineScene
-from walkerlab.ground.friction import Coulomb, friction_coefficient
+from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.held import held_flags, no_stops
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, knees_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
@@ -210,7 +210,7 @@ def lost_row(
     outcome = Outcome.BUDGET_EXHAUSTED if lost.timed_out else Outcome.SOLVER_FAILED
     return Row(
         scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None,
-        0.0, None, None, None, 0, outcome.label, lost.why,
+        None, None, None, None, 0, outcome.label, lost.why,
     )  # fmt: skip
 
 
@@ -218,14 +218,15 @@ def target_of(scene: EngineScene) -> Contact | None:
     """What the walker's own contact is, linearised under its weight on one foot; None on frictionless ground."""
     walker = scene.ours
     law, friction = walker.normal, walker.friction
-    if not isinstance(friction, Coulomb):
+    if friction.largest == 0.0:
         return None
     mass, g = walker.tree.mass, walker.gravity_down
     depth = (mass * g / law.stiffness) ** (1.0 / law.exponent)
     stiffness = law.exponent * mass * g / depth
-    creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.stiction_velocity)
+    creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until)
+    sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
-    return Contact(mass, g, depth, law.exponent, ratio, friction.dynamic, CREEP_LOAD, creep)
+    return Contact(mass, g, depth, law.exponent, ratio, sliding, CREEP_LOAD, creep)
 
 
 def bisected(function: Any, low: float, high: float) -> float:
@@ -240,8 +241,7 @@ def tuned(
     engine: Engine, contact: str, scene: EngineScene, target: Contact, process: OwnProcess
 ) -> tuple[OwnContact | None, list[TuningRow], Lost | None]:
     """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
-    friction = scene.ours.friction
-    task = TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * friction.friction_velocity)
+    task = TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
     answer: TuningAnswer | Lost = process.do(task, PATIENCE_S)
     if isinstance(answer, Lost):
         return None, [], answer
@@ -418,4 +418,4 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 def least_wall(rows: Sequence[Row], error: float) -> Row | None:
     """The quickest of the runs with at most this error."""
     good = [row for row in rows if row.error is not None and row.error <= error]
-    return min(good, key=lambda row: row.wall_s, default=None)
+    return min(good, key=lambda row: row.wall_s or math.inf, default=None)

@@ -20,7 +20,7 @@ class Row:
 
     step_s  of a run of adapted steps that did not come to an end, the largest
     error   on its own law, from the period of ADAMS's law
-    wall_s  of its loop; an engine has a process of its own, whose processor time it is
+    wall_s  of its loop; an engine has a process of its own, whose processor time it is; None if that was lost
     why     how a run ended that has no outcome of its own
     """
 
@@ -34,7 +34,7 @@ class Row:
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float | None, Label("1", FROM_REFERENCE)]
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
-    wall_s: Annotated[float, RUN_TIME]
+    wall_s: Annotated[float | None, RUN_TIME]
     period_s: Annotated[float | None, Label("s", "period of the last step")]
     step_length_m: Annotated[float | None, Label("m", "length of the last step")]
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]

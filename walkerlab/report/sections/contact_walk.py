@@ -48,13 +48,6 @@ def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
     if contact is None:
         return ""
     si = contact.in_si()
-    friction = (
-        f"Coulomb friction as ADAMS has it, with a coefficient of {number(si.static_friction)} at a slip of "
-        f"{quantity(si.stiction_velocity_m_s, 'm/s')} and {number(si.dynamic_friction)} from "
-        f"{quantity(si.friction_velocity_m_s, 'm/s')} on"
-        if contact.friction == "coulomb"
-        else "no friction"
-    )
     pitch = f", {length(summary.get('pitch_m'))} apart" if summary.get("pitch_m") else ""
     terrain = {
         "checkerboard": f"a checkerboard of pads{pitch}",
@@ -63,7 +56,7 @@ def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
     return (
         f"The normal force is k dᵉ + c(d) ḋ with k = {quantity(si.stiffness_N_per_m_e, 'N/mᵉ')}, "
         f"e = {number(si.exponent)} and c rising to {quantity(si.damping_N_s_m, 'N s/m')} at "
-        f"{length(si.full_damping_penetration_m)}; there is {friction}. The walker walks on {terrain}."
+        f"{length(si.full_damping_penetration_m)}; there is {summary['friction']}. The walker walks on {terrain}."
     )
 
 

@@ -1,0 +1,117 @@
+"""A law of friction says what is asked of it itself, so that one of a user's own is treated as ADAMS's is."""
+
+import math
+from types import SimpleNamespace
+from typing import NamedTuple, get_args
+
+import numpy as np
+import pytest
+
+from walkerlab.benchmarks.contact_trials import SLOWER, near_rigid_trial
+from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of
+from walkerlab.config.loader import load
+from walkerlab.config.schema import Contact
+from walkerlab.ground import friction
+from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
+from walkerlab.orbits.contact_gait import softened, why_there_is_none
+from walkerlab.orbits.rigid_limit import STICTION, series_of, with_contact_of
+from walkerlab.scene.contact import contact_scene, friction_law, scene_measures
+from walkerlab.stages.contact_sim import tell_unresolved_slip
+
+START = (-0.2042, 0.1694, -0.605819, -0.861041)
+
+
+class Regularised(NamedTuple):
+    """Friction mu tanh(v / v_0): smooth, without a larger coefficient at rest."""
+
+    mu: float
+    v_0: float
+
+    @classmethod
+    def of(cls, contact):
+        return cls(contact.dynamic_friction, contact.stiction_velocity_m_s)
+
+    largest = property(lambda self: self.mu)
+    rising_until = property(lambda self: 3.0 * self.v_0)
+    sliding_from = property(lambda self: 3.0 * self.v_0)
+
+    def with_creep(self, factor):
+        return self._replace(v_0=factor * self.v_0)
+
+    def in_words(self):
+        return f"friction of {self.mu:g} tanh(v / {self.v_0:g} m/s)"
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """The paper's walker on ground with that law."""
+    monkeypatch.setitem(
+        friction.friction_coefficient._bodies,
+        Regularised,
+        lambda law, slip: (-law.mu * math.tanh(slip / law.v_0), -law.mu / law.v_0 / math.cosh(slip / law.v_0) ** 2),
+    )
+    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Regularised)
+    return contact_scene(load().config, 0.3714)
+
+
+def test_every_word_of_the_config_is_a_law():
+    assert set(FRICTION_LAWS) == set(get_args(Contact.model_fields["friction"].annotation))
+
+
+@pytest.mark.parametrize("word", FRICTION_LAWS)
+def test_what_a_law_says_is_what_its_coefficient_does(word):
+    law = friction_law(Contact(friction=word))
+    slips = np.linspace(0.0, 3.0, 3001)
+    found = [-friction_coefficient(law, slip)[0] for slip in slips]
+    assert max(found) == pytest.approx(law.largest, rel=1e-5)
+    rising = [mu for mu, slip in zip(found, slips, strict=True) if slip <= law.rising_until]
+    assert rising == sorted(rising)
+    assert len({mu for mu, slip in zip(found, slips, strict=True) if slip >= law.sliding_from}) == 1
+    for slip in slips:
+        slowed = friction_coefficient(law.with_creep(0.25), 0.25 * slip)[0]
+        assert slowed == pytest.approx(friction_coefficient(law, slip)[0], rel=1e-12)
+        assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
+
+
+def test_the_laws_differ_in_words():
+    said = [friction_law(Contact(friction=word)).in_words() for word in FRICTION_LAWS]
+    assert len(set(said)) == len(said)
+    assert said[0] == (
+        "Coulomb friction as ADAMS has it, with a coefficient of 0.9 at a slip of 0.1 m/s and 0.7 from 1 m/s on"
+    )
+
+
+def test_a_result_names_the_law_that_walked(own):
+    assert scene_measures(own)["friction"] == "friction of 0.7 tanh(v / 0.1 m/s)"
+
+
+def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
+    stiff = softened(own.walker, 1.0).friction.v_0
+    assert stiff < 0.1
+    setting = series_of(STICTION)[-1]
+    assert with_contact_of(own.walker, setting).friction.v_0 == pytest.approx(0.1 * setting.stiction)
+    trial = near_rigid_trial(load().config, START, 0.3714, 2)
+    assert trial.walker.friction.v_0 == pytest.approx(0.1 * SLOWER)
+
+
+def test_any_law_can_be_too_weak_for_the_slope(own):
+    assert why_there_is_none(own.walker) is None
+    weak = own.walker._replace(friction=Regularised(0.01, 0.1))
+    assert "0.01 is below the slope's 0.0174" in why_there_is_none(weak)[0]
+    assert "without friction" in why_there_is_none(own.walker._replace(friction=Frictionless()))[0]
+
+
+def test_an_unresolved_slip_of_any_law_is_told(own):
+    said = []
+    progress = SimpleNamespace(note=said.append)
+    tell_unresolved_slip(1e-9, own, progress)
+    assert said == []
+    tell_unresolved_slip(0.1, own, progress)
+    assert "0.3 m/s" in said[0]
+
+
+def test_engines_are_tuned_to_the_creep_of_any_law(own):
+    target = target_of(SimpleNamespace(ours=own.walker))
+    assert target.friction == pytest.approx(0.7 * math.tanh(3.0))
+    assert target.creep_velocity == pytest.approx(0.1 * math.atanh(CREEP_LOAD / 0.7), rel=1e-9)
+    assert target_of(SimpleNamespace(ours=own.walker._replace(friction=Frictionless()))) is None
