@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import walkerlab
 from walkerlab import api
+from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.store.code import Sources
 
@@ -84,3 +86,33 @@ def test_what_cannot_be_meant_is_refused():
         walkerlab.find_gait().dataset("gaits")
     with pytest.raises(StaleError, match="there is no run"):
         walkerlab.open_run("nothing", Path("nowhere"))
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (lambda: walkerlab.find_gait(5), "walker: 5 is not a walker block"),
+        (lambda: walkerlab.simulate(contact={"stiffness": 1e5}), "is not a contact block"),
+        (lambda: walkerlab.basin(cells=50), r"basin\.cells: 50 is not a list"),
+        (lambda: walkerlab.continue_gait(span=0.1), r"span: 0\.1 is not two numbers"),
+        (lambda: walkerlab.find_gait(slope_deg="steep"), "'steep' is not a number"),
+        (lambda: walkerlab.find_gait(slope_deg=3, slope_rad=0.05), "the slope is given already"),
+    ],
+)
+def test_arguments_that_are_no_config_are_refused_in_words(asked, message):
+    with pytest.raises(ConfigError, match=message):
+        asked()
+
+
+def test_what_is_left_out_is_as_the_built_in_config_has_it(monkeypatch):
+    asked = []
+    monkeypatch.setattr(api, "in_memory", lambda stage, config: asked.append(config))
+    walkerlab.find_gait()
+    walkerlab.simulate()
+    walkerlab.continue_gait()
+    walkerlab.basin()
+    wanted = load().config.model_copy(update={"name": "memory", "source": None, "contact": None})
+    assert asked == [wanted] * 4
+    walkerlab.find_gait(walkerlab.kneed(), slope_deg=np.int64(3), strides=7)
+    assert asked[-1].walker == walkerlab.kneed()
+    assert (asked[-1].slope_rad, asked[-1].strides) == (np.deg2rad(3.0), 7)

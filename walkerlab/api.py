@@ -6,8 +6,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
+from walkerlab.config.fields import Block
+from walkerlab.config.files import DEFAULT, builtin, read_layers
+from walkerlab.config.layers import stacked
 from walkerlab.config.loader import load, template
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.placing import on_the_slope
@@ -15,6 +19,7 @@ from walkerlab.config.schema import Config, Contact
 from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.tree import Position
 from walkerlab.config.validation import typed
+from walkerlab.config.walkers import WALKERS
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
@@ -26,6 +31,11 @@ from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 
 RUNS = "runs"
+MADE_HERE = {
+    "walker": (tuple(WALKERS.values()), "walkerlab.compass(), kneed() and walker(type) make one."),
+    "contact": ((Contact,), "walkerlab.contact() makes one."),
+}
+"""Arguments that are blocks of a config: what they may be, and what makes them."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +108,7 @@ class Run:
 
 def run(
     stage: str,
-    config: str | Path = "paper",
+    config: str | Path = DEFAULT,
     set: Mapping[str, Any] | None = None,
     runs: str | Path = RUNS,
     *,
@@ -147,19 +157,20 @@ def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
 def sweep(
     stage: str,
     over: Mapping[str, Sequence[Any] | str],
-    config: str | Path = "paper",
+    config: str | Path = DEFAULT,
     set: Mapping[str, Any] | None = None,
     runs: str | Path = RUNS,
     *,
     zip: bool = False,
     sample: str = "",
-    seed: int = 1,
+    seed: int | None = None,
     engine: str = "local",
     jobs: int = 0,
 ) -> Any:
     """Do what `walkerlab sweep` does, and give its file as one xarray Dataset.
 
     over    for each key of a config its values, or "FROM:TO:N"
+    seed    of a drawing; None is the config's
     jobs    chunks computed at once; 0 leaves it to the engine
 
     Worker processes import the calling script anew: call it under `if __name__ == "__main__":` there.
@@ -174,7 +185,8 @@ def sweep(
 
     read = template(Path(config), settings(set))
     listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
-    question = asked(stage, listed, zip, sample, seed)
+    drawn = (read.base.config.sweep or Sweep()).seed if seed is None else seed
+    question = asked(stage, listed, zip, sample, drawn)
     chosen, address = engine_named(engine)
     folder = RunFolder(Path(runs), read.base.run_name)
     order = Order(jobs, address, modules_of(stage, read.base.config, PIPELINE), folder.path)
@@ -218,26 +230,34 @@ def contact(**keys: Any) -> Contact:
     return made
 
 
-def find_gait(walker: Any = None, slope_deg: float = 1.0, **keys: Any) -> Result:
+def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Result:
     """The periodic gaits of a walker on a slope, in memory: the chosen one in `summary`, all of them in `dataset`.
 
-    walker     from `compass` or `walker`; the paper's if left out
+    What is left out here and below is as the built-in paper config has it.
+
+    walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
     keys       other keys of a config, such as gravity_m_s2, equations, seed
+
+    Raises ConfigError for what cannot be meant, as all functions here do.
 
     >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
     >>> gait.summary["stable"], round(gait.summary["period_s"], 4)
     (True, 0.7343)
     """
-    return in_memory("fixedpoint", config_of_scene(walker, slope_deg, keys))
+    return in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys))
 
 
 def simulate(
-    walker: Any = None, slope_deg: float = 1.0, contact: Contact | None = None, strides: int = 5, **keys: Any
+    walker: Any = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    strides: int | None = None,
+    **keys: Any,
 ) -> Result:
     """Walk, in memory: the rigid model, or with `contact` the contact model; from the gait unless `start` is given.
 
-    walker     from `compass` or `walker`; the paper's if left out
+    walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
     contact    the ground, from `contact`; None is the rigid model
     keys       other keys of a config, such as start, gravity_m_s2, solver
@@ -248,38 +268,43 @@ def simulate(
     >>> walk.dataset("trajectory").angle.dims
     ('time', 'leg')
     """
-    more = {} if contact is None else {"contact": contact.model_dump(mode="json")}
-    config = config_of_scene(walker, slope_deg, {**keys, **more, "strides": strides})
+    given = {"slope_deg": slope_deg, "contact": contact, "strides": strides}
+    config = config_of_scene(walker, given, keys)
     return in_memory("simulate" if contact is None else "contact-sim", config)
 
 
 def continue_gait(
     walker: Any = None,
-    over: str = "slope_rad",
-    span: tuple[float, float] = (1e-4, 0.1),
-    slope_deg: float = 1.0,
+    over: str | None = None,
+    span: tuple[float, float] | None = None,
+    slope_deg: float | None = None,
     **keys: Any,
 ) -> Result:
     """Families of gaits over a number of the config, in memory: branches and bifurcations in `summary`.
 
-    walker     from `compass`, `kneed` or `walker`; the paper's if left out
+    walker     from `compass`, `kneed` or `walker`
     over       the key that changes, and `span` from where to where, in its unit
     slope_deg  positive downhill, deg, where `over` is another key
     keys       other keys of a config, such as contact, seed
     """
-    asked = {"over": over, "from": span[0], "to": span[1]}
-    return in_memory("continuation", config_of_scene(walker, slope_deg, {**keys, "continuation": asked}))
+    asked = {} if over is None else {"over": over}
+    if span is not None:
+        asked |= dict(zip(("from", "to"), two_numbers("span", span), strict=True))
+    return in_memory("continuation", config_of_scene(walker, {"slope_deg": slope_deg, "continuation": asked}, keys))
 
 
-def basin(walker: Any = None, slope_deg: float = 1.0, cells: tuple[int, int] = (100, 100), **keys: Any) -> Result:
+def basin(
+    walker: Any = None, slope_deg: float | None = None, cells: tuple[int, int] | None = None, **keys: Any
+) -> Result:
     """Which starts come to which attractor, in memory: shares in `summary`, the window's cells in `dataset`.
 
-    walker     from `compass` or `walker`; the paper's if left out
+    walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
     cells      along either axis of the window
     keys       other keys of a config, such as seed
     """
-    return in_memory("basin", config_of_scene(walker, slope_deg, {**keys, "basin": {"cells": list(cells)}}))
+    asked = {} if cells is None else {"cells": cells}
+    return in_memory("basin", config_of_scene(walker, {"slope_deg": slope_deg, "basin": asked}, keys))
 
 
 def dataset(group: Group) -> Any:
@@ -304,13 +329,39 @@ def in_memory(stage: str, config: Config) -> Result:
     return Result(stage, answer.content.summary, answer.content, said)
 
 
-def config_of_scene(walker: Any, slope_deg: float, keys: Mapping[str, Any]) -> Config:
-    """The config of a walker on a slope; ConfigError for keys that configs do not have."""
-    lines: dict[str, Any] = {"name": "memory", "slope_deg": float(slope_deg), **keys}
-    if walker is not None:
-        lines["walker"] = walker.model_dump(mode="json")
-    config, tree = typed_lines(lines)
-    return on_the_slope(config, tree)[0]
+def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
+    """The built-in paper config with another scene and question, and with contact only if it is given.
+
+    walker  its block, or None
+    given   keys of the config with their values, blocks among them; None is left out
+    keys    further keys
+
+    Raises ConfigError for keys and values that configs do not have.
+    """
+    named = {"name": "memory", "walker": walker, **given}
+    for name, (kinds, makers) in MADE_HERE.items():
+        if not isinstance(named.get(name), (NoneType, *kinds)):
+            raise ConfigError(f"{name}: {named[name]!r} is not a {name} block.", makers)
+    lines = {key: plain(value) for key, value in {**keys, **named}.items() if value is not None}
+    replaced = {"source", "contact", *({"walker"} & lines.keys())}
+    upper = tree_of(lines, Position("walkerlab", 1, 1))
+    assert isinstance(upper, Tree)
+    tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
+    return on_the_slope(typed(tree), tree)[0]
+
+
+def plain(value: Any) -> Any:
+    """A block, or NumPy's numbers, as plain values."""
+    if isinstance(value, Block):
+        return value.model_dump(mode="json")
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def two_numbers(name: str, values: Any) -> Sequence[Any]:
+    """The two of them; ConfigError if there are not two."""
+    if not isinstance(values, Sequence) or len(values) != 2:
+        raise ConfigError(f"{name}: {values!r} is not two numbers.", f"For example {name}=(0.001, 0.09).")
+    return values
 
 
 def typed_lines(lines: Mapping[str, Any]) -> tuple[Config, Tree]:

@@ -120,6 +120,29 @@ def test_a_key_of_one_kind_of_walker_is_found_by_the_name_that_a_config_has(walk
     assert walker("schema", "walker(kneed).thigh").stdout.splitlines() == lines
 
 
+def test_the_schema_of_a_key_is_that_key_alone_as_json_too(walker):
+    stiffness = json.loads(walker("schema", "contact.stiffness", "--json").stdout)
+    assert (stiffness["default"], stiffness["unit"]) == (1e5, "N/mm^e or N/m^e")
+    thigh = json.loads(walker("schema", "walker.thigh", "--json").stdout)
+    assert set(thigh["$defs"]) == {"Thigh"}
+    assert "mass_below_hip_m" in thigh["$defs"]["Thigh"]["properties"]
+    masses = json.loads(walker("schema", "walker.hip_mass_kg", "--json").stdout)["anyOf"]
+    assert [one["default"] for one in masses] == [10.0, 0.0, 0.5]
+    assert json.loads(walker("schema", "walker(kneed).hip_mass_kg", "--json").stdout)["default"] == 0.5
+    done = walker("schema", "contact.stifness", "--json")
+    assert done.returncode == 3
+    assert "contact.stiffness?" in json.loads(done.stdout)["error"]["message"]
+
+
+def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
+    assert walker("init", "sub/dir/x.yaml").returncode == 0
+    assert load(walker.folder / "sub" / "dir" / "x.yaml").run_name == "x"
+    done = walker("init", "sub/dir/x.yaml/y.yaml")
+    assert done.returncode == 4
+    assert "sub/dir/x.yaml/y.yaml could not be written" in done.stderr
+    assert "--runs" not in done.stderr
+
+
 def test_a_config_that_is_not_there_is_begun_with_init(walker):
     done = walker("fixedpoint", "-c", "mine.yaml")
     assert done.returncode == 3

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from walkerlab.config import schema
+from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config, Contact
 from walkerlab.errors import ConfigError
@@ -189,3 +190,31 @@ def test_a_method_of_an_extra_that_is_not_installed_says_what_to_install(
     assert message.startswith("mine.yaml:1:")
     assert "solver.contact.method: 'cvode-bdf'" in message
     assert message.endswith("pip install scikit-sundae")
+
+
+def test_a_walker_of_another_type_than_inherited_is_told_which_keys_it_has_not(refused: Refused) -> None:
+    message = refused("extends: paper\n", ["walker.type=kneed"])
+    assert message.startswith("--set walker.type=kneed: walker.type: kneed has no leg_length_m, foot_to_mass_m, ")
+    assert "(of type compass), given at built-in paper.yaml:" in message
+    assert "`-c kneed`, in a file `extends: kneed`" in message
+    assert len(message.splitlines()) == 1
+    message = refused("extends: paper\nwalker:\n  type: straight-legs\n")
+    assert message.startswith("mine.yaml:3:3: walker.type: straight-legs has no foot_to_mass_m (of type compass)")
+    assert "`-c round-feet`" in message
+
+
+def test_a_key_of_another_type_is_told_with_those_of_its_own(refused: Refused) -> None:
+    message = refused("walker: {type: kneed, leg_length_m: 1.0}\n")
+    assert "1:23: walker.type is kneed, which has no leg_length_m (of type compass); allowed: type, thigh" in message
+    message = refused("extends: paper\n", ["walker.thigh.length_m=0.4"])
+    assert message.startswith("--set walker.thigh.length_m=0.4: walker.type is compass, which has no thigh (of type ")
+
+
+def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(refused: Refused) -> None:
+    message = refused("extends: parts\n", ["walker.leg_length_m=1.2"])
+    assert "1:21: walker.leg_length_m: 1.2 is not what the parts have" in message
+    assert "it is 1 m" in message
+    arcs = [f"{{body: shank {leg}, centre_m: [0.02, -0.45], radius_m: 0.1}}" for leg in (1, 2)]
+    assert "it is 1.05 m" in refused("extends: parts\n", [f"walker.feet=[{', '.join(arcs)}]"])
+    own_frames = (BUILTIN_FOLDER / "parts.yaml").read_text().replace("centre_m: [0.0, -0.5]", "centre_m: [0.0, -0.4]")
+    assert "5:17: walker.leg_length_m: 1.0 is not what" in refused(own_frames.split("\n", 2)[2])

@@ -263,12 +263,12 @@ def test_a_twin_of_another_size_and_mass_moves_alike(assembly, slope, free):
     assert ground_reaction(twin, twin.bent, of_twin(y)) == pytest.approx(force, rel=1e-8, abs=1e-7)
 
 
-def by_parts(assembly, radius_m):
+def by_parts(assembly, radius_m, leg_length_m):
     """The assembly as a config of type `parts` lists it."""
     locking = {(knee.thigh, knee.shank) for knee in assembly.knees}
     return PartsWalker(
         type="parts",
-        leg_length_m=1.0,
+        leg_length_m=leg_length_m,
         bodies=[
             {"name": b.name, "mass_kg": b.mass_kg, "centre_m": b.centre_m, "inertia_kg_m2": b.inertia_kg_m2}
             for b in assembly.bodies
@@ -289,7 +289,7 @@ def test_a_walker_by_its_parts_in_frames_of_their_own_is_that_of_its_type(assemb
         zip(("leg", "thigh", "shank", "torso"), ((0.1, 0.3), (-0.2, 0.1), (0.3, -0.4), (0.0, 0.5)), strict=True)
     )
     moved = mapped(assembly, lambda name, at: tuple(np.add(at, shifts[name.split()[0]])))
-    listed = standing(assembly_of(by_parts(moved, model.radius)), G, slope)
+    listed = standing(assembly_of(by_parts(moved, model.radius, model.leg_length)), G, slope)
     y, struck = state_of(model, model.bent, free), both_feet_down(model, free)
     assert walkers_differ_by(rates(listed, listed.bent, y), rates(model, model.bent, y)) < 1e-9
     assert walkers_differ_by(heel_strike(listed, struck), heel_strike(model, struck)) < 1e-9

@@ -11,7 +11,6 @@ from walkerlab.config.loader import load, safe_name
 from walkerlab.config.problems import nearest
 from walkerlab.config.reference import as_json_schema
 from walkerlab.errors import ConfigError, StorageError
-from walkerlab.store.files import storing
 
 SCHEMA = ".walkerlab-schema.json"
 
@@ -26,9 +25,14 @@ def write_config(file: Path, walker: str) -> str:
         raise StorageError(f"{file} is there already.", "Choose another name; nothing was overwritten.")
     lines = [line for line in text.splitlines() if not line.startswith("name:")]
     head = [f"# yaml-language-server: $schema={SCHEMA}", f"name: {safe_name(file.stem)}"]
-    with storing(file):
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
         (file.parent / SCHEMA).write_text(json.dumps(as_json_schema(), indent=1) + "\n", encoding="utf-8")
         file.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
+    except OSError as error:
+        raise StorageError(
+            f"{file} could not be written: {error.strerror or error}.", "Choose a file in a folder that can be written."
+        ) from error
     return f"{file} written, with its schema beside it; next: `walkerlab report -c {shlex.quote(str(file))}`"
 
 

@@ -81,7 +81,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.config.reference import as_json_schema, as_paragraphs
 
             if as_json:
-                print_json(as_json_schema())
+                print_json(as_json_schema(key))
             else:
                 print(as_paragraphs(key))
 

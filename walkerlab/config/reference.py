@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import textwrap
 from collections.abc import Iterator
@@ -93,6 +94,11 @@ def as_paragraphs(asked: str = "") -> str:
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
+    return "\n\n".join("\n".join(_paragraph(key)) for key in asked_for(asked))
+
+
+def asked_for(asked: str) -> list[KeyReference]:
+    """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none."""
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     found = [key for key in plain if not asked or any(is_in(asked, name) for name in (key.key, plain[key]))]
     if not found:
@@ -100,7 +106,7 @@ def as_paragraphs(asked: str = "") -> str:
         near = nearest(asked, names) or nearest(asked, {name.split(".")[-1] for name in names})
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
-    return "\n\n".join("\n".join(_paragraph(key)) for key in found)
+    return found
 
 
 def is_in(asked: str, key: str) -> bool:
@@ -120,11 +126,63 @@ def _line(cells: tuple[str, ...] | list[str], widths: list[int]) -> str:
     return f"| {' | '.join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))} |"
 
 
-def as_json_schema() -> dict[str, Any]:
-    """JSON schema of a config file."""
+def as_json_schema(asked: str = "") -> dict[str, Any]:
+    """JSON schema of a config file; only of a block or key, if one is asked for.
+
+    Raises ConfigError with the nearest key if there is no such block or key.
+    """
     schema = Config.model_json_schema()
     degrees = SlopeInDegrees.model_json_schema()["properties"]["slope_deg"]
     extends = {"type": "string", "description": EXTENDS_MEANING, "examples": list(builtin_names())}
     schema["properties"] = {"extends": extends, **schema["properties"], "slope_deg": degrees}
     schema["not"] = {"required": ["slope_rad", "slope_deg"]}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    part = schema if not asked else part_of(schema, asked)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **part}
+
+
+def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
+    """The part of a JSON schema that describes a block or key, with the definitions that it refers to."""
+    asked_for(asked)
+    definitions = schema["$defs"]
+    parts = [schema]
+    for name in asked.split("."):
+        plain, _, kind = name.rstrip(")").partition("(")
+        blocks = [block for part in parts for block in blocks_of(part, definitions)]
+        parts = [block["properties"][plain] for block in blocks if plain in block["properties"]]
+        if kind:
+            of_kinds = [block for part in parts for block in blocks_of(part, definitions)]
+            parts = [block for block in of_kinds if block["properties"]["type"].get("const") == kind]
+    unlike = list({json.dumps(part): part for part in parts}.values())
+    found = unlike[0] if len(unlike) == 1 else {"anyOf": unlike}
+    needed = referred_to(found, definitions)
+    return {**found, "$defs": {name: definitions[name] for name in sorted(needed)}} if needed else found
+
+
+def blocks_of(part: dict[str, Any], definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The blocks of keys that a part of a JSON schema allows."""
+    if "properties" in part:
+        yield part
+    choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]
+    if "$ref" in part:
+        choices.append(definitions[name_of(part["$ref"])])
+    for choice in choices:
+        yield from blocks_of(choice, definitions)
+
+
+def referred_to(part: Any, definitions: dict[str, Any]) -> set[str]:
+    """Names of the definitions that a part of a JSON schema refers to, in itself and in them."""
+    found: set[str] = set()
+    waiting = [part]
+    while waiting:
+        node = waiting.pop()
+        waiting += node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+        reference = node.get("$ref") if isinstance(node, dict) else None
+        if isinstance(reference, str) and name_of(reference) not in found:
+            found.add(name_of(reference))
+            waiting.append(definitions[name_of(reference)])
+    return found
+
+
+def name_of(reference: str) -> str:
+    """The definition that a reference names."""
+    return reference.rsplit("/", 1)[-1]

@@ -10,6 +10,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
+from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
+from walkerlab.config.layers import stacked
 from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence, plain
@@ -123,7 +125,10 @@ def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
     block: type[Block] = Config
     for depth, above in enumerate(path[:-1]):
         if above in block.model_fields:
-            block = _kinds_in(tree, path[: depth + 1], block.model_fields[above]) or block
+            field = block.model_fields[above]
+            block = _kinds_in(tree, path[: depth + 1], field) or block
+            if depth == len(path) - 2 and any(path[-1] in kind.model_fields for kind in kinds_of(field).values()):
+                return _key_of_another_kind(path, tree, block, kinds_of(field))
     name = path[-1]
     parent, _ = _node_at(tree, location[:-1])
     position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
@@ -136,6 +141,38 @@ def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
     value = f" ({shown_value(node)})" if node else ""
     text = f"{shown('.'.join(path))}: unknown key{value}"
     return Problem(position, text, ", ".join(siblings), meant)
+
+
+def _key_of_another_kind(
+    path: tuple[str, ...], tree: Mapping, block: type[Block], kinds: dict[str, type[Block]]
+) -> Problem:
+    """What to say of a key that another type of the block has; the same for all such keys of one source."""
+    given, _ = _node_at(tree, path[:-1])
+    assert isinstance(given, Mapping), "it holds the key"
+    source = given.keys[path[-1]].source
+    others = {key for one in kinds.values() for key in one.model_fields} - {*block.model_fields}
+    strange = {key: place for key, place in given.keys.items() if key in others and place.source == source}
+    where = next(iter(strange.values()))
+    chosen = next(kind for kind, one in kinds.items() if one is block)
+    other = next(kind for kind, one in kinds.items() if next(iter(strange)) in one.model_fields)
+    above, keys = ".".join(path[:-1]), ", ".join(strange)
+    type_at = given.keys.get("type", where)
+    if source.startswith("--") or type_at.source in (source, builtin(DEFAULT).label):
+        text = f"{above}.type is {chosen}, which has no {keys} (of type {other})"
+        return Problem(where, text, ", ".join(block.model_fields))
+    text = f"{above}.type: {chosen} has no {keys} (of type {other}), given at {where}"
+    begin = builtin_of_type(above, chosen)
+    instead = f"`-c {begin}`, in a file `extends: {begin}`; or the whole {above} block in a file without `extends`"
+    return Problem(type_at, text, instead)
+
+
+def builtin_of_type(block: str, kind: str) -> str:
+    """The first built-in config whose block is of that type."""
+    for name in (DEFAULT, *builtin_names()):
+        node, _ = _node_at(stacked(read_layers(builtin(name))), (block, "type"))
+        if isinstance(node, Scalar) and node.value == kind:
+            return name
+    raise AssertionError("each type has a built-in config")
 
 
 def _elsewhere(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
@@ -14,6 +15,7 @@ from walkerlab.errors import ConfigError
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 LONGEST: Final = 1e3  # m
+LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
 HEAVIEST: Final = 1e6  # kg
 LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant ground must carry along
 
@@ -330,7 +332,6 @@ class PartsWalker(Block):
     """A walker described by its bodies, hinges, particles, feet and couplings."""
 
     type: Annotated[Literal["parts"], key("", "kind of walker", "this project")]
-    leg_length_m: Annotated[float, length("hip to sole: what lengths and falls are measured by", "this project")]
     bodies: Annotated[
         tuple[PartBody, ...],
         key("", "the bodies", "this project", bounds="blocks of name, mass_kg, centre_m, inertia_kg_m2", sequence=True),
@@ -367,8 +368,22 @@ class PartsWalker(Block):
         tuple[LegBodies, LegBodies],
         key("", "bodies of either leg, hip down", "this project", bounds="two lists of names", sequence=True),
     ]
+    leg_length_m: Annotated[
+        float, length("hip to sole as the parts have it: what lengths and falls are measured by", "this project")
+    ]
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
+
+    @field_validator("leg_length_m")
+    @classmethod
+    def _agrees_with_the_soles(cls, value: float, info: ValidationInfo) -> float:
+        if {"hinges", "feet", "legs"} - info.data.keys():
+            return value  # what is wrong with those is told
+        found = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
+        if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
+            return value
+        reason = "is not what the parts have: upright, from the hip's hinge to the first leg's sole, it is {found} m"
+        raise PydanticCustomError("soles", reason, {"found": f"{found:.9g}"})
 
     @property
     def foot_radius_m(self) -> float:
@@ -385,6 +400,28 @@ class PartsWalker(Block):
     def lean_rad(self) -> float:
         """Not told by single keys; a start is taken as given."""
         return 0.0
+
+
+def hip_to_sole(
+    hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
+) -> float | None:
+    """How far the first leg's sole lies below the hip while all bodies are upright, m.
+
+    None where no hinges lead from the other leg to the foot's body: parts that make no walker.
+    """
+    places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
+    places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
+    chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
+    below, upper = 0.0, 0.0  # m, of the present body's upper hinge: below the hip, over its own origin
+    for body, lower in pairwise(chain):
+        if (body, lower) not in places:
+            return None
+        leaving, entering = places[body, lower]
+        below += upper - leaving[1] if body in legs[0] else 0.0
+        upper = entering[1]
+        if lower == feet[0].body:
+            return below + upper - feet[0].centre_m[1] + feet[0].radius_m
+    return None
 
 
 def torso_mass(torso: Torso | None) -> float:
