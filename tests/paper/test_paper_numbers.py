@@ -23,6 +23,7 @@ from walkerlab.paper.printed import (
     E_AVG,
     LOST_BALANCE,
     RAISED,
+    STEP_LENGTH,
     STRIDES,
     TABLE_1,
     TABLE_2,
@@ -268,3 +269,9 @@ def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
         assert row.verdict != Verdict.REFUTED or "about the paper's own numbers, not about this scene" in row.evidence
         assert row.verdict == Verdict.REPRODUCED or "slope_rad 0.05" in row.evidence
     assert not any("this scene" in row.evidence for row in rows().values())
+
+
+def test_no_step_is_not_called_a_step_of_no_length(rows):
+    row = next(row for printed, row in rows(models={}, step_length=None).items() if printed is STEP_LENGTH)
+    assert "no model has a step" in row.evidence
+    assert "times the printed length" not in row.evidence

@@ -138,6 +138,13 @@ def test_a_pulling_ground_is_said():
     assert result.summary["min_normal_force_N"] < 0.0
 
 
+def test_where_the_ground_would_have_to_pull_all_along_there_is_no_friction_ratio():
+    summary = run(start=(-0.2022, 0.1674, -20.0, -20.0), strides=1).summary
+    assert summary["min_normal_force_N"] < 0.0
+    assert summary["max_friction_ratio"] is None
+    json.dumps(summary, allow_nan=False)
+
+
 def test_an_exhausted_budget_is_no_answer_with_what_was_walked(monkeypatch):
     monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
     with pytest.raises(NoAnswer, match=r"budget-exhausted after [1-9] steps") as caught:

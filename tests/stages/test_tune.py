@@ -210,3 +210,11 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
 
 def at_period(period):
     return Distance(Setting(NORMAL, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
+
+
+def test_of_a_compass_that_is_not_the_papers_nothing_of_the_paper_is_told():
+    content = small("paper", "walker.hip_mass_kg=11", cells=3)
+    assert "paper_start" not in content.summary
+    assert "paper_start" not in content.groups
+    assert not [key for row in content.summary["table2"].values() for key in row if key.startswith("paper")]
+    assert [entry["what"] for entry in content.summary["left_out"]] == ["the paper's start of its ADAMS model"]

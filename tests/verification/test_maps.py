@@ -11,6 +11,7 @@ from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.parts import Parts
 from walkerlab.verification.maps import (
+    NONE,
     PAPER_STIFFNESS,
     VERDICTS,
     StepColumn,
@@ -66,7 +67,24 @@ def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
     verdicts = [VERDICTS[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
     assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
-    assert numbers[5] == 0.0
+    assert numbers[5] == NONE
+
+
+def test_where_no_error_was_measured_the_map_has_a_gap():
+    """Also where both runs end alike, but after different numbers of steps."""
+    walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
+    rows = ([walked, 4.0, walked, 1e-7, 9.0], [slid, 1.0, slid, NONE, 9.0], [walked, 4.0, slid, NONE, 9.0])
+    cells = (rows[0], rows[1], rows[2], rows[1])
+    kept = {f"stiction {i} {j}": list(cells[2 * i + j]) for i in range(2) for j in range(2)}
+    found = stability_maps.stiction_group(2, kept)
+    np.testing.assert_array_equal(found["error"], [[1e-7, np.nan], [np.nan, np.nan]])
+    assert found["compared"].tolist() == [[1, 0], [0, 0]]
+    fine, diverges = float(VERDICTS.index("fine")), float(VERDICTS.index("diverges"))
+    step = stability_maps.step_group(2, {f"step {i}": [fine, 1e-5, diverges, NONE] for i in range(2)})
+    np.testing.assert_array_equal(step["error"], [[1e-5, 1e-5], [np.nan, np.nan]])
+    kept = {name: list(rows[1]) for name in kept}
+    none = stability_maps.summary_of(stability_maps.stiction_group(2, kept), step)
+    assert (none["largest_error"], none["median_error"]) == (None, None)
 
 
 def test_every_cell_has_a_name_of_its_own():

@@ -1,6 +1,7 @@
 """The measures themselves notice what is wrong."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from walkerlab.paper.appendix_a import impact
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import compass, rigid_scene, rigid_walker
 from walkerlab.verification.catalogue import config_of, shipped
+from walkerlab.verification.rigid_case import time_difference
 from walkerlab.verification.rigid_momentum import RigidMasses
 from walkerlab.verification.scaling import Scale, scaled, to_twin
 from walkerlab.verification.verdict import Finding, finite
@@ -35,6 +37,14 @@ def test_a_heel_strike_that_is_a_little_wrong_does_not(walk, index):
     wrong = walk.after.copy()
     wrong[:, index] *= 1.0 + 1e-6
     assert MASSES.momentum_change(walk.before, wrong) > 1e-8
+
+
+def test_walks_without_a_heel_strike_are_not_called_equal(walk):
+    case = next(case for case in shipped() if case.name == "paper")
+    none = replace(walk, heel_strikes=np.zeros(0))
+    assert time_difference("a walk", none, 1.0, walk, 1.0, case, PAPER) == []
+    (found,) = time_difference("itself", walk, 1.0, walk, 1.0, case, PAPER)
+    assert found.value == 0.0
 
 
 def test_momentum_with_leg_inertia_is_kept_too():

@@ -85,7 +85,7 @@ def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]
     most = max(len(gait["multipliers"]) for gait in gaits)
     rows += [[f"multiplier {place + 1}", *(multiplier(gait, place) for gait in gaits), ""] for place in range(most)]
     rows += [
-        [words, *(written(gait[key]) if key in gait else "" for gait in gaits), unit_of(key)]
+        [words, *("" if gait.get(key) is None else written(gait[key]) for gait in gaits), unit_of(key)]
         for key, words, written in (
             ("period_s", "step period", partial(fixed, decimals=5)),
             ("step_length_m", "step length", partial(fixed, decimals=5)),
@@ -149,7 +149,7 @@ def walk_measures(summary: Summary) -> list[tuple[str, str]]:
 
 def told(summary: Summary, key: str, digits: int = 4) -> str:
     """A number of a summary with its unit; nothing if it is not there."""
-    return quantity(summary[key], unit_by_name(key), digits) if key in summary else ""
+    return "" if summary.get(key) is None else quantity(summary[key], unit_by_name(key), digits)
 
 
 def shown_places(total: int) -> list[Any]:

@@ -146,13 +146,14 @@ def overlay(axes: Axes, cells: Group, up: str, mask: NDArray[np.bool_], colour: 
 def caption_stiction(results: Results) -> str:
     """What is walked, and how many cells come out how."""
     summary, cells = results[STAGE].summary, results[STAGE]["stiction"]
+    compared = summary["median_error"] is not None
     otherwise = summary["ends_otherwise_sharper"]
+    sizes = f"{summary['median_error']:.0e} in the median, {summary['largest_error']:.0e} at most; " if compared else ""
     return (
         f"{cells.attrs['steps_wanted']} steps of the paper's walk by the default method, at most "
         f"{cells.attrs['budget']:,} right-hand sides, over the ground's stiffness and the stiction velocity (friction "
         f"velocity ten times that), all else the paper's: {counted(summary['outcomes'])}. (b) Difference of touches "
-        "and end from a run at a tenfold tolerance, in legs, radians and pendulum times: "
-        f"{summary['median_error']:.0e} in the median, {summary['largest_error']:.0e} at most; {otherwise} cells end "
+        f"and end from a run at a tenfold tolerance, in legs, radians and pendulum times: {sizes}{otherwise} cells end "
         "otherwise there."
     )
 

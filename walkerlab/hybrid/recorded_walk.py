@@ -72,7 +72,7 @@ class RecordedWalk:
     lengths: Array  # (steps,) m, from touch to touch
     knee_strikes: Array | None  # (steps,) s; None for legs without knees
     min_normal_force: float  # N, of the ground on the stance foot
-    max_friction_ratio: float  # tangential over normal force, where the ground pushes
+    max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
     max_scuff_depth: float  # m, of the swing foot below the slope
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean, from the stance foot

@@ -25,7 +25,7 @@ class Gait:
     energy: float  # J, time mean over the step, from the stance foot
     energy_drift: float  # J, between least and most of it
     min_normal_force: float  # N
-    max_friction_ratio: float
+    max_friction_ratio: float | None  # None if the ground pushes nowhere
     max_scuff_depth: float  # m
     trailing_foot_rises: bool  # after the heel strike
     knee_strike: float | None  # s; None for legs without knees
@@ -74,7 +74,7 @@ def measured(walker: Standing, units: Units, method: Any, z: Vector, DP: Vector)
         energy=step.mean_energy * units.energy,
         energy_drift=step.energy_drift * units.energy,
         min_normal_force=step.min_normal_force * units.force,
-        max_friction_ratio=step.max_friction_ratio,
+        max_friction_ratio=step.max_friction_ratio or None,
         max_scuff_depth=step.max_scuff_depth * units.length,
         trailing_foot_rises=swing_foot_motion(walker, start)[1][0] >= 0.0,
         knee_strike=None if step.knee_strikes is None else float(step.knee_strikes[0]) * units.time,

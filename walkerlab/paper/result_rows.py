@@ -101,9 +101,9 @@ def step_length_row(measured: Measured) -> Row:
     contact = measured.contact.step_length
     if contact is not None:
         said.append(f"contact model {contact:.4f} m")
-    text = "2 L sin((theta_2 - theta_1)/2): " + "; ".join(said)
-    longest = max((*lengths.values(), *([] if contact is None else [contact])), default=0.0)
-    text += f", up to {longest / STEP_LENGTH.value:.1f} times the printed length."
+    text = "2 L sin((theta_2 - theta_1)/2): " + ("; ".join(said) or "no model has a step")
+    found = [*lengths.values(), *([] if contact is None else [contact])]
+    text += f", up to {max(found) / STEP_LENGTH.value:.1f} times the printed length." if found else "."
     agrees = any(agreement(STEP_LENGTH, length) for length in lengths.values())
     verdict, evidence = weigh(agrees, Verdict.REFUTED, measured.departures.rigid, text)
     return Row(STEP_LENGTH, lengths.get("as-printed"), lengths.get("corrected"), contact, verdict, evidence)

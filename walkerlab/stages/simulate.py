@@ -55,7 +55,7 @@ def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
         "energy_drift_J": walk.energy_drift,
         "mean_energy_J": walk.mean_energy,
         "min_normal_force_N": walk.min_normal_force,
-        "max_friction_ratio": walk.max_friction_ratio,
+        "max_friction_ratio": walk.max_friction_ratio or None,
         "max_scuff_depth_m": walk.max_scuff_depth,
         **({} if walk.knee_strikes is None else {"knee_strike_times_s": walk.knee_strikes.tolist()}),
         "rhs_evaluations": walk.work.rhs_evaluations,

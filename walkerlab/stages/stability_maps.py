@@ -14,6 +14,7 @@ from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 from walkerlab.verification.maps import (
     BUDGET,
+    NONE,
     STEP,
     STICTION_VELOCITY,
     STIFFNESS,
@@ -55,8 +56,8 @@ def stiction_group(cells: int, kept: Mapping[str, Numbers]) -> Group:
     found = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(OF_STICTION, np.moveaxis(found, 2, 0), strict=True))
     dims = (VELOCITY_DIM, STIFFNESS_DIM)
-    same = columns["outcome"] == columns["sharper_outcome"]
     answered = np.isin(columns["outcome"], [int(one) for one in Outcome if one.answered])
+    compared = answered & (columns["error"] != NONE)
     return Group(
         {
             STIFFNESS_DIM: stiffness_axis(cells),
@@ -64,12 +65,11 @@ def stiction_group(cells: int, kept: Mapping[str, Numbers]) -> Group:
             "outcome": whole(columns["outcome"], dims, "how the walk ended, see attribute outcomes"),
             "steps": whole(columns["steps"], dims, "steps walked"),
             "sharper_outcome": whole(columns["sharper_outcome"], dims, "how it ended at a tenfold tolerance"),
-            "compared": whole(same & answered, dims, "1 if both runs have an answer and end alike"),
-            "error": Variable(
-                np.ascontiguousarray(columns["error"]),
+            "compared": whole(compared, dims, "1 if both runs have an answer and end alike after as many steps"),
+            "error": error(
+                np.where(compared, columns["error"], NONE),
                 dims,
-                "1",
-                "between both runs, in legs, radians, pendulum times; 0 if not compared",
+                "between both runs, in legs, radians, pendulum times, where they are compared",
             ),
             "rhs_evaluations": whole(columns["rhs_evaluations"], dims, "right-hand sides evaluated"),
         },
@@ -90,12 +90,7 @@ def step_group(cells: int, kept: Mapping[str, Numbers]) -> Group:
             STIFFNESS_DIM: stiffness_axis(cells),
             STEP_DIM: Variable(along(STEP, cells), (STEP_DIM,), "s", "step size"),
             "verdict": whole(found[:, :, 0].T, dims, "what became of it, see attribute verdicts"),
-            "error": Variable(
-                np.ascontiguousarray(found[:, :, 1].T),
-                dims,
-                "1",
-                "of the state at the end, in legs, radians, pendulum times; 0 where there is none",
-            ),
+            "error": error(found[:, :, 1].T, dims, "of the state at the end, in legs, radians, pendulum times"),
         },
         {
             "verdicts": ", ".join(f"{number} {verdict}" for number, verdict in enumerate(VERDICTS)),
@@ -110,6 +105,11 @@ def stiffness_axis(cells: int) -> Variable:
     return Variable(along(STIFFNESS, cells), (STIFFNESS_DIM,), "N/m^2.2", "stiffness of the ground")
 
 
+def error(values: Any, dims: tuple[str, ...], text: str) -> Variable:
+    """A variable of errors, with gaps where there is none."""
+    return Variable(np.ascontiguousarray(np.where(values == NONE, np.nan, values)), dims, "1", text, missing=True)
+
+
 def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:
     """A variable of whole numbers."""
     return Variable(np.ascontiguousarray(values).astype(np.int64), dims, "1", text)
@@ -117,14 +117,14 @@ def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:
 
 def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
     """How many cells came out how."""
-    compared = stiction["compared"] == 1
+    errors = stiction["error"][stiction["compared"] == 1]
     numbers, counts = np.unique(stiction["outcome"], return_counts=True)
     verdicts, times = np.unique(step["verdict"], return_counts=True)
     return {
         "cells": int(stiction["outcome"].size + step["verdict"].size),
         "outcomes": {Outcome(int(one)).label: int(many) for one, many in zip(numbers, counts, strict=True)},
         "ends_otherwise_sharper": int(np.count_nonzero(stiction["outcome"] != stiction["sharper_outcome"])),
-        "largest_error": float(np.max(stiction["error"], where=compared, initial=0.0)),
-        "median_error": float(np.median(stiction["error"][compared])) if compared.any() else 0.0,
+        "largest_error": float(errors.max()) if errors.size else None,
+        "median_error": float(np.median(errors)) if errors.size else None,
         "fixed_step": {VERDICTS[int(one)]: int(many) for one, many in zip(verdicts, times, strict=True)},
     }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.reads import ContactConfig, TuneConfig
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_plain_compass, is_the_papers
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.pinned import Pinned
@@ -55,7 +55,7 @@ class Procedure:
     """The paper's procedure, step by step.
 
     hinged    the paper's walk whose first step has a revolute joint at its stance foot, from the rigid state; None for
-              another walker than its compass
+              another walker than a compass
     released  the walk without it
     adjusted  the walk from the adjusted start; the released one if no adjustment is needed; None if there is none
     """
@@ -129,16 +129,16 @@ class Stage:
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.steps = 2 * config.strides
         self.rigid: Standing = rigid_walker(config, config.equations)
-        self.of_the_paper = is_plain_compass(config.walker)
+        self.compass, self.of_the_paper = is_plain_compass(config.walker), is_the_papers(config.walker)
         self.starts = self.scaled()
 
     def findings(self, progress: Progress, jobs: int) -> Findings:
         """Procedure, margins, map, adjustment and the paper's own start."""
         settings = self.config.tune
-        cells = settings.cells or (COMPASS_CELLS if self.of_the_paper else CELLS)
+        cells = settings.cells or (COMPASS_CELLS if self.compass else CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        hinge = hinged_walker(self.config, self.scene.walker) if self.of_the_paper else None
+        hinge = hinged_walker(self.config, self.scene.walker) if self.compass else None
         hinged = None if hinge is None else self.walk(self.rigid_state, hinge)
         released = self.walk(self.rigid_state)
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
@@ -148,7 +148,7 @@ class Stage:
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         adjustment, around = self.adjusted(as_it_stands, quick, walked)
-        search = Search() if self.of_the_paper else COARSE
+        search = Search() if self.compass else COARSE
         found = margins(self.starts, around, search) if adjustment is not None else []
         state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
         adjusted = None if state is None else self.walk(state)

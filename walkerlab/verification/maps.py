@@ -27,6 +27,7 @@ from walkerlab.verification.verdict import finite
 PAPER_STIFFNESS: Final = 1.0e5 * 1000.0**2.2  # N/m^e
 STIFFNESS: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_VELOCITY: Final = (1e-7, 10.0)  # m/s
+NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
 STEP: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
@@ -85,9 +86,9 @@ class StictionCell:
 
 
 def apart(one: ContactWalkResult, other: ContactWalkResult, config: RigidConfig) -> float:
-    """How far two walks' touches and ends are apart, in legs, radians and pendulum times; 0 if not to be compared."""
+    """How far two walks' touches and ends are apart, in legs, radians and pendulum times; `NONE` if they end unlike."""
     if one.outcome is not other.outcome or one.touch_time_s.size != other.touch_time_s.size:
-        return 0.0
+        return NONE
     times = np.abs(one.touch_time_s - other.touch_time_s) / pendulum_time(config)
     ends = np.abs(np.array(one.end_state) - np.array(other.end_state)) / natural_units(config)
     return finite(float(np.max(np.concatenate([times, ends]))))
@@ -117,14 +118,14 @@ class StepColumn:
         name, rtol, atol = REFERENCE
         walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)
         if not walk.outcome.answered:
-            return [float(VERDICTS.index("no reference")), 0.0] * self.cells
+            return [float(VERDICTS.index("no reference")), NONE] * self.cells
         return [number for h in self.steps_s for number in step_cell(h, ready, walk, natural_units(config))]
 
 
 def step_cell(h: float, ready: Prepared, walk: ContactWalkResult, units: NDArray[np.float64]) -> tuple[float, float]:
-    """Verdict and error of one step; the error is 0 where there is none to speak of."""
+    """Verdict and error of one step; the error is `NONE` where there is none to speak of."""
     choice = fixed("map", h, ready, walk.end_time_s, np.array(walk.end_state), units, MOST_EVALUATIONS)
-    return float(VERDICTS.index(choice.verdict)), choice.error or 0.0
+    return float(VERDICTS.index(choice.verdict)), NONE if choice.error is None else choice.error
 
 
 MapPiece = StictionCell | StepColumn

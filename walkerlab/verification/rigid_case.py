@@ -93,7 +93,7 @@ def judge_rigid(case: Case, config: Config) -> CaseResult:
     if walk.outcome.answered:
         second = walked_otherwise(ready, config, short)
         for what, again, unit in compared_walks(ready, config, short, second):
-            findings.append(time_difference(what, walk, pendulum_time(config), again, unit, case, config))
+            findings += time_difference(what, walk, pendulum_time(config), again, unit, case, config)
             if short.steps == case.steps:
                 remarks += outcome_differs(what, case, walk.outcome, again.outcome)
     return CaseResult(
@@ -157,10 +157,12 @@ def time_difference(
     other_unit: float,
     case: Case,
     config: WalksConfig,
-) -> Finding:
-    """How far two walks' heel strikes are apart, each in its own pendulum time."""
+) -> list[Finding]:
+    """How far two walks' heel strikes are apart, each in its own pendulum time; nothing where there are none."""
     strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit
     steps = min(strikes.size, others.size, case.compared_steps)
-    apart = float(np.max(np.abs(strikes[:steps] - others[:steps]))) if steps else 0.0
+    if steps == 0:
+        return []
+    apart = float(np.max(np.abs(strikes[:steps] - others[:steps])))
     limit = promised(case, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
-    return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)
+    return [Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)]
