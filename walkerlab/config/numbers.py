@@ -1,8 +1,13 @@
-"""Numbers as short texts that read back as the same number."""
+"""Numbers as short texts that read back as the same number, and when two are the same."""
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal
+from typing import Any, Final
+
+SAME: Final = 1e-9
+"""Relative difference up to which two numbers are one, written in different units."""
 
 
 def short(number: float) -> str:
@@ -17,3 +22,10 @@ def short(number: float) -> str:
         return plain
     digits, exponent = f"{Decimal(repr(number)).normalize():E}".split("E")
     return min(plain, f"{digits}e{int(exponent)}", key=len)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values are the same, numbers up to their rounding."""
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=SAME)
+    return bool(one == other)

@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.fields import Block, key
+from walkerlab.config.numbers import same
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
@@ -444,8 +445,11 @@ def is_plain_compass(walker: Any) -> bool:
 
 
 def is_the_papers(walker: Any) -> bool:
-    """Whether this is the paper's own walker, to its last number."""
-    return bool(walker == CompassWalker())
+    """Whether this is the paper's own walker, up to rounding of its numbers."""
+    paper = CompassWalker()
+    return isinstance(walker, CompassWalker) and all(
+        same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
+    )
 
 
 def too_light_for_contact(walker: Any) -> str:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, Final
 
+from walkerlab.config.numbers import same
 from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.config.schema import CompassWalker, Config, Contact
 from walkerlab.paper.measured import Departures
 from walkerlab.paper.printed import X_P, slope_of
 
-SAME: Final = 1e-9
-"""Relative difference up to which two numbers are one, written in different units."""
 PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
 LAWS: Final = ("friction", "terrain", "pad_pitch")
 """Keys of the contact block besides its force laws. A pinned first stance is the paper's too (section 4)."""
@@ -67,13 +65,6 @@ def different(paper: CompassWalker, used: CompassWalker, leave_out: tuple[str, .
     for name in CompassWalker.model_fields:
         if name not in leave_out and not same(getattr(used, name), getattr(paper, name)):
             yield said(name, getattr(used, name), getattr(paper, name))
-
-
-def same(one: Any, other: Any) -> bool:
-    """Whether two values are the same, numbers up to their rounding."""
-    if isinstance(one, float | int) and isinstance(other, float | int):
-        return math.isclose(one, other, rel_tol=SAME)
-    return bool(one == other)
 
 
 def said(name: str, used: Any, paper: Any) -> str:
