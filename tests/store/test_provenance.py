@@ -47,8 +47,14 @@ def test_commit_is_that_of_the_package_and_marks_changes(tmp_path, monkeypatch):
     git("add", ".")
     git("commit", "--quiet", "--message", "first")
     assert provenance.git_commit() == git("rev-parse", "HEAD")
-    source.write_text("changed = True\n")
-    assert provenance.git_commit() == git("rev-parse", "HEAD") + "-dirty"
+    (tmp_path / "notes.txt").touch()
+    assert provenance.git_commit() == git("rev-parse", "HEAD")
+    for changed in (source, tmp_path / "configs" / "paper.yaml"):
+        changed.parent.mkdir(exist_ok=True)
+        changed.write_text("changed = True\n")
+        assert provenance.git_commit() == git("rev-parse", "HEAD") + "-dirty"
+        git("add", ".")
+        git("commit", "--quiet", "--message", "changed")
 
 
 def test_an_installed_package_inside_somebodys_repository_has_no_commit(tmp_path, monkeypatch):

@@ -11,7 +11,9 @@ from walkerlab.config.problems import KEYS_ARE_LISTED, Problem, nearest, refusal
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
-BUILTIN_FOLDER: Final = Path(__file__).parent / "builtin"
+_INSTALLED: Final = Path(__file__).parent / "builtin"
+BUILTIN_FOLDER: Final = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "configs"
+"""The built-in configs: beside this file where a wheel was installed, at the top of a checkout."""
 DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16

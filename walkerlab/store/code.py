@@ -20,7 +20,8 @@ IMPORT = re.compile(
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
-# The built-in configs reach a stage through the slice of the config that it reads, which is in its key already.
+# The built-in configs, which a wheel has in the package, reach a stage through the slice of the config that it reads,
+# which is in its key already.
 INPUT_FOLDERS = ("config/builtin",)
 
 

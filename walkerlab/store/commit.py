@@ -12,17 +12,19 @@ from pathlib import Path
 FILE = "commit.txt"
 """At the root of a source distribution, and in the metadata of an installed package."""
 IN_METADATA = f"extra_metadata/{FILE}"
+SHIPPED = ("walkerlab", "configs")
+"""What of a checkout an installed package is made of."""
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """The commit of a source tree, '-dirty' if the package in it was changed; None if it is no checkout of its own."""
+    """The commit of a source tree, '-dirty' if what a package has of it was changed; None if it is no checkout."""
     # Only the package's own repository: an environment inside somebody's checkout says nothing about this code.
     if not (root / ".git").exists():
         return None
     commit = git(root, "rev-parse", "HEAD")
     if commit is None:
         return None
-    return f"{commit}-dirty" if git(root, "status", "--porcelain", "--", "walkerlab") else commit
+    return f"{commit}-dirty" if git(root, "status", "--porcelain", "--", *SHIPPED) else commit
 
 
 def commit_of_installation(package: Path) -> str | None:
