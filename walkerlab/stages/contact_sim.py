@@ -108,8 +108,8 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
         progress.note(
-            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against the slip velocity of the largest "
-            f"friction, {rising:g} m/s: friction, and how the walk ends, may be chance; lower atol"
+            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against contact.stiction_velocity, up to "
+            f"which friction rises, {rising:g} m/s: friction, and how the walk ends, may be chance; lower atol"
         )
 
 
