@@ -34,6 +34,10 @@ def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
     assert said[7] == "a bug: ZeroDivisionError: a bug"
     assert said[13].startswith("its worker died: WorkerDiedError")
     assert "SIGKILL" in said[13]
+    error = swept.error()
+    assert error.exit_code == 1
+    assert error.message.startswith("2 of 12 points were not computed, and a bug is among the reasons")
+    assert [note.splitlines()[-1] for note in error.__notes__] == ["ZeroDivisionError: a bug"]
     twice = swept.content[""]["twice"]
     assert np.nansum(twice) == sum(2 * seed for seed in range(5, 17) if seed not in (7, 13))
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.workers import WorkerPool
 
 POLL_S = 0.5
+GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -106,9 +108,12 @@ def dask(order: Order) -> Iterator[Pool]:
             client = stack.enter_context(distributed.Client(order.address))
         else:
             workers = order.workers or os.cpu_count() or 1
-            cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
-            )
+            try:
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+                )
+            except RuntimeError as error:
+                raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
         # A worker's death is dealt with chunk by chunk, here as in every engine.
@@ -222,4 +227,9 @@ def engine_named(text: str) -> tuple[Engine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
+    # what multiprocessing itself goes by: a process that it starts runs the script first
+    if text == "dask" and getattr(current_process(), "_inheriting", False):
+        raise ConfigError(
+            "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD
+        )
     return ENGINES[name], address

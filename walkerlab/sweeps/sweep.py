@@ -103,7 +103,9 @@ class Swept:
         why = f"`said` in {self.path} says why."
         if not self.bugs:
             return NoAnswer(f"{said}; {why}", "The same command tries them again and keeps the rest.")
-        error = WalkerlabError(f"{said}, because of a bug; {why}", "Please report the traceback; the rest is stored.")
+        error = WalkerlabError(
+            f"{said}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
+        )
         for bug in self.bugs:
             error.add_note(bug)
         return error
