@@ -29,6 +29,7 @@ LAYERS = (
     "ground",
     "mechanics",
     "solvers",
+    "workers",
     "config",
     "kernels",
     "labels",

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,9 @@ from walkerlab import kernels
 
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
-from walkerlab.kernels import CACHE_FOLDER
+from walkerlab.kernels import cache_folder
 import walkerlab.orbits.trial_of_code as trial
-print(trial.twice(3.0), CACHE_FOLDER.name)
+print(trial.twice(3.0), cache_folder().name)
 """
 CALLER = '''"""A kernel that calls a function of another file."""
 
@@ -80,6 +81,82 @@ def test_code_that_is_as_before_is_not_compiled_again(copy):
     assert run()[1] == folder
     assert kept
     assert compiled(package.parent / "cache" / folder) == kept
+
+
+IMPORT_ALL = """
+import walkerlab, walkerlab.kernels, walkerlab.orbits.trial_of_code
+"""
+
+
+def test_importing_kernels_writes_nothing(copy, tmp_path):
+    home = tmp_path / "home"
+    home.mkdir()
+    given = {name: str(home / name) for name in ("WALKERLAB_CACHE", "XDG_CACHE_HOME", "HOME", "TMPDIR")}
+    environment = {**os.environ, **given, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    before = sorted(tmp_path.rglob("*"))
+    subprocess.run([sys.executable, "-c", IMPORT_ALL], cwd=tmp_path, env=environment, check=True)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+CHOSEN_LATE = """
+import os, sys
+from walkerlab.orbits.trial_of_code import twice
+os.environ["WALKERLAB_CACHE"] = sys.argv[1]
+twice(3.0)
+"""
+
+
+def test_a_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "at-first")}
+    command = [sys.executable, "-c", CHOSEN_LATE, str(tmp_path / "later")]
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    assert compiled(tmp_path / "later")
+    assert not (tmp_path / "at-first").exists()
+
+
+@pytest.fixture
+def generations(copy, tmp_path):
+    """Make twelve older generations of compiled code, last used so many days ago and earlier; those left of them."""
+    _, run = copy
+    host = run()[1].split("-", 3)[3]  # kernels-DIGEST-pyVERSION-PROCESSOR
+    shutil.rmtree(tmp_path / "cache")
+
+    def left_after_a_new_one(days):
+        folders = [tmp_path / "cache" / f"kernels-{number:016x}-py311-{host}" for number in range(12)]
+        for number, folder in enumerate(folders):
+            folder.mkdir(parents=True)
+            os.utime(folder, times=(time.time() - (days + number) * 86_400,) * 2)
+        run()
+        return [number for number, folder in enumerate(folders) if folder.exists()]
+
+    return left_after_a_new_one
+
+
+def test_older_compiled_code_that_others_may_be_using_is_left(generations):
+    assert generations(days=1) == list(range(12))
+
+
+def test_compiled_code_that_nobody_has_used_for_long_goes_but_for_the_latest(generations):
+    assert generations(days=100) == list(range(kernels.KEPT_GENERATIONS - 1))
+
+
+FOLDER_GONE = """
+import shutil
+from walkerlab.kernels import cache_folder
+from walkerlab.orbits.trial_of_code import twice
+twice(3.0)
+shutil.rmtree(cache_folder())
+print(twice(3))
+"""
+
+
+def test_a_process_whose_compiled_code_is_removed_compiles_anew(copy, tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", FOLDER_GONE], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert float(done.stdout) == 8.0
+    assert compiled(tmp_path / "cache")
 
 
 @pytest.fixture

@@ -173,7 +173,8 @@ def sweep(
     seed    of a drawing; None is the config's
     jobs    chunks computed at once; 0 leaves it to the engine
 
-    Worker processes import the calling script anew: call it under `if __name__ == "__main__":` there.
+    Raises NoAnswer if points were not computed, and WalkerlabError if a bug is why; the others are stored then, for
+    `open_run`.
 
     >>> gaits = sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=folder, jobs=1)
     >>> [round(float(period), 4) for period in gaits.period_s]
@@ -190,7 +191,10 @@ def sweep(
     chosen, address = engine_named(engine)
     folder = RunFolder(Path(runs), read.base.run_name)
     order = Order(jobs, address, modules_of(stage, read.base.config, PIPELINE), folder.path)
-    return dataset(Sweep(question, read, folder).run(Work(chosen, order)).content[""])
+    swept = Sweep(question, read, folder).run(Work(chosen, order))
+    if swept.failed:
+        raise swept.error()
+    return dataset(swept.content[""])
 
 
 def walker(type: str, **keys: Any) -> Any:

@@ -14,6 +14,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -34,6 +35,7 @@ from numba.extending import overload, register_jitable
 # the only packages in which compiled functions may stand (a test says so)
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 KEPT_GENERATIONS = 8
+UNUSED_S = 30 * 86_400.0  # an older generation that no process has begun to use for so long is nobody's
 # No licence to contract or reorder: code compiled twice computes the same to the last bit.
 # No counting of references (_nrt): kernels allocate nothing and borrow all arrays from their caller, and counting takes
 # as long as the arithmetic.
@@ -122,40 +124,49 @@ def _writable(folder: Path) -> bool:
         return False
 
 
-def _open_cache() -> Path:
-    """This processor's folder of this state of the sources; its older generations beyond a few are removed."""
+@functools.cache
+def cache_folder() -> Path:
+    """This processor's folder of this state of the sources, chosen and made when this process first needs it.
+
+    A new one takes the place of what has not been used for long.
+    """
     root, host = cache_root(), compiled_for()
     folder = root / f"kernels-{sources_digest()[:16]}-py{sys.version_info.major}{sys.version_info.minor}-{host}"
-    folder.mkdir(exist_ok=True)
+    if not folder.is_dir():
+        folder.mkdir(exist_ok=True)
+        _remove_unused(list(root.glob(f"kernels-*-{host}")))
     os.utime(folder)
-    generations = sorted(root.glob(f"kernels-*-{host}"), key=_age, reverse=True)
-    for old in generations[KEPT_GENERATIONS:]:
-        shutil.rmtree(old, ignore_errors=True)
     return folder
 
 
-def _age(folder: Path) -> float:
+def _remove_unused(generations: list[Path]) -> None:
+    """Remove those that were not used for long, beyond the latest few; a process that has one open compiles anew."""
+    latest_first = sorted(((_last_used(folder), folder) for folder in generations), reverse=True)
+    for last_used, folder in latest_first[KEPT_GENERATIONS:]:
+        if time.time() - last_used > UNUSED_S:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _last_used(folder: Path) -> float:
+    """Time (s since the epoch) at which a process last began to use a folder; now for one that has just gone."""
     try:
         return folder.stat().st_mtime
     except OSError:
-        return 0.0
-
-
-CACHE_FOLDER = _open_cache()
+        return time.time()
 
 
 def nothing_compiled_yet() -> bool:
     """Whether this state of the sources has no compiled code so far: the first run on a machine, or after a change."""
-    return next(CACHE_FOLDER.rglob("*.nbc"), None) is None
+    return next(cache_folder().rglob("*.nbc"), None) is None
 
 
 class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
-    """Numba's locator for a folder that was chosen, which is `CACHE_FOLDER`, for kernels alone."""
+    """Numba's locator for a folder that was chosen, which is `cache_folder`, for kernels alone."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         """The folder of a function's file."""
         super().__init__(py_func, py_file)
-        self._cache_path = str(CACHE_FOLDER / self.get_suitable_cache_subpath(py_file))
+        self._cache_path = str(cache_folder() / self.get_suitable_cache_subpath(py_file))
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> Any:
@@ -164,7 +175,7 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
 
 
 class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    """Results of compiling in `CACHE_FOLDER`; those of a notebook's cells, which have no file, where IPython says."""
+    """Results of compiling in `cache_folder`; those of a notebook's cells, which have no file, where IPython says."""
 
     _locator_classes = (KernelLocator, IPythonCacheLocator)
 
@@ -182,29 +193,42 @@ class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
             return {}
 
 
-class KernelCache(FunctionCache):  # type: ignore[misc]
-    """A kernel's machine code on disk: of several processes that call one at once, one compiles it and all load it."""
+class StoredKernel(FunctionCache):  # type: ignore[misc]
+    """A kernel's machine code on disk."""
 
     _impl_class = KernelCacheImpl
 
     def __init__(self, py_func: Any) -> None:
-        """Of a Python function."""
+        """Of a Python function; makes the folder that it is in."""
         super().__init__(py_func)
         locator = self._impl.locator
         self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+
+
+class KernelCache:
+    """What numba asks for a kernel's stored code: of several processes that call it at once, one compiles it."""
+
+    def __init__(self, py_func: Any) -> None:
+        """Of a Python function; nothing is opened before its first call."""
+        self._function = py_func
         self.kernel = py_func.__name__
         self._held: dict[str, Any] = {}
 
+    @functools.cached_property
+    def stored(self) -> StoredKernel:
+        """The code on disk."""
+        return StoredKernel(self._function)
+
     def load_overload(self, signature: Any, context: Any) -> Any:
         """The stored code; None if this process is to compile it, once no other does."""
-        found = super().load_overload(signature, context)
+        found = self.stored.load_overload(signature, context)
         if found is not None or str(signature) in self._held:
             return found
         for tell in watchers:
             tell(self.kernel)
         lock = _lock(f"{self.kernel} {signature}")
         lock.acquire()
-        found = super().load_overload(signature, context)
+        found = self.stored.load_overload(signature, context)
         if found is None:
             self._held[str(signature)] = lock
             compiling.append((self, str(signature)))
@@ -216,7 +240,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         """Store what was compiled."""
         try:
             with _lock(self.kernel):  # one index for all signatures
-                super().save_overload(signature, data)
+                self.stored.save_overload(signature, data)
         finally:
             self.finish(str(signature))
 
@@ -233,7 +257,7 @@ def _lock(name: str) -> Any:
     # Imported here: a process that finds everything compiled takes no lock.
     from filelock import FileLock
 
-    return FileLock(CACHE_FOLDER / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
+    return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
 
 
 def _finished(lock: Any) -> None:

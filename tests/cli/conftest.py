@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -36,11 +37,13 @@ class Program:
         )
 
     def start(self, *arguments, environment=None, **options):
+        """Start it as a terminal does: where the tests are a script's background job they ignore Ctrl-C."""
         return subprocess.Popen(
             [*self.command, *map(str, arguments)],
             cwd=self.folder,
             env={**self.environment, **(environment or {})},
             text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options},
         )
 

@@ -95,3 +95,26 @@ def test_status_lists_all_runs_and_tells_of_one(toy):
     assert one["run_dir"] == "runs/paper@strides=7"
     assert {row["stage"]: row["state"] for row in one["stages"]}["drop"] == "current"
     assert toy("status", "paper@strides=8").returncode == 5
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_bug_at_one_point_is_told_with_its_traceback_and_exits_1_and_the_others_are_there(toy, tmp_path, jobs):
+    source = tmp_path / "source" / "toy" / "drop.py"
+    text = source.read_text()
+    assert "    progress.advance()" in text
+    broken = "    assert config.gravity_m_s2 != 5.0, 'a bug'\n    progress.advance()"
+    source.write_text(text.replace("    progress.advance()", broken))
+    over = ("--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1")
+    done = toy("sweep", "--stage", "drop", "--jobs", jobs, *over, "--json")
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "AssertionError: a bug" in done.stderr
+    value = json.loads(done.stdout)
+    assert (value["done"], value["failed"], value["error"]["exit_code"]) == (4, 1, 1)
+
+
+def test_points_without_an_answer_are_no_bug_and_no_failure(toy):
+    done = toy("sweep", "--stage", "drop", "--jobs", "2", "--over", "slope_rad=[0.1, 1.2]", "--json")
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert json.loads(done.stdout)["outcomes"] == {"answered": 1, "no-answer": 1}

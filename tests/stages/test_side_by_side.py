@@ -1,14 +1,16 @@
 """Stages in processes side by side: the same results, told as they come, with a page before all is there."""
 
+import os
 import re
 from dataclasses import replace
 
 import pytest
+from process_table import workers_below
 
-from walkerlab.stages.crew import Message, found
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.runner import STILL_COMPUTED, any_side_by_side, execute
 from walkerlab.store.artifact import read
+from walkerlab.workers import WorkerDiedError
 
 STEEP = "slope_rad=1.2"
 NUMBERS = ("drop", "roll", "bounce", "survey")
@@ -73,14 +75,16 @@ def test_what_measures_times_has_nothing_beside_it(toy, listener):
 
 def test_what_fails_in_a_process_is_told_with_its_traceback(toy):
     toy.edit("roll", "period = ", "period = 1 / 0 + ")
-    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
+    with pytest.raises(ZeroDivisionError) as caught:
         toy.execute("page", jobs=2)
+    assert "roll.py" in caught.value.__notes__[0]
     assert not (toy.runs / "paper" / "roll.h5").exists()
 
 
-def test_a_process_that_was_killed_is_told():
-    with pytest.raises(Exception, match="ended from outside"):
-        found(Message("died", last=True))
+def test_a_process_that_was_killed_is_told(toy):
+    toy.edit("roll", "period = ", "import os; os.kill(os.getpid(), 9); period = ")
+    with pytest.raises(WorkerDiedError, match="SIGKILL"):
+        toy.execute("page", jobs=2)
 
 
 def test_a_chain_is_walked_in_one_process(toy):
@@ -91,8 +95,6 @@ def test_a_chain_is_walked_in_one_process(toy):
 
 
 def test_no_process_is_left(toy):
-    import multiprocessing
-
     config, folder = toy.loaded()
     execute(config, "page", folder, jobs=2, graph=toy.graph)
-    assert multiprocessing.active_children() == []
+    assert workers_below(os.getpid()) == []

@@ -7,11 +7,10 @@ import subprocess
 import sys
 import threading
 import time
-from multiprocessing import forkserver, get_all_start_methods
-from pathlib import Path
 
 import numpy as np
 import pytest
+from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, Engine, Order, engine_named, one_thread_each
@@ -32,18 +31,22 @@ def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
     swept = toy.run("deadly", "seed=5:16:12", engine=LOCAL, order=order())
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
     said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["said"].tolist(), strict=True))
-    assert said[7] == "ZeroDivisionError: a bug"
-    assert said[13].startswith("its worker died: BrokenProcessPool")
+    assert said[7] == "a bug: ZeroDivisionError: a bug"
+    assert said[13].startswith("its worker died: WorkerDiedError")
+    assert "SIGKILL" in said[13]
+    error = swept.error()
+    assert error.exit_code == 1
+    assert error.message.startswith("2 of 12 points were not computed, and a bug is among the reasons")
+    assert [note.splitlines()[-1] for note in error.__notes__] == ["ZeroDivisionError: a bug"]
     twice = swept.content[""]["twice"]
     assert np.nansum(twice) == sum(2 * seed for seed in range(5, 17) if seed not in (7, 13))
 
 
-@pytest.mark.skipif("forkserver" not in get_all_start_methods(), reason="workers are forked from no server here")
-def test_workers_are_forked_from_a_process_that_may_begin_before_there_are_points():
-    ENGINES["local"].begin(Order(workers=1))
-    begun = forkserver._forkserver._forkserver_pid
-    with ENGINES["local"].opened(Order(workers=1)) as pool:
-        assert pool.executor.submit(os.getppid).result() == begun
+def test_workers_of_this_machine_may_begin_before_there_are_points():
+    with LOCAL.begun(Order(workers=2)) as begun:
+        workers = set(processes_below(os.getpid()))
+        with begun.opened(Order(workers=2)) as pool:
+            assert pool.executor.submit(os.getpid).result() in workers
 
 
 def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
@@ -67,34 +70,16 @@ from walkerlab.sweeps.engines import Order
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.sweep import Sweep, Work
 from toy_sweep.sweep_pipeline import GRAPH
-if __name__ == "__main__":
-    read = template()
-    question = asked("deadly", [axis_of_text("seed=100:179:80")])
-    sweep = Sweep(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
-    order = Order(2, modules=("toy_sweep.deadly",))
-    swept = sweep.run(Work(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
-    print(swept.content.digest(), swept.failed)
+read = template()
+question = asked("deadly", [axis_of_text("seed=100:179:80")])
+sweep = Sweep(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
+order = Order(2, modules=("toy_sweep.deadly",))
+swept = sweep.run(Work(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
+print(swept.content.digest(), swept.failed)
 """
 
 
-def workers_of(parent):
-    """Processes below a process, by the kernel's own table."""
-    children = {}
-    for entry in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            pid, rest = entry.read_text().split(" ", 1)
-        except OSError:
-            continue
-        children.setdefault(int(rest.rpartition(")")[2].split()[1]), []).append(int(pid))
-    found, waiting = [], [parent]
-    while waiting:
-        below = children.get(waiting.pop(), [])
-        found += below
-        waiting += below
-    return found
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs the kernel's table of processes")
+@pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
 def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     script = tmp_path / "sweeper.py"
@@ -105,7 +90,7 @@ def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_
     deadline = time.monotonic() + 90.0
     while not (chunks.is_dir() and len(list(chunks.glob("*.h5"))) >= 3) and time.monotonic() < deadline:
         time.sleep(0.01)
-    below = workers_of(process.pid)
+    below = processes_below(process.pid)
     process.kill()
     process.wait()
     assert below
@@ -125,13 +110,6 @@ def test_two_sweeps_on_one_folder_at_once_come_to_the_same_bits(toy, tmp_path):
     both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = [process.communicate(timeout=120)[0].split() for process in both]
     assert said[0] == said[1] == [toy.run("deadly", "seed=100:179:80").content.digest(), "0"]
-
-
-def is_alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 from statistics import median
 from typing import Annotated, Any
 
@@ -17,6 +15,7 @@ from walkerlab.benchmarks.references import End, Reference, WalkEndsError, first
 from walkerlab.benchmarks.trials import Trial, TrialRun
 from walkerlab.labels import Label
 from walkerlab.solvers.registry import METHODS
+from walkerlab.workers import in_order
 
 BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
 SHORT = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
@@ -104,7 +103,8 @@ def finished(
     ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
     wanted = [one for one in climbs if one.unfinished and long_runs]
     put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in wanted]
-    done = in_processes([*ends, *put_off], jobs)
+    calls: list[Callable[[], Any]] = [*ends, *put_off]
+    done = in_order(calls, jobs)
     firsts: list[End | WalkEndsError] = [next(done) for _ in trials][::-1]
     return firsts, [
         replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished and long_runs else one
@@ -124,21 +124,6 @@ def long_run(trial: Trial, method: str, tolerance: float) -> Run:
     """A run that takes long, perhaps in a process of its own that has to warm up."""
     trial.prepare(method, tolerance, WARM_UP)()
     return measure(trial, method, tolerance, BUDGET)
-
-
-def in_processes(tasks: Sequence[Callable[[], Any]], jobs: int) -> Iterator[Any]:
-    """Results in the order of the tasks."""
-    if jobs <= 1:
-        yield from map(called, tasks)
-        return
-    # compiled code and threads do not survive a fork
-    with ProcessPoolExecutor(min(jobs, len(tasks) or 1), get_context("spawn")) as pool:
-        yield from pool.map(called, tasks)
-
-
-def called(task: Callable[[], Any]) -> Any:
-    """What a task gives; a function that other processes can be sent."""
-    return task()
 
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> Run:

@@ -97,15 +97,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 folder=request.folder.path,
                 options=options_of(engine_option or ()),
             )
-            if not dry_run:
-                chosen.begin(order)
-            asked = Sweep(question, template, request.folder, graph)
             if dry_run:
+                asked = Sweep(question, template, request.folder, graph)
                 show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
                 return
-            load_meanwhile("walkerlab.sweeps.drawing")
-            work = Work(chosen, order, chunk_seconds, not no_wait, force, where(graph))
-            swept = asked.run(work, request.console)
+            with chosen.begun(order) as begun:
+                asked = Sweep(question, template, request.folder, graph)
+                load_meanwhile("walkerlab.sweeps.drawing")
+                work = Work(begun, order, chunk_seconds, not no_wait, force, where(graph))
+                swept = asked.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
 
 
@@ -203,7 +203,7 @@ def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
 
 
 def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: bool) -> None:
-    """Draw and print a sweep; typer.Exit(4) if points could not be computed."""
+    """Draw and print a sweep; typer.Exit if points were not computed."""
     from walkerlab.store.files import write_atomically
     from walkerlab.sweeps.drawing import draw
     from walkerlab.sweeps.result import as_csv as table_of
@@ -222,7 +222,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
         beside = swept.path.with_suffix(".csv")
         write_atomically(beside, table.encode())
         value["csv"] = str(beside)
-    error = failed(swept)
+    error = swept.error() if swept.failed else None
     if request.as_json:
         print_json(value | ({"error": described(error)} if error is not None else {}))
     elif as_csv:
@@ -245,15 +245,3 @@ def printed(swept: Swept, page: Path) -> list[str]:
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]
-
-
-def failed(swept: Swept) -> Any:
-    """What the command fails with if points were not computed."""
-    from walkerlab.errors import NoAnswer
-
-    if not swept.failed:
-        return None
-    return NoAnswer(
-        f"{swept.failed} of {len(swept.question)} points were not computed; `said` in {swept.path} says why.",
-        "The same command tries them again and keeps the rest.",
-    )

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,35 +40,6 @@ class StartMap:
     def share(self) -> float:
         """Part of the cells that walk and settle."""
         return float(self.walking.shape[0]) / self.outcome.size
-
-
-def contact_map(
-    starts: ScaledStarts,
-    swing: NDArray[np.float64],
-    stance: NDArray[np.float64],
-    jobs: int,
-    advance: Callable[[int], None],
-) -> StartMap:
-    """Walk from every scaled start.
-
-    jobs     processes to share the rows
-    advance  told how many more cells are done
-    """
-    rows = []
-    for row in in_order(partial(contact_row, starts, swing), stance, jobs):
-        rows.append(row)
-        advance(swing.size)
-    return as_map(swing, stance, rows)
-
-
-def in_order(work: Callable[[float], Integers], factors: NDArray[np.float64], jobs: int) -> Iterator[Integers]:
-    """The rows' results in their order, computed by as many processes."""
-    if jobs <= 1:
-        yield from map(work, factors)
-        return
-    # spawned and not forked: the same on every system, and no lock is inherited
-    with multiprocessing.get_context("spawn").Pool(min(jobs, factors.size)) as pool:
-        yield from pool.imap(work, factors)
 
 
 def contact_row(starts: ScaledStarts, swing: NDArray[np.float64], stance: float) -> Integers:

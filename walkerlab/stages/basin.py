@@ -37,7 +37,7 @@ from walkerlab.stages.basin_pieces import (
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
-from walkerlab.verification.processes import in_order
+from walkerlab.workers import in_order
 
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
 DRAWN = 4_000  # starts from which attractors are sought
@@ -107,7 +107,8 @@ def finish(pieces: list[Piece], label: str, progress: Progress, parts: Parts, jo
     progress.start(label, sum(piece.walks for piece in pieces))
     progress.advance(sum(piece.walks for piece in pieces if piece.name in parts.kept))
     worth_sharing = sum(piece.walks for piece in waiting) >= waiting[0].question.shared_from if waiting else False
-    for piece, numbers in zip(waiting, in_order(waiting, jobs if worth_sharing else 1, (0,)), strict=True):
+    found = in_order([piece.run for piece in waiting], jobs if worth_sharing else 1, (0,))
+    for piece, numbers in zip(waiting, found, strict=True):
         parts.keep(piece.name, numbers)
         clock.walks += piece.walks
         progress.advance(piece.walks)

@@ -5,16 +5,17 @@ from __future__ import annotations
 import datetime
 import importlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import NoAnswer
-from walkerlab.stages.ahead import Ahead
-from walkerlab.stages.crew import Crew, Member, found
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
     STILL_COMPUTED,
@@ -27,8 +28,9 @@ from walkerlab.stages.plan import (
     plan,
     why_unsuited,
 )
+from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
-from walkerlab.stages.task import Compilation, Task, kernels_told_of, nothing_compiled_yet, task_of
+from walkerlab.stages.task import Task, kernels_told_of, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
@@ -36,6 +38,7 @@ from walkerlab.store.elsewhere import take_over
 from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
+from walkerlab.workers import WorkerPool
 
 __all__ = ["Done", "StageReport", "execute", "plan", "preview"]
 
@@ -173,7 +176,9 @@ class Run:
         self.jobs = jobs
         self.done: list[Done] = []
         self.waiting: list[Stage] = []
-        self.running: dict[Member | None, Begun] = {}
+        self.running: dict[Future[Any] | None, Begun] = {}
+        self.working: set[Future[Any]] = set()
+        self.events: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self.left: list[str] = []
         self.of = 0
 
@@ -181,11 +186,13 @@ class Run:
         """Decide on the stages, and do what is decided; those of `to_run` will probably run."""
         self.waiting, self.left, self.of = list(stages), [stage.name for stage in to_run], len(to_run)
         try:
-            if self.jobs > 1 and any_side_by_side(to_run, self.planner.config):
-                with Crew(self.jobs) as crew:
-                    self._side_by_side(stages, crew)
-            else:
-                self._one_by_one(stages)
+            with WorkerPool(self.jobs) as pool:
+                precompiler = Precompiler(pool, self.planner.config)
+                if self.jobs > 1 and any_side_by_side(to_run, self.planner.config):
+                    self._side_by_side(stages, pool, precompiler)
+                else:
+                    self._one_by_one(stages, precompiler)
+                precompiler.raise_bugs()
         finally:
             for begun in self.running.values():
                 begun.reporter.end("")
@@ -196,16 +203,15 @@ class Run:
         self.done.append(done)
         self.reporter.note(said_of(done))
 
-    def _one_by_one(self, stages: Sequence[Stage]) -> None:
-        ahead = Ahead()
+    def _one_by_one(self, stages: Sequence[Stage], precompiler: Precompiler) -> None:
         for stage in stages:
             step = self._decided(stage, stages)
             self.waiting.remove(stage)
             if step.action == "run":
                 importlib.import_module(stage.module)
-                if not ahead.begun and nothing_compiled_yet():
-                    ahead.begin(self.waiting, self.planner.config)
-                ahead.wait_for(stage)
+                if not precompiler.begun and nothing_compiled_yet():
+                    precompiler.begin(self.waiting)
+                precompiler.wait_for(stage)
                 self._run_here(self._begin(step))
                 self._draw_early(stages)
             else:
@@ -227,46 +233,53 @@ class Run:
             content, complete = unanswered(error), False
         self._settle(self.running.pop(None), content, complete)
 
-    def _side_by_side(self, stages: Sequence[Stage], crew: Crew) -> None:
-        compiled: set[str] = set()
+    def _side_by_side(self, stages: Sequence[Stage], pool: WorkerPool, precompiler: Precompiler) -> None:
         while self.waiting or self.running:
-            self._start_what_can_run(stages, crew, compiled)
-            outcomes = list(crew.outcomes())
-            while not outcomes:
-                outcomes = list(crew.outcomes())
-            for member, task, message in outcomes:
-                if isinstance(task, Compilation):
-                    continue
-                try:
-                    content, complete = found(message), True
-                except NoAnswer as error:
-                    content, complete = unanswered(error), False
-                self._settle(self.running.pop(member), content, complete)
+            self._start_what_can_run(stages, pool, precompiler)
+            while self.working and not self.events.get()():
+                pass
             self._draw_early(stages)
 
-    def _start_what_can_run(self, stages: Sequence[Stage], crew: Crew, compiled: set[str]) -> None:
-        """Give work to the processes that have none: stages whose inputs are there, kernels of those that wait."""
+    def _start_what_can_run(self, stages: Sequence[Stage], pool: WorkerPool, precompiler: Precompiler) -> None:
+        """Give work to free processes: stages whose inputs are there, kernels of those that wait."""
         for stage in list(self.waiting):
-            if any(begun.step.stage.alone for begun in self.running.values()):
+            if len(self.working) == self.jobs or any(begun.step.stage.alone for begun in self.running.values()):
                 return
             if not self._ready(stage, stages):
-                if stage.compiles_long and stage.name in self.left and stage.name not in compiled:
-                    member = crew.free()
-                    if member is not None:
-                        compiled.add(stage.name)
-                        member.give(Compilation(stage.module, self.planner.config))
+                compiling = precompiler.begin_if_first(stage) if stage.name in self.left else None
+                if compiling is not None:
+                    self._work(compiling)
                 continue
             step = self._decided(stage, stages)
             if step.action != "run":
                 self.waiting.remove(stage)
                 self._pass_over(step)
             elif not (stage.alone and self.running):
-                member = crew.free()
-                if member is None:
-                    return
                 self.waiting.remove(stage)
-                begun = self.running[member] = self._begin(step)
-                member.give(begun.task, begun.reporter)
+                begun = self._begin(step)
+                future = pool.start(partial(run_in_worker, begun.task), partial(self._heard, begun.reporter))
+                self.running[future] = begun
+                self._work(future)
+
+    def _work(self, future: Future[Any]) -> None:
+        """Look after a process's work; its end is an event."""
+        self.working.add(future)
+        future.add_done_callback(lambda ended: self.events.put(partial(self._ended, ended)))
+
+    def _heard(self, reporter: StageReporter, told: tuple[Any, ...]) -> None:
+        """Have what a process tells passed on in this thread's turn; it is heard in another one."""
+        self.events.put(partial(pass_on, reporter, *told))
+
+    def _ended(self, future: Future[Any]) -> bool:
+        """Store what a stage has returned; True, since a process is free."""
+        self.working.remove(future)
+        if future in self.running:
+            try:
+                content, complete = future.result(), True
+            except NoAnswer as error:
+                content, complete = unanswered(error), False
+            self._settle(self.running.pop(future), content, complete)
+        return True
 
     def _ready(self, stage: Stage, stages: Sequence[Stage]) -> bool:
         """Whether all that a stage takes is there, or known not to come."""
@@ -384,6 +397,12 @@ class Run:
             if said is not None:
                 return NoAnswer(f"{done.stage}: {said['message']}", said["advice"])
         return None
+
+
+def pass_on(reporter: StageReporter, call: str, *arguments: Any) -> bool:
+    """Call a stage's reporter as the stage has done in its process; False, since nothing has ended."""
+    getattr(reporter, call)(*arguments)
+    return False
 
 
 def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:

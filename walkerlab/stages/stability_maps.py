@@ -25,7 +25,7 @@ from walkerlab.verification.maps import (
     pieces_of,
 )
 from walkerlab.verification.ordinary import FINE, STEPS
-from walkerlab.verification.processes import in_order
+from walkerlab.workers import in_order
 
 STIFFNESS_DIM, VELOCITY_DIM, STEP_DIM = "stiffness", "stiction_velocity", "step_size"
 OF_STICTION = ("outcome", "steps", "sharper_outcome", "error", "rhs_evaluations")
@@ -44,7 +44,8 @@ def run(
     waiting = [piece for piece in pieces if piece.name not in parts.kept]
     progress.start("stability maps", sum(piece.cells for piece in pieces))
     progress.advance(sum(piece.cells for piece in pieces if piece.name in parts.kept))
-    for piece, numbers in zip(waiting, in_order(waiting, jobs, (0,)), strict=True):
+    found = in_order([piece.run for piece in waiting], jobs, (0,))
+    for piece, numbers in zip(waiting, found, strict=True):
         parts.keep(piece.name, numbers)
         progress.advance(piece.cells)
     stiction, step = stiction_group(cells, parts.kept), step_group(cells, parts.kept)

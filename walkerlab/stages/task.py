@@ -19,6 +19,7 @@ from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
 from walkerlab.store.parts import Parts
 from walkerlab.store.runfolder import RunFolder
+from walkerlab.workers import tell
 
 
 @dataclass(frozen=True)
@@ -59,19 +60,32 @@ class Task:
         return content
 
 
-@dataclass(frozen=True)
-class Compilation:
-    """The kernels of a stage, compiled before it runs if nothing is compiled yet; what fails, the stage will tell."""
+class PipeReporter:
+    """The progress of a stage in a worker: each call is told as it is to the process that waits."""
 
-    module: str
-    config: Config
+    def start(self, label: str, total: int | None = None) -> None:
+        """A piece of work begins."""
+        tell(("start", label, total))
 
-    def run(self) -> None:
-        """Compile them."""
-        with contextlib.suppress(Exception):
-            module = importlib.import_module(self.module)
-            if nothing_compiled_yet():
-                module.compile_kernels(self.config)
+    def advance(self, n: int = 1) -> None:
+        """So many more parts are done."""
+        tell(("advance", n))
+
+    def note(self, text: str) -> None:
+        """One line."""
+        tell(("note", text))
+
+    def compiling(self, kernel: str) -> None:
+        """A kernel is being compiled, or is there."""
+        tell(("compiling", kernel))
+
+
+def run_in_worker(task: Task) -> Content:
+    """Run a stage in a worker, telling its progress."""
+    reporter = PipeReporter()
+    importlib.import_module(task.module)
+    with kernels_told_of(reporter.compiling):
+        return task.run(reporter)
 
 
 def task_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from walkerlab.orbits.scaled_starts import (
     scaled_starts,
     smallest_change,
 )
-from walkerlab.orbits.start_map import StartMap, contact_map, rigid_map
+from walkerlab.orbits.start_map import StartMap, as_map, contact_row, rigid_map
 from walkerlab.paper.adams_start import PaperStart, forces_of, paper_start
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
 from walkerlab.scene.left_out import of_adjustment
@@ -40,6 +41,7 @@ from walkerlab.stages.progress import Progress
 from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary
 from walkerlab.stages.tune_results import groups, summary
 from walkerlab.store.content import Content
+from walkerlab.workers import in_order
 
 # tolerances of the map: away from edges its outcomes are those of the config's (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
@@ -144,7 +146,11 @@ class Stage:
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
         quick = self.starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * as_it_stands.evaluations))
-        walked = contact_map(quick, swing, stance, jobs, progress.advance)
+        rows = []
+        for row in in_order([partial(contact_row, quick, swing, float(factor)) for factor in stance], jobs):
+            rows.append(row)
+            progress.advance(swing.size)
+        walked = as_map(swing, stance, rows)
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         adjustment, around = self.adjusted(as_it_stands, quick, walked)

@@ -7,6 +7,7 @@ import importlib
 import os
 import platform
 import time
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from walkerlab.config.schema import Config
+from walkerlab.errors import WalkerlabError
 from walkerlab.stages.graph import Graph
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged
@@ -40,6 +42,7 @@ class Row:
     said     why there is no answer; empty if there is one
     numbers  of the stage's summary, flat, as JSON and without run times; some or none if there is no answer
     wall_s   time it took, s
+    bug      the traceback of the bug that stopped it; empty if none did
     """
 
     key: str
@@ -47,6 +50,7 @@ class Row:
     said: str
     numbers: str = "{}"
     wall_s: float = 0.0
+    bug: str = ""
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ class Chunk:
 
 
 def compute(task: Task) -> Chunk:
-    """Compute a chunk's points in this process; what goes wrong with one is its row and not the chunk's end."""
+    """Compute a chunk's points in this process; what goes wrong with one does not end the others."""
     keep_compiled_code_apart(task.host)
     graph = graph_at(task.graph)
     worker = worker_for(task.graph, graph)
@@ -130,9 +134,11 @@ def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tu
     key = keys[target]
     try:
         answer = worker.answer(without_outputs(config, target, worker.graph), target, keys)
+    except WalkerlabError as error:
+        return Row(key, "failed", error.message), Content()
     except Exception as error:
-        # A point that meets a bug is told as such; the others are there.
-        return Row(key, "failed", f"{type(error).__name__}: {error}"), Content()
+        said = f"a bug: {type(error).__name__}: {error}"
+        return Row(key, "failed", said, bug=traceback.format_exc()), Content()
     content, no_answer = answer.content, answer.no_answer
     numbers = flat_text(untimed(content.summary, content.timed))
     if no_answer is None:

@@ -9,14 +9,16 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field
-from multiprocessing import connection, get_all_start_methods, get_context, parent_process
+from dataclasses import dataclass, field, replace
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
+from walkerlab.workers import WorkerPool
 
 POLL_S = 0.5
+GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -55,43 +57,30 @@ class Engine:
 
     opened   a context that gives a pool and closes it
     chunk_s  how long a chunk is to take, s: long against what a chunk costs the engine
-    begin    begins what takes a while and needs no points yet; `opened` does it too
     """
 
     opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
     chunk_s: float
-    begin: Callable[[Order], object] = lambda _order: None
+
+    @contextlib.contextmanager
+    def begun(self, order: Order) -> Iterator[Engine]:
+        """The engine for one sweep; on this machine its workers load what they need while points are still made."""
+        if self.opened is not local:
+            yield self
+            return
+        with local(order) as pool:
+            pool.executor.start_all()  # type: ignore[attr-defined]
+            yield replace(self, opened=lambda _order: contextlib.nullcontext(pool))
 
 
 @contextlib.contextmanager
 def local(order: Order) -> Iterator[Pool]:
-    """Processes of this machine, one thread each; they end with this one, in whatever way it ends."""
-    from concurrent.futures import ProcessPoolExecutor
-
-    workers = order.workers or os.cpu_count() or 1
-    context = begin_local(order)
-    with one_thread_each():
-        # The server that workers are forked from may be older than what the environment says now.
-        given = (order.modules, dict(os.environ))
-        executor = ProcessPoolExecutor(workers, context, initializer=begin_worker, initargs=given)
-        try:
-            yield Pool(executor, workers)
-        finally:
-            executor.shutdown(wait=False, cancel_futures=True)
-
-
-def begin_local(order: Order) -> Any:
-    """The context that local workers are begun in; where they are forked, from a process that loads what all need."""
+    """Processes of this machine, one thread each."""
     refuse_address("local", order)
-    if "forkserver" not in get_all_start_methods():
-        return get_context("spawn")
-    from multiprocessing import forkserver
-
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["walkerlab.sweeps.chunk", *order.modules])
-    with one_thread_each():
-        forkserver.ensure_running()
-    return context
+    workers = order.workers or os.cpu_count() or 1
+    modules = ("walkerlab.sweeps.chunk", *order.modules)
+    with WorkerPool(workers, modules, dict.fromkeys(ONE_THREAD, "1")) as executor:
+        yield Pool(executor, workers)
 
 
 @contextlib.contextmanager
@@ -109,25 +98,6 @@ def one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def begin_worker(modules: tuple[str, ...], environment: Mapping[str, str]) -> None:
-    """End with the process that began this one, and load what chunks need; an interrupt is the other's to deal with."""
-    import signal
-
-    os.environ.update(environment)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    for module in modules:
-        importlib.import_module(module)
-
-
-def end_with_parent() -> None:
-    """Wait for the parent's end, and follow."""
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
-
-
 @contextlib.contextmanager
 def dask(order: Order) -> Iterator[Pool]:
     """Workers of a Dask cluster that runs at an address, or of one that is made on this machine."""
@@ -138,9 +108,12 @@ def dask(order: Order) -> Iterator[Pool]:
             client = stack.enter_context(distributed.Client(order.address))
         else:
             workers = order.workers or os.cpu_count() or 1
-            cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
-            )
+            try:
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+                )
+            except RuntimeError as error:
+                raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
         # A worker's death is dealt with chunk by chunk, here as in every engine.
@@ -217,7 +190,7 @@ class JobExecutor(Executor):
         self._poll.join()
         if cancel_futures:
             for job in self._running.values():
-                with contextlib.suppress(Exception):
+                with contextlib.suppress(OSError):  # a job that has ended meanwhile
                     job.cancel(check=False)
 
 
@@ -243,7 +216,7 @@ def number_if_it_is_one(text: str) -> str | int:
 
 
 ENGINES: dict[str, Engine] = {
-    "local": Engine(local, chunk_s=5.0, begin=begin_local),
+    "local": Engine(local, chunk_s=5.0),
     "dask": Engine(dask, chunk_s=10.0),
     "slurm": Engine(slurm, chunk_s=60.0),
 }
@@ -254,4 +227,9 @@ def engine_named(text: str) -> tuple[Engine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
+    # what multiprocessing itself goes by: a process that it starts runs the script first
+    if text == "dask" and getattr(current_process(), "_inheriting", False):
+        raise ConfigError(
+            "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD
+        )
     return ENGINES[name], address

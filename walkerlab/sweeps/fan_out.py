@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import platform
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass, replace
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
 from typing import Any, Final
 
 from walkerlab.errors import NoAnswer
@@ -30,12 +29,10 @@ class Try:
     """A chunk on its way.
 
     failures  how often it has come to nothing
-    alone     whether nothing else may run beside it: processes of one pool die together
     """
 
     task: Task
     failures: int = 0
-    alone: bool = False
 
 
 class FanOut:
@@ -63,35 +60,17 @@ class FanOut:
         Raises NoAnswer if no worker lives long enough to compute anything.
         """
         self.graph, self.target, self.keep = graph, target, keep
-        with contextlib.ExitStack() as stack:
-            pool = stack.enter_context(self.engine.opened(self.order))
+        with self.engine.opened(self.order) as pool:
             while self.left or self._again or self._running:
                 self._submit(pool)
-                if self._collect():
-                    stack.close()
-                    pool = stack.enter_context(self.engine.opened(self.order))
+                self._collect()
 
     def _submit(self, pool: Pool) -> None:
         """Hand out as much as the pool can work on, and one chunk more for each worker that waits."""
-        while len(self._running) < self._most_running(pool):
-            if self._again:
-                if self._again[0].alone and self._running:
-                    return
-                one = self._again.popleft()
-            elif self.left:
-                one = Try(self._next_task(pool.workers))
-            else:
-                return
-            try:
-                self._running[pool.executor.submit(compute, one.task)] = one
-            except BrokenExecutor as error:
-                self._running[failed_future(error)] = one
-                return
-
-    def _most_running(self, pool: Pool) -> int:
-        if self.point_s is None or any(one.alone for one in self._running.values()):
-            return 1
-        return pool.workers + 1
+        most = 1 if self.point_s is None else pool.workers + 1
+        while len(self._running) < most and (self._again or self.left):
+            one = self._again.popleft() if self._again else Try(self._next_task(pool.workers))
+            self._running[pool.executor.submit(compute, one.task)] = one
 
     def _next_task(self, workers: int) -> Task:
         size = min(self.left, self._chunk_size(workers))
@@ -107,20 +86,16 @@ class FanOut:
         fair = self.left / (SHARES * workers)
         return max(1, min(LARGEST_CHUNK, math.ceil(min(self.chunk_s / self.point_s, max(fair, least)))))
 
-    def _collect(self) -> bool:
-        """Wait for something to end and deal with it; True if the pool is broken and a new one is needed."""
+    def _collect(self) -> None:
+        """Wait for something to end and deal with it."""
         ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
-        broken = any(isinstance(future.exception(), BrokenExecutor) for future in ended)
-        if broken:  # all that runs in it will end the same way
-            ended, _ = wait(self._running)
         for future in ended:
             one = self._running.pop(future)
             error = future.exception()
             if error is None:
                 self._arrived(future.result())
             else:
-                self._failed(one, error, broken)
-        return broken
+                self._failed(one, error)
 
     def _arrived(self, chunk: Chunk) -> None:
         self._alive = True
@@ -130,7 +105,7 @@ class FanOut:
         self.point_s = latest if self.point_s is None else 0.5 * (self.point_s + latest)
         self.keep(chunk)
 
-    def _failed(self, one: Try, error: BaseException, together: bool) -> None:
+    def _failed(self, one: Try, error: BaseException) -> None:
         """Try a chunk again, then split it, then give its point up."""
         self._deaths += 1
         said = f"{type(error).__name__}: {error}"
@@ -139,21 +114,11 @@ class FanOut:
                 f"no worker lives: {said}",
                 "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
             )
-        again = replace(one, failures=one.failures + 1, alone=together)
-        if one.failures == 0 or (together and not one.alone):
-            self._again.append(again)
-        elif len(one.task.configs) > 1:
-            self._again.extend(Try(half, 1, together) for half in one.task.split())
+        if one.failures and len(one.task.configs) > 1:
+            self._again.extend(Try(half, 1) for half in one.task.split())
         elif one.failures < 3:
-            self._again.append(again)
+            self._again.append(Try(one.task, one.failures + 1))
         else:
             self.point_s = self.point_s or 1.0
             key = one.task.keys[0][self.target]
             self.keep(Chunk((Row(key, "failed", f"its worker died: {said}"),), {}))
-
-
-def failed_future(error: BaseException) -> Future[Chunk]:
-    """A future that has failed."""
-    future: Future[Chunk] = Future()
-    future.set_exception(error)
-    return future

@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.config.loader import Template
 from walkerlab.config.schema import Config
-from walkerlab.errors import ConfigError
+from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.stages.graph import PIPELINE, Graph
 from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.store import artifact, provenance
@@ -67,6 +67,7 @@ class Swept:
     summary  of the file
     reused   points whose result was there
     wall_s   time of the whole
+    bugs     tracebacks of bugs that stopped points
     """
 
     question: Question
@@ -74,6 +75,7 @@ class Swept:
     summary: Mapping[str, Any]
     reused: int
     wall_s: float
+    bugs: tuple[str, ...] = ()
 
     @property
     def content(self) -> Content:
@@ -94,6 +96,19 @@ class Swept:
     def failed(self) -> int:
         """Points whose computation was not completed."""
         return int(self.summary["failed"])
+
+    def error(self) -> WalkerlabError:
+        """What is to be raised at the edge if points were not computed; the others are stored."""
+        said = f"{self.failed} of {len(self.question)} points were not computed"
+        why = f"`said` in {self.path} says why."
+        if not self.bugs:
+            return NoAnswer(f"{said}; {why}", "The same command tries them again and keeps the rest.")
+        error = WalkerlabError(
+            f"{said}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
+        )
+        for bug in self.bugs:
+            error.add_note(bug)
+        return error
 
 
 @dataclass(frozen=True)
@@ -172,14 +187,14 @@ class Sweep:
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
             )
             try:
-                self._compute(merge, work, progress, begun)
+                bugs = self._compute(merge, work, reporter, progress, begun)
             finally:
                 progress.end("")
             content = merge.content(self.question, self.points, self.inverse)
             identity = Identity("sweep", self.slice, {}, self.points.code_digest)
             complete = content.summary["failed"] == 0
             artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
-        return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started)
+        return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
     def _stored(self) -> Iterator[Chunk]:
         """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
@@ -195,21 +210,31 @@ class Sweep:
         for chunk in self._stored():
             merge.put(chunk, self.places)
 
-    def _compute(self, merge: Merge, work: Work, progress: Progress, begun: provenance.Provenance) -> None:
+    def _compute(
+        self, merge: Merge, work: Work, reporter: Reporter, progress: Progress, begun: provenance.Provenance
+    ) -> tuple[str, ...]:
+        """Compute what is missing; the tracebacks of bugs, one for each place in the code, which are told at once."""
         missing = np.sort(self.first[~merge.there])
         if not missing.size:
-            return
+            return ()
+        bugs: dict[str, str] = {}
         progress.start("sweep", int(missing.size))
         stage, digest = self.question.stage, self.points.code_digest
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
             merge.put(chunk, self.places)
+            for bug in (row.bug for row in chunk.rows if row.bug):
+                place = bug.rpartition("\n  ")[0]  # without what it says there, which differs from point to point
+                if place not in bugs:
+                    reporter.warn(f"a bug stopped a point of the sweep; the others go on.\n{bug}")
+                    bugs[place] = bug
             progress.advance(len(chunk.rows))
 
         chunk_s = work.chunk_s or work.engine.chunk_s
         todo = self._configs(missing.tolist())
         FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
+        return tuple(bugs.values())
 
     def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str]]]:
         for index in indices:

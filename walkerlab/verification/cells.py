@@ -10,9 +10,9 @@ from walkerlab.config.stability import Case
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.contact_case import judge_contact
 from walkerlab.verification.ordinary import Choice, choices
-from walkerlab.verification.processes import in_order
 from walkerlab.verification.rigid_case import judge_rigid
 from walkerlab.verification.verdict import CaseResult
+from walkerlab.workers import in_order
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def cells_of(cases: Sequence[Case], own: Sequence[tuple[Case, Config]] = ()) -> 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[Found]:
     """The pieces' results in their order, whoever ran them."""
-    return in_order(cells, jobs, first_of_each_model(cells))
+    return in_order([cell.run for cell in cells], jobs, first_of_each_model(cells))
 
 
 def first_of_each_model(cells: Sequence[CaseCell]) -> list[int]:

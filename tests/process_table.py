@@ -1,0 +1,43 @@
+"""Processes by the kernel's own table, for tests that look whether any is left."""
+
+from pathlib import Path
+
+THERE = Path("/proc/self/stat").exists()
+
+
+def processes_below(parent):
+    """The ids of all processes below a process."""
+    children = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            pid, rest = entry.read_text().split(" ", 1)
+        except OSError:
+            continue
+        children.setdefault(int(rest.rpartition(")")[2].split()[1]), []).append(int(pid))
+    found, waiting = [], [parent]
+    while waiting:
+        below = children.get(waiting.pop(), [])
+        found += below
+        waiting += below
+    return found
+
+
+def workers_below(parent):
+    """Those that are workers of the package."""
+    return [pid for pid in processes_below(parent) if "walkerlab.workers" in command_of(pid)]
+
+
+def command_of(pid):
+    """What a process was started as; empty for one that has ended."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
+def is_alive(pid):
+    """Whether a process runs."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

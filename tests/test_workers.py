@@ -1,0 +1,180 @@
+"""Workers: what they are given comes back, what happens to them is told, and none is left."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+import worker_calls as calls
+from process_table import THERE, is_alive, workers_below
+
+from walkerlab.errors import NoAnswer
+from walkerlab.workers import Worker, WorkerDiedError, WorkerPool, WorkerTimeoutError, in_order
+
+DEADLINE_S = 60.0
+
+
+def until(condition):
+    """Wait for something that is bound to come."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def pool():
+    with WorkerPool(2) as two:
+        yield two
+
+
+def test_results_are_in_the_order_of_the_calls():
+    assert list(in_order([partial(calls.square, n) for n in range(7)], jobs=3)) == [n * n for n in range(7)]
+
+
+def test_one_job_is_done_here_and_so_is_what_comes_first():
+    assert set(in_order([calls.own_id] * 3, jobs=1)) == {os.getpid()}
+    ids = list(in_order([calls.own_id] * 3, jobs=2, first=(1,)))
+    assert ids[1] == os.getpid()
+    assert os.getpid() not in (ids[0], ids[2])
+
+
+def test_an_error_comes_back_as_it_is_with_its_traceback(pool):
+    with pytest.raises(ZeroDivisionError) as caught:
+        pool.start(calls.divide_by_zero).result()
+    assert "divide_by_zero" in caught.value.__notes__[0]
+    with pytest.raises(NoAnswer) as unanswered:
+        pool.start(calls.no_answer).result()
+    assert (unanswered.value.advice, unanswered.value.partial) == ("look elsewhere", {"partial": 1})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [(calls.raise_what_cannot_be_sent, "NeedsTwoError: 1 and 2"), (calls.return_what_cannot_be_sent, "pickle")],
+)
+def test_what_cannot_be_sent_back_is_told_in_words(pool, call, said):
+    with pytest.raises(Exception, match=said):
+        pool.start(call).result()
+    assert pool.submit(calls.square, 3).result() == 9
+
+
+@pytest.mark.parametrize(("call", "how"), [(calls.kill_itself, "SIGKILL"), (calls.leave_with_3, "exit code 3")])
+def test_a_worker_that_dies_is_told_and_replaced_and_the_others_go_on(pool, call, how):
+    others = [pool.submit(calls.square, number) for number in range(4)]
+    with pytest.raises(WorkerDiedError, match=how):
+        pool.start(call).result()
+    assert [future.result() for future in [*others, pool.submit(calls.square, 5)]] == [0, 1, 4, 9, 25]
+
+
+def test_a_worker_that_dies_while_idle_costs_nothing():
+    with WorkerPool(1) as pool:
+        first = pool.start(calls.own_id).result()
+        os.kill(first, signal.SIGKILL)
+        until(lambda: not is_alive(first))
+        assert pool.start(calls.own_id).result() != first
+
+
+def test_what_a_call_tells_is_heard_in_its_order(pool):
+    heard = []
+    assert pool.start(partial(calls.count_to, 5), heard.append).result() == "done"
+    assert heard == [0, 1, 2, 3, 4]
+
+
+def test_a_call_that_takes_too_long_can_be_given_up():
+    worker = Worker()
+    with pytest.raises(WorkerTimeoutError):
+        worker.do(calls.sleep, timeout_s=0.01)
+    worker.close()
+    assert not worker.alive
+
+
+def test_workers_that_are_ended_clean_up_behind_them(tmp_path):
+    with WorkerPool(1) as pool:
+        pool.start(partial(calls.clean_up_at_the_end, tmp_path / "ended"))
+        until((tmp_path / "ended.begun").exists)
+    assert (tmp_path / "ended").exists()
+
+
+def test_workers_may_have_workers(pool):
+    assert pool.start(partial(calls.squares_of_workers_own, 3)).result() == [0, 1, 4]
+
+
+def test_an_interrupt_of_the_keyboard_is_left_to_whoever_waits(pool):
+    assert pool.start(calls.interrupt_handler).result() is signal.SIG_IGN
+
+
+def test_a_pool_starts_no_more_workers_than_it_needs(pool):
+    assert len({pool.start(calls.own_id).result() for _ in range(5)}) <= 2
+
+
+WAITS = """
+import worker_calls as calls
+from walkerlab.workers import WorkerPool
+with WorkerPool(2) as pool:
+    pool.start_all()
+    futures = [pool.start(calls.sleep) for _ in range(3)]
+    print("begun", flush=True)
+    futures[0].result()
+"""
+
+
+@pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
+def test_no_worker_outlives_whoever_started_it(number):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", WAITS],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        assert process.stdout.readline() == b"begun\n"
+        below = workers_below(process.pid)
+        process.send_signal(number)
+        process.wait(DEADLINE_S)
+    assert len(below) == 2
+    until(lambda: not any(is_alive(pid) for pid in below))
+
+
+UNGUARDED = """
+import sys
+print("the script runs")
+from functools import partial
+import worker_calls as calls
+from walkerlab.workers import in_order
+print(list(in_order([partial(calls.square, n) for n in range(4)], 2)))
+"""
+
+
+@pytest.mark.parametrize("how", ["script", "stdin", "command"])
+def test_a_program_without_a_guard_runs_once_and_has_its_workers(tmp_path, how):
+    path = tmp_path / "unguarded.py"
+    path.write_text(UNGUARDED)
+    arguments = {"script": [str(path)], "stdin": ["-"], "command": ["-c", UNGUARDED]}[how]
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        input=UNGUARDED if how == "stdin" else "",
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+    )
+    assert done.stdout.splitlines() == ["the script runs", "[0, 1, 4, 9]"], done.stderr
+
+
+def test_modules_beside_the_script_are_found_from_any_folder(tmp_path):
+    (tmp_path / "beside.py").write_text("def answer():\n    return 42\n")
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import beside\nfrom walkerlab.workers import WorkerPool\n"
+        "with WorkerPool(1) as pool:\n    print(pool.start(beside.answer).result())\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run([sys.executable, str(script)], env=environment, cwd="/", capture_output=True, text=True)
+    assert done.stdout == "42\n", done.stderr

@@ -1,0 +1,74 @@
+"""Calls that workers are given in tests."""
+
+import os
+import signal
+import sys
+import time
+
+from walkerlab.errors import NoAnswer
+from walkerlab.workers import in_order, tell
+
+
+def square(number):
+    return number * number
+
+
+def own_id(_number=0):
+    return os.getpid()
+
+
+def sleep():
+    time.sleep(600.0)
+
+
+def kill_itself():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def leave_with_3():
+    sys.exit(3)
+
+
+def divide_by_zero():
+    return 1 / 0
+
+
+def no_answer():
+    raise NoAnswer("nothing is there", "look elsewhere", {"partial": 1})
+
+
+class NeedsTwoError(Exception):
+    def __init__(self, one, two):
+        super().__init__(f"{one} and {two}")
+
+
+def raise_what_cannot_be_sent():
+    raise NeedsTwoError(1, 2)
+
+
+def return_what_cannot_be_sent():
+    return lambda: None
+
+
+def count_to(number):
+    for value in range(number):
+        tell(value)
+    return "done"
+
+
+def clean_up_at_the_end(path):
+    path.with_suffix(".begun").touch()
+    try:
+        time.sleep(600.0)
+    finally:
+        path.touch()
+
+
+def interrupt_handler():
+    return signal.getsignal(signal.SIGINT)
+
+
+def squares_of_workers_own(count):
+    from functools import partial
+
+    return list(in_order([partial(square, number) for number in range(count)], 2))

@@ -1,0 +1,70 @@
+"""Kernels of later stages compiled in other processes while earlier stages compile their own.
+
+On a new machine they would else wait for the compiler, one after the other. What is compiled goes into the cache that
+all processes share. A stage whose kernels were not compiled ahead compiles for itself.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from concurrent.futures import Future
+from functools import partial
+
+from walkerlab.config.schema import Config
+from walkerlab.errors import WalkerlabError
+from walkerlab.stages.graph import Stage
+from walkerlab.stages.task import nothing_compiled_yet
+from walkerlab.workers import WorkerPool
+
+
+def compile_kernels(module: str, config: Config) -> None:
+    """Compile the kernels of a stage."""
+    importlib.import_module(module).compile_kernels(config)
+
+
+def compile_first_kernels(module: str, config: Config) -> None:
+    """Compile the kernels of a stage if nothing is compiled yet."""
+    importlib.import_module(module)
+    if nothing_compiled_yet():
+        compile_kernels(module, config)
+
+
+class Precompiler:
+    """What is compiled ahead of stages, in the workers of a pool, and what is wrong with it."""
+
+    def __init__(self, pool: WorkerPool, config: Config) -> None:
+        """Nothing is compiled ahead so far."""
+        self._pool, self._config = pool, config
+        self._begun: dict[str, Future[None]] = {}
+
+    @property
+    def begun(self) -> bool:
+        """Whether anything is."""
+        return bool(self._begun)
+
+    def begin(self, later: Sequence[Stage]) -> None:
+        """Compile for the first of the later stages that takes long to compile."""
+        slow = [stage for stage in later if stage.compiles_long]
+        if slow:
+            self._begun[slow[0].name] = self._pool.start(partial(compile_kernels, slow[0].module, self._config))
+
+    def begin_if_first(self, stage: Stage) -> Future[None] | None:
+        """Compile for a stage that takes long to, once, if nothing is compiled yet."""
+        if not stage.compiles_long or stage.name in self._begun:
+            return None
+        work = partial(compile_first_kernels, stage.module, self._config)
+        future = self._begun[stage.name] = self._pool.start(work)
+        return future
+
+    def wait_for(self, stage: Stage) -> None:
+        """Let what is compiled for a stage be there before it runs, or have failed."""
+        if stage.name in self._begun:
+            self._begun[stage.name].exception()
+
+    def raise_bugs(self) -> None:
+        """Raise what stopped a compilation; what a user can act on, the stage itself has told."""
+        for future in self._begun.values():
+            error = future.exception() if future.done() and not future.cancelled() else None
+            if error is not None and not isinstance(error, WalkerlabError):
+                raise error
