@@ -17,6 +17,7 @@ from walkerlab.errors import ConfigError, StaleError
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
+from walkerlab.store.runfolder import RunFolder
 
 QUIET = Console(quiet=True)
 
@@ -30,7 +31,7 @@ def run(tmp_path, monkeypatch):
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(Config(), {}))
-    return folder
+    return RunFolder.at(folder)
 
 
 @pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")])
@@ -91,12 +92,12 @@ def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
             export_from(run, name, "pdf", None, 2, "")
-        assert refused.value.advice == f"`walkerlab {command} -c {run}` makes what it needs."
+        assert refused.value.advice == f"`walkerlab {command} -c {run.typed}` makes what it needs."
 
 
 def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
     assert walk_in(run) == "contact-sim"
-    (run / "contact-sim.h5").unlink()
+    run.artifact("contact-sim").unlink()
     assert walk_in(run) == "simulate"
 
 

@@ -15,6 +15,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.stages.graph import PIPELINE, Graph
 from walkerlab.stages.progress import Progress, Reporter, Silent
+from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
 from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
@@ -122,7 +123,7 @@ class Sweep:
         Raises ConfigError for points that are no configs and for a stage that has no result without files.
         """
         refuse_unknown_stage(question.stage, graph)
-        self.question, self.folder = question, folder
+        self.question, self.folder, self.config = question, folder, template.base.config
         self.points = Points(question, template, graph)
         keys = np.frombuffer(b"".join(self.points.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
@@ -130,14 +131,15 @@ class Sweep:
         # any one of the points that have a result will do to compute it
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
-        base = template.base.config.model_dump(mode="json")
+        base = self.config.model_dump(mode="json")
         base.pop("sweep", None)
         self.slice = question_slice(question, base)
         self.name = result_name(question, self.slice)
         self.path = result_path(folder, self.name)
 
     def foresee(self, workers: int, shown: int) -> Foreseen:
-        """What would be done; touches nothing."""
+        """What would be done; touches nothing. Raises ConfigError as `run` would."""
+        refuse_another_config(self.folder, self.config)
         there = np.zeros(len(self.places), bool)
         rows: list[Row] = []
         for chunk in self._stored():
@@ -153,7 +155,8 @@ class Sweep:
     def run(self, work: Work, reporter: Reporter | None = None) -> Swept:
         """Have the sweep's file, computing the points that have no result yet.
 
-        Raises LockedError (only without `wait`), StorageError, and NoAnswer if no worker lives.
+        Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
+        StorageError, and NoAnswer if no worker lives.
         """
         started = time.perf_counter()
         reporter = reporter or Silent()
@@ -161,13 +164,14 @@ class Sweep:
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
+            claim(self.folder, self.config)
             merge = Merge(len(self.places))
             if not work.force:
                 self._take_over(merge)
             reused = int(merge.there[self.inverse].sum())
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
-            begun = provenance.begin(self.points.template.base.config, {})
+            begun = provenance.begin(self.config, {})
             progress = reporter.begin(
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
             )
