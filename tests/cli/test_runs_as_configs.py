@@ -1,7 +1,6 @@
 """Runs as configs: what `-c` names, where that runs, and that no result of another config is overwritten."""
 
 import json
-import os
 import re
 import shlex
 
@@ -21,6 +20,10 @@ def gravity_of(toy, artifact):
     return 2.0 / stored["summary"]["period_s"] ** 2
 
 
+def names_in(folder):
+    return [path.name for path in folder.iterdir()]
+
+
 def run_dir(done):
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)["run_dir"]
@@ -36,7 +39,7 @@ def test_a_run_that_is_given_by_its_folder_runs_there_and_not_in_the_folder_of_a
         assert run_dir(toy("roll", "-c", named, "--json")) == str(named).removesuffix("/drop.h5")
     assert run_dir(toy("roll", "-c", "far/runs/stone", "--runs", "elsewhere", "--json")) == "far/runs/stone"
     assert not (toy.folder / "elsewhere").exists()
-    assert os.listdir(toy.folder / "runs") == ["stone"]
+    assert names_in(toy.folder / "runs") == ["stone"]
     assert (toy.folder / "runs/stone/drop.h5").read_bytes() == mine
     assert not (toy.folder / "runs/stone/roll.h5").exists()
 
@@ -157,7 +160,7 @@ def test_what_an_export_needs_is_made_by_the_command_that_it_advises(walker):
     advised = re.search(r"`walkerlab ([^`]*)`", done.stderr)[1]
     assert walker(*shlex.split(advised)).returncode == 0
     assert walker(*export).returncode == 0
-    assert os.listdir(there) == ["rigid-only-trajectory.csv"]
+    assert names_in(there) == ["rigid-only-trajectory.csv"]
 
 
 @pytest.mark.parametrize(
@@ -182,4 +185,43 @@ def test_a_run_that_is_not_there_exits_3(toy, command):
     done = toy(*command)
     assert done.returncode == 3, done.stderr
     assert "there is no" in done.stderr
-    assert os.listdir(toy.folder / "runs") == ["paper"]
+    assert names_in(toy.folder / "runs") == ["paper"]
+
+
+def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
+    toy("page")
+    toy("roll", "--set", "strides=7")
+    artifacts = [toy.folder / "runs/paper" / name for name in ("drop.h5", "roll.h5")]
+    for path in artifacts:
+        data = path.read_bytes()
+        path.unlink()  # the other run has the same file where a result was taken over
+        path.write_bytes(data[:-1])
+    made = "`walkerlab drop -c runs/paper` and `walkerlab roll -c runs/paper` make them anew."
+    done = toy("diff", "paper", "paper@strides=7")
+    assert (done.returncode, done.stderr.splitlines()[1]) == (5, f"advice: {made}")
+    assert all(f"runs/paper/{path.name} is damaged: it does not end" in done.stderr for path in artifacts)
+    for command in (("show", "roll"), ("rerun", "runs/paper/roll.h5")):
+        done = toy(*command)
+        assert done.returncode == 5, done.stderr
+        assert "runs/paper/roll.h5" in done.stderr
+        assert "damaged: it does not end" in done.stderr
+        assert "Traceback" not in done.stderr
+    done = toy("roll", "-c", "runs/paper/roll.h5")
+    assert done.returncode == 3
+    assert "runs/paper/roll.h5 is damaged, and no config can be taken from it" in done.stderr
+    states = json.loads(toy("status", "paper", "--json").stdout)["stages"]
+    assert {row["stage"]: row["state"] for row in states if row["state"] == "damaged"} == dict.fromkeys(
+        ("drop", "roll"), "damaged"
+    )
+    assert toy("roll", "-c", "runs/paper").returncode == 0
+    assert toy("diff", "paper", "paper@strides=7").returncode == 0
+
+
+def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
+    toy("survey", "--full")
+    census = toy.folder / "runs/paper/census.h5"
+    census.write_bytes(census.read_bytes()[:-1])
+    assert toy("page").returncode == 0
+    page = (toy.folder / "runs/paper/report.html").read_text()
+    assert "<p>census: its result is damaged: it does not end" in page
+    assert "`walkerlab survey --full` makes it anew</p>" in page

@@ -137,10 +137,14 @@ def test_what_several_points_need_is_computed_once(toy, marks):
 
 def test_a_damaged_chunk_is_computed_again(toy, marks):
     first = toy.run("drop", GRAVITIES)
-    for path in (toy.runs / "paper" / FOLDER).iterdir():
+    chunks = sorted((toy.runs / "paper" / FOLDER).iterdir())
+    for path in chunks:
         path.write_bytes(path.read_bytes()[:-1])
-    again = toy.run("drop", GRAVITIES)
+    warnings = []
+    reporter = type("Listener", (sweeps.Silent,), {"warn": lambda self, text: warnings.append(text)})()
+    again = toy.run("drop", GRAVITIES, reporter=reporter)
     assert again.reused == 0
+    assert [warning.partition(" is damaged: ")[0] for warning in warnings] == [str(path) for path in chunks]
     assert again.content.digest() == first.content.digest()
     assert marks() == 5  # the same points, in the same process
 

@@ -104,12 +104,17 @@ class Planner:
         return tuple(steps)
 
     def look_at_current(self, stage: Stage, planned: Sequence[Stage]) -> None:
-        """Take note of the results that a stage takes if they are current and that are not planned for themselves."""
+        """Take note of the results that a stage takes if they are current and that are not planned for themselves.
+
+        One that is damaged is not passed over in silence.
+        """
         for name in stage.if_current:
             if self.graph[name] not in planned:
                 step = self._judge(self.graph[name], force=False)
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
+                elif step.damaged:
+                    self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} makes it anew"
 
     def decide(self, stage: Stage) -> Step:
         """What is to happen with a stage, given what became of its inputs."""
@@ -166,12 +171,14 @@ class Planner:
         return found if found is not None and self._made_anew(stage, found.result) is None else None
 
     def _why_absent(self, name: str) -> str:
-        main = self.graph[name].campaign_of
+        command = self._command_of(name)
         if self.graph[name].optional:
-            command = f"{main} --full" if main else name
-            return self.left_out.get(name, f"it was not asked for; `walkerlab {command}` makes it")
-        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; `walkerlab {name}` makes one"
+            return self.left_out.get(name, f"it was not asked for; {command} makes it")
+        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; {command} makes one"
         return self.left_out.get(name, none_yet)
+
+    def _command_of(self, name: str) -> str:
+        return f"`walkerlab {self.graph[name].command}`"
 
     def _why_left_out(self, stage: Stage) -> str | None:
         unsuited = why_unsuited(stage, self.config)

@@ -132,8 +132,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
 
 def makes(folder: RunFolder, stage: Stage) -> str:
     """The command that makes a stage's result in a run's folder."""
-    command = f"{stage.campaign_of} --full" if stage.campaign_of else stage.name
-    return f"`walkerlab {command} -c {folder.typed}`"
+    return f"`walkerlab {stage.command} -c {folder.typed}`"
 
 
 def find_run(text: str, runs_dir: Path) -> RunFolder | None:

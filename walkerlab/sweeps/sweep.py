@@ -17,6 +17,7 @@ from walkerlab.stages.graph import PIPELINE, Graph
 from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
+from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
@@ -142,7 +143,7 @@ class Sweep:
         refuse_another_config(self.folder, self.config)
         there = np.zeros(len(self.places), bool)
         rows: list[Row] = []
-        for chunk in self._stored():
+        for chunk in self._stored(Silent()):
             rows += chunk.rows
             there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
         count = len(self.question)
@@ -167,7 +168,7 @@ class Sweep:
             claim(self.folder, self.config)
             merge = Merge(len(self.places))
             if not work.force:
-                self._take_over(merge)
+                self._take_over(merge, reporter)
             reused = int(merge.there[self.inverse].sum())
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
@@ -185,18 +186,21 @@ class Sweep:
             artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started)
 
-    def _stored(self) -> Iterator[Chunk]:
+    def _stored(self, reporter: Reporter) -> Iterator[Chunk]:
         """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
         runs, stage = self.folder.runs_dir, self.question.stage
         for path in chunk_files(runs, stage, self.points.code_digest):
-            chunk = stored_chunk(path)
-            if chunk is not None:
-                yield chunk
+            try:
+                yield stored_chunk(path)
+            except (FileNotFoundError, OtherLayout):
+                continue
+            except Damaged as error:
+                reporter.warn(f"{path} is damaged: {error}; its points are computed again")
         for row, labels in rows_of_single_runs(runs, stage, self.places):
             yield Chunk((row,), labels)
 
-    def _take_over(self, merge: Merge) -> None:
-        for chunk in self._stored():
+    def _take_over(self, merge: Merge, reporter: Reporter) -> None:
+        for chunk in self._stored(reporter):
             merge.put(chunk, self.places)
 
     def _compute(self, merge: Merge, work: Work, progress: Progress, begun: provenance.Provenance) -> None:
