@@ -84,7 +84,7 @@ def test_what_cannot_be_meant_is_refused():
         walkerlab.run("walk")
     with pytest.raises(KeyError, match="there are"):
         walkerlab.find_gait().dataset("gaits")
-    with pytest.raises(StaleError, match="there is no run"):
+    with pytest.raises(ConfigError, match="there is no run"):
         walkerlab.open_run("nothing", Path("nowhere"))
 
 

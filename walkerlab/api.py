@@ -12,7 +12,6 @@ from typing import Any
 from walkerlab.config.fields import Block
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
-from walkerlab.config.loader import load, template
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.schema import Config, Contact
@@ -23,10 +22,11 @@ from walkerlab.config.walkers import WALKERS
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.stages.resolve import resolve
 from walkerlab.stages.runner import execute
-from walkerlab.stages.runs import config_of, results_in, run_named
+from walkerlab.stages.runs import config_of, result_in, run_named
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged
+from walkerlab.store.artifact import Damaged, Stored
 from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 
@@ -78,7 +78,7 @@ class Run:
 
     @property
     def config(self) -> Config:
-        """The config that its last result was made with; StaleError if it cannot be told."""
+        """The config that its results are of; StaleError if it cannot be told."""
         config = config_of(self.folder)
         if config is None:
             raise StaleError(f"{self.folder.path} has no result that tells its config.")
@@ -87,7 +87,7 @@ class Run:
     @property
     def stages(self) -> tuple[str, ...]:
         """The stages that it has results of."""
-        return tuple(results_in(self.folder))
+        return tuple(stage.name for stage in PIPELINE.stages if self.folder.artifact(stage.name).is_file())
 
     @property
     def sweeps(self) -> tuple[str, ...]:
@@ -95,15 +95,22 @@ class Run:
         return tuple(sorted(path.stem for path in self.folder.path.glob("sweep-*.h5")))
 
     def result(self, stage: str) -> Result:
-        """The stored result of a stage, whether or not it is up to date; StaleError if there is none."""
-        return stored(self.folder.artifact(stage), stage)
+        """The stored result of a stage, whether or not it is up to date; StaleError if there is none to be read."""
+        refuse_unknown_stage(stage)
+        return as_result(stage, result_in(self.folder, stage), self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
-        """A sweep as one xarray Dataset; without a name the only one there is."""
+        """A sweep as one xarray Dataset; without a name the only one there is. StaleError if it cannot be read."""
         names = self.sweeps
         if not name and len(names) != 1:
             raise StaleError(f"{self.folder.path} has {len(names)} sweeps: {', '.join(names) or 'none'}.")
-        return stored(self.folder.path / f"{name or names[0]}.h5", "sweep").dataset("")
+        path = self.folder.path / f"{name or names[0]}.h5"
+        try:
+            return dataset(artifact.read(path)[""])
+        except FileNotFoundError:
+            raise StaleError(f"{self.folder.path} has no sweep {name}.", f"There are {', '.join(names)}.") from None
+        except Damaged as error:
+            raise StaleError(f"{path} is damaged: {error}.", "The same sweep again puts it together anew.") from error
 
 
 def run(
@@ -118,7 +125,7 @@ def run(
 ) -> Result:
     """Do what `walkerlab STAGE` does: reuse what is up to date, run the rest, store it.
 
-    config   a file, or the name of a built-in config
+    config   a file, the name of a built-in config, or a run: its name or its folder
     set      keys of the config with other values, as {"slope_deg": 3}
     runs     the folder of all runs
     strides  to walk, for stages that walk
@@ -134,9 +141,8 @@ def run(
     from walkerlab.cli.stage import as_json
 
     refuse_unknown_stage(stage)
-    loaded = load(Path(config), settings(set), strides)
-    folder = RunFolder(Path(runs), loaded.run_name)
-    report = execute(loaded.config, stage, folder, force=force, jobs=jobs)
+    asked = resolve(str(config), settings(set), strides, Path(runs))
+    report = execute(asked.template.base.config, stage, asked.folder, force=force, jobs=jobs)
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
     return Result(stage, as_json(report), content, said, report.artifact)
@@ -145,7 +151,7 @@ def run(
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
     """A run that is stored: by its name in the folder of all runs, or by its own folder.
 
-    Raises StaleError if there is none.
+    Raises ConfigError if there is none.
 
     >>> _ = run("fixedpoint", runs=folder)
     >>> open_run("paper", folder).result("fixedpoint").summary["stable"]
@@ -184,14 +190,13 @@ def sweep(
     from walkerlab.sweeps.question import asked
     from walkerlab.sweeps.sweep import Sweep, Work, modules_of
 
-    read = template(Path(config), settings(set))
+    found = resolve(str(config), settings(set), runs=Path(runs))
     listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
-    drawn = (read.base.config.sweep or Sweep()).seed if seed is None else seed
+    drawn = (found.template.base.config.sweep or Sweep()).seed if seed is None else seed
     question = asked(stage, listed, zip, sample, drawn)
     chosen, address = engine_named(engine)
-    folder = RunFolder(Path(runs), read.base.run_name)
-    order = Order(jobs, address, modules_of(stage, read.base.config, PIPELINE), folder.path)
-    swept = Sweep(question, read, folder).run(Work(chosen, order))
+    order = Order(jobs, address, modules_of(stage, found.template.base.config, PIPELINE), found.folder.path)
+    swept = Sweep(question, found.template, found.folder).run(Work(chosen, order))
     if swept.failed:
         raise swept.error()
     return dataset(swept.content[""])
@@ -387,11 +392,7 @@ def refuse_unknown_stage(stage: str) -> None:
         raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
 
 
-def stored(path: Path, what: str) -> Result:
-    """The result in a file; StaleError if there is none that can be trusted."""
-    try:
-        found = artifact.read(path)
-    except (OSError, Damaged) as error:
-        raise StaleError(f"{path} has no result: {error}.", f"`walkerlab {what}` makes it.") from error
+def as_result(stage: str, found: Stored, path: Path) -> Result:
+    """A stored artifact as a result."""
     said = found.summary.get("no_answer")
-    return Result(what, found.summary, found, None if said is None else str(said["message"]), path)
+    return Result(stage, found.summary, found, None if said is None else str(said["message"]), path)

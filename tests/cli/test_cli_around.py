@@ -151,7 +151,7 @@ def test_a_config_that_is_not_there_is_begun_with_init(walker):
 
 def test_a_film_needs_no_name(walker):
     done = walker("animate", "paper")
-    assert done.returncode == 5
+    assert done.returncode == 3
     assert "there is no run paper" in done.stderr
 
 

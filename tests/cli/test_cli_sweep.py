@@ -78,7 +78,6 @@ def test_diff_says_what_of_config_and_numbers_differs(toy):
     assert numbers["period_s"]["change"] == pytest.approx(2**0.5 - 1, rel=1e-12)
     text = toy("diff", "paper", "paper@gravity_m_s2=4.905").stdout
     assert "+41.4 %" in text
-    assert toy("diff", "paper", "nothing").returncode == 5
 
 
 def test_status_lists_all_runs_and_tells_of_one(toy):
@@ -94,7 +93,6 @@ def test_status_lists_all_runs_and_tells_of_one(toy):
     one = json.loads(toy("status", "paper@strides=7", "--json").stdout)
     assert one["run_dir"] == "runs/paper@strides=7"
     assert {row["stage"]: row["state"] for row in one["stages"]}["drop"] == "current"
-    assert toy("status", "paper@strides=8").returncode == 5
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])

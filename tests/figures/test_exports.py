@@ -1,6 +1,7 @@
 """What leaves a run for use elsewhere: figures, tables, trajectories, films."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import xarray
 from PIL import Image
 from synthetic_walks import both_models
 
+from walkerlab.api import open_run
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import cell, export_from
 from walkerlab.cli.films import Film, write_film
@@ -17,6 +19,7 @@ from walkerlab.errors import ConfigError, StaleError
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
+from walkerlab.store.runfolder import RunFolder
 
 QUIET = Console(quiet=True)
 
@@ -30,7 +33,7 @@ def run(tmp_path, monkeypatch):
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(Config(), {}))
-    return folder
+    return RunFolder.at(folder)
 
 
 @pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")])
@@ -91,12 +94,12 @@ def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
             export_from(run, name, "pdf", None, 2, "")
-        assert refused.value.advice == f"`walkerlab {command} -c {run}` makes what it needs."
+        assert refused.value.advice == f"`walkerlab {command} -c {run.typed}` makes what it needs."
 
 
 def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
     assert walk_in(run) == "contact-sim"
-    (run / "contact-sim.h5").unlink()
+    run.artifact("contact-sim").unlink()
     assert walk_in(run) == "simulate"
 
 
@@ -138,3 +141,40 @@ def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     path = write_film(run, tmp_path / "walk.mp4", Film("simulate", 1, 5, 1.0), QUIET)
     assert int(path.read_bytes()) % (640 * 360 * 3) == 0
+
+
+DAMAGES = {
+    "cut short": lambda data: data[:-1],
+    "emptied": lambda _data: b"",
+    "a bit flipped": lambda data: data[:600] + bytes([data[600] ^ 1]) + data[601:],
+}
+READERS = {
+    "figure": lambda run: export_from(run, "figure-06", "svg", None, 2, ""),
+    "trajectory": lambda run: export_from(run, "trajectory", "csv", None, 2, "contact-sim"),
+    "film": lambda run: write_film(run, Path("walk.gif"), Film("contact-sim", 1, 10, 1.0), QUIET),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("reader", READERS)
+def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, damage):
+    path = run.artifact("contact-sim")
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    with pytest.raises(StaleError) as refused:
+        READERS[reader](run)
+    assert refused.value.message.startswith(f"{path} is damaged: ")
+    assert refused.value.advice == f"`walkerlab contact-sim -c {run.path}` makes it anew."
+    assert refused.value.exit_code == 5
+
+
+def test_damage_of_what_is_not_needed_does_not_matter(run):
+    run.artifact("simulate").write_bytes(b"")
+    assert export_from(run, "trajectory", "csv", None, 2, "contact-sim").is_file()
+
+
+def test_a_damaged_result_is_told_from_python_too(run):
+    opened = open_run(run.path)
+    run.artifact("compare").write_bytes(b"")
+    assert "compare" in opened.stages
+    with pytest.raises(StaleError, match=r"compare\.h5 is damaged"):
+        opened.result("compare")

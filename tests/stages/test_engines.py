@@ -15,7 +15,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.stages import engines
 from walkerlab.stages.engines import closest, ratios, three_digits
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import config_slice
+from walkerlab.stages.identity import Identities
 from walkerlab.stages.progress import Silent
 from walkerlab.store.key import differences
 
@@ -40,9 +40,9 @@ def test_another_version_of_an_engine_makes_another_key(monkeypatch):
     config = load().config
     monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
     monkeypatch.setattr(Engine, "version", "1.0")
-    before = config_slice(config, PIPELINE["engines"])
+    before = Identities().of(PIPELINE["engines"], config, {}).config_slice
     monkeypatch.setattr(Engine, "version", "1.1")
-    after = config_slice(config, PIPELINE["engines"])
+    after = Identities().of(PIPELINE["engines"], config, {}).config_slice
     assert list(differences("", before, after)) == ["programs.absent 1.0 -> 1.1"]
 
 

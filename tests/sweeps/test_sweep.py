@@ -4,15 +4,18 @@ import csv
 import io
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from walkerlab.benchmarks.engines import registry
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.stages.plan import Planner
 from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
 from walkerlab.store.content import untimed
@@ -108,6 +111,25 @@ def test_keys_are_those_that_the_pipeline_stores_under(toy):
     assert report.summary == InMemory(toy.graph).answer(config, "roll", keys).content.summary
 
 
+@pytest.mark.parametrize("name", ["paper", "round-feet", "kneed"])
+def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
+    loaded = load(Path(name))
+    stages = [stage for stage in PIPELINE.stages if not stage.draws]
+    folder = RunFolder(tmp_path, loaded.run_name)
+    single = {step.stage.name: step.identity.key for step in Planner(loaded.config, folder).plan(stages)}
+    assert {stage.name: Keys().of(loaded.config, stage.name)[stage.name] for stage in stages} == single
+
+
+def test_another_version_of_an_engine_computes_old_points_again(monkeypatch):
+    config = load().config
+    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent", "absent"),))
+    keys = []
+    for version in ("1.0", "1.1"):
+        monkeypatch.setattr(registry.Engine, "version", version)
+        keys.append(Keys().of(config, "engines"))
+    assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
+
+
 def test_what_several_points_need_is_computed_once(toy, marks):
     toy.run("roll", "strides=2:9:8")
     assert marks() == 1
@@ -115,10 +137,14 @@ def test_what_several_points_need_is_computed_once(toy, marks):
 
 def test_a_damaged_chunk_is_computed_again(toy, marks):
     first = toy.run("drop", GRAVITIES)
-    for path in (toy.runs / "paper" / FOLDER).iterdir():
+    chunks = sorted((toy.runs / "paper" / FOLDER).iterdir())
+    for path in chunks:
         path.write_bytes(path.read_bytes()[:-1])
-    again = toy.run("drop", GRAVITIES)
+    warnings = []
+    reporter = type("Listener", (sweeps.Silent,), {"warn": lambda self, text: warnings.append(text)})()
+    again = toy.run("drop", GRAVITIES, reporter=reporter)
     assert again.reused == 0
+    assert [warning.partition(" is damaged: ")[0] for warning in warnings] == [str(path) for path in chunks]
     assert again.content.digest() == first.content.digest()
     assert marks() == 5  # the same points, in the same process
 

@@ -13,8 +13,8 @@ from walkerlab.mechanics.standing import STANCE, kinetic_energy
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.identity import Identities
 from walkerlab.stages.known_problems import known_of, known_row
-from walkerlab.stages.plan import config_slice
 from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.cells import CaseCell
@@ -140,14 +140,15 @@ def numbers_of(block):
 
 def test_known_problems_are_answered_once_for_all_scenes():
     stage = PIPELINE["known-problems"]
-    kneed, paper = config_of("kneed"), config_of("paper")
-    assert config_slice(kneed, stage) == config_slice(paper, stage) == {}
+    slices = [Identities().of(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
+    assert slices == [{}, {}]
     assert known_of(known_row(RIGHT)) == RIGHT
 
 
 def test_only_other_walkers_read_their_scene():
     stage = PIPELINE["stability"]
-    assert config_slice(config_of("slope-3deg"), stage) == config_slice(config_of("paper"), stage)
+    steep, paper = (Identities().of(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
+    assert steep == paper
     assert {"walker", "contact", "solver", "stability.cases"} <= set(dotted_keys(stage.takes_under(config_of("kneed"))))
     assert stage.inputs(config_of("slope-3deg")) == ("known-problems",)
     assert stage.inputs(config_of("kneed")) == ("known-problems", "fixedpoint")

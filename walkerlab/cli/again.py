@@ -6,12 +6,12 @@ import tempfile
 from pathlib import Path
 
 from walkerlab.cli.console import Console
-from walkerlab.cli.earlier import artifact_at
 from walkerlab.cli.failures import print_json
 from walkerlab.config.loader import EarlierRun, load
-from walkerlab.errors import StaleError
+from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.runner import execute
+from walkerlab.store.artifact import Damaged, Stored, read
 from walkerlab.store.runfolder import RunFolder
 
 SHORT = 12
@@ -20,7 +20,7 @@ SHORT = 12
 def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) -> None:
     """Run an artifact's stage and all it needs in an empty folder, and say whether its content is the same.
 
-    Raises StaleError if it is not.
+    Raises ConfigError if there is no such artifact, StaleError if it cannot be read or is not the same.
     """
     stored = artifact_at(path)
     stage = stored.identity.stage
@@ -28,7 +28,7 @@ def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) ->
     config = load(run=EarlierRun(stored.provenance.config, name, str(path))).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
         report = execute(config, stage, RunFolder(Path(scratch), name), reporter=console, graph=graph)
-        again = None if report.artifact is None else artifact_at(report.artifact)
+        again = None if report.artifact is None else read(report.artifact)
     before, after = stored.digest(), None if again is None else again.digest()
     same_code = again is not None and again.identity.key == stored.identity.key
     if as_json:
@@ -50,3 +50,14 @@ def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) ->
         )
     if not as_json:
         print(f"{path} comes out again to the last bit: content {before[:SHORT]}.")
+
+
+def artifact_at(path: Path) -> Stored:
+    """The artifact that is to come out again; ConfigError if there is none, StaleError if it cannot be read."""
+    try:
+        return read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists those of a run.") from None
+    except Damaged as error:
+        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).typed}` makes it anew."
+        raise StaleError(f"{path} is damaged: {error}.", advice) from None

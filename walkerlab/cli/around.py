@@ -10,7 +10,7 @@ from walkerlab.cli.options import RUNS, AsJson, Quiet, Runs, Verbose
 from walkerlab.stages.graph import Graph
 
 RunArgument = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
+    str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
 FIGURES = "figure-07 and so on, or its number; table-1 to table-3, table, trajectory"
 FIRST_WALK = "default: contact-sim, or simulate where that has not run"
@@ -41,9 +41,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 print(said)
 
     @app.command("open")
-    def open_run(
-        run: RunArgument = Path("paper"), runs: Runs = RUNS, quiet: Quiet = False, verbose: Verbose = False
-    ) -> None:
+    def open_run(run: RunArgument = "paper", runs: Runs = RUNS, quiet: Quiet = False, verbose: Verbose = False) -> None:
         """Show a run's page in the browser."""
         with exit_on_failure("open", as_json=False):
             from walkerlab.cli.browser import open_file
@@ -84,8 +82,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.cli.named import walk_in
             from walkerlab.stages.runs import run_named
 
-            folder = run_named(str(run), runs).path
-            print(export_from(folder, what, to, output, columns, model or walk_in(folder)))
+            folder = run_named(run, runs)
+            print(export_from(folder, what, to, output, columns, walk_in(folder, model)))
 
     @app.command("animate")
     def animate(
@@ -108,7 +106,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.cli.named import walk_in
             from walkerlab.stages.runs import run_named
 
-            folder = run_named(str(run), runs).path
-            path = to or Path(f"{folder.resolve().name}.gif")
-            film = Film(model or walk_in(folder), steps, rate, slower)
+            folder = run_named(run, runs)
+            path = to or Path(f"{folder.name}.gif")
+            film = Film(walk_in(folder, model), steps, rate, slower)
             print(write_film(folder, path, film, Console(quiet)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import re
@@ -16,9 +15,11 @@ from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
 from walkerlab.report.numbers import listed
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.store.artifact import Damaged, Stored, read
+from walkerlab.stages.runs import makes, read_all, result_in, results_in
+from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
 from walkerlab.store.files import write_atomically
+from walkerlab.store.runfolder import RunFolder
 
 if TYPE_CHECKING:
     from walkerlab.figures.illustration import Illustration
@@ -26,26 +27,28 @@ if TYPE_CHECKING:
 FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 TRAJECTORY = "trajectory"
+STORED_WITH = "outputs: [states, energies, forces] has it."
+"""What a walk without a trajectory lacks in its config."""
 RAISED = re.compile(r"\\\^\{\}(-?\d+)")
 """A power in a text whose letters are guarded already."""
 NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
-def export_from(folder: Path, what: str, kind: str, output: Path | None, columns: int, model: str) -> Path:
+def export_from(folder: RunFolder, what: str, kind: str, output: Path | None, columns: int, model: str) -> Path:
     """Write one thing of a run as a file of a kind, and say where it is.
 
     Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
     """
     what = figure_named(what)
     if what == TRAJECTORY:
-        data = written(what, kind, TRAJECTORY_KINDS, lambda: trajectory(result(folder, model), kind))
+        data = written(what, kind, TRAJECTORY_KINDS, lambda: trajectory(result_in(folder, model), kind))
     elif what in TABLES:
         data = written(what, kind, TABLE_KINDS, lambda: table(rows_of(folder, what), kind))
     else:
         illustration = figure_in(folder, what)
         data = written(what, kind, FIGURE_KINDS, lambda: figure(folder, illustration, kind, columns))
-    path = output or Path(f"{folder.resolve().name}-{what}.{kind}")
+    path = output or Path(f"{folder.name}-{what}.{kind}")
     write_atomically(path, data)
     return path
 
@@ -63,23 +66,14 @@ def written(what: str, kind: str, kinds: Sequence[str], make: Callable[[], bytes
     return make()
 
 
-def result(folder: Path, stage: str) -> Stored:
-    """A stage's stored result; StaleError if there is none."""
-    try:
-        return read(folder / f"{stage}.h5")
-    except (FileNotFoundError, Damaged):
-        advice = f"`walkerlab {stage} -c {folder}` makes it." if folder.is_dir() else ""
-        raise StaleError(f"{folder} has no result of {stage}.", advice) from None
-
-
-def figure_in(folder: Path, name: str) -> Illustration:
+def figure_in(folder: RunFolder, name: str) -> Illustration:
     """The figure of a name; ConfigError with what the run has if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
 
     named = {one.name: one for one in FIGURES}
     if name not in named:
-        stored = results_in(folder)
+        stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
         near = nearest(name, (*named, *TABLES, TRAJECTORY))
         meant = f" Did you mean {near}?" if near else ""
         drawable = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
@@ -87,24 +81,15 @@ def figure_in(folder: Path, name: str) -> Illustration:
     return named[name]
 
 
-def figure(folder: Path, illustration: Illustration, kind: str, columns: int) -> bytes:
+def figure(folder: RunFolder, illustration: Illustration, kind: str, columns: int) -> bytes:
     """A figure, drawn anew for one or two columns of a journal; StaleError if the run lacks what it needs."""
-    stored = results_in(folder)
+    stored = results_in(folder, illustration.stages)
     why = illustration.why_left_out(stored, {})
     if why is not None:
-        made = [f"`walkerlab {command_of(stage)} -c {folder}`" for stage in illustration.stages if stage not in stored]
+        made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     return illustration.as_file(stored, kind, columns)
-
-
-def results_in(folder: Path) -> dict[str, Stored]:
-    """The results of a run that can be read, by stage."""
-    found = {}
-    for path in sorted(folder.glob("*.h5")):
-        with contextlib.suppress(Damaged):
-            found[path.stem] = read(path)
-    return found
 
 
 def exportable(stored: Mapping[str, Stored]) -> list[str]:
@@ -114,23 +99,19 @@ def exportable(stored: Mapping[str, Stored]) -> list[str]:
     return tables + [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
 
 
-def there_is(folder: Path, names: Sequence[str]) -> str:
+def there_is(folder: RunFolder, names: Sequence[str]) -> str:
     """What a run has that can be exported."""
-    return f"{folder} has {listed(names)}." if names else f"{folder} has nothing yet: `walkerlab report` makes it all."
+    if names:
+        return f"{folder.path} has {listed(names)}."
+    return f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
 
 
-def command_of(stage: str) -> str:
-    """What is typed to have a stage's result."""
-    main = PIPELINE[stage].campaign_of
-    return f"{main} --full" if main else stage
-
-
-def rows_of(folder: Path, name: str) -> Any:
+def rows_of(folder: RunFolder, name: str) -> Any:
     """The rows of a table; ConfigError if the walker is another than the paper's."""
-    summary = result(folder, "compare").summary
+    summary = result_in(folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
-            f"{folder} has no {name}: it compares with the paper's walker, and this run's walker is another."
+            f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another."
         )
     return summary[TABLES[name]]
 
@@ -175,7 +156,7 @@ def trajectory(stored: Stored, kind: str) -> bytes:
     """A walk in time: a column for each variable and leg, or a netCDF file."""
     group = stored.groups.get(TRAJECTORY)
     if group is None:
-        raise StaleError("the walk was stored without a trajectory.", "outputs: [states, energies, forces] has it.")
+        raise StaleError("the walk was stored without a trajectory.", STORED_WITH)
     if kind == "nc":
         # Imported here: CSV needs no HDF5.
         from walkerlab.store import hdf5

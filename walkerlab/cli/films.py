@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.cli.console import Console
+from walkerlab.cli.exports import STORED_WITH
 from walkerlab.errors import ConfigError, StaleError, StorageError
-from walkerlab.store.artifact import read
+from walkerlab.stages.runs import result_in
 from walkerlab.store.files import write_atomically
+from walkerlab.store.runfolder import RunFolder
 
 KINDS = (".gif", ".mp4")
 
@@ -34,7 +36,7 @@ class Film:
     slower: float
 
 
-def write_film(folder: Path, path: Path, film: Film, console: Console) -> Path:
+def write_film(folder: RunFolder, path: Path, film: Film, console: Console) -> Path:
     """Draw a run's walk, picture by picture, and write the film.
 
     Raises ConfigError for a kind of file that there is not, StaleError if there is no walk to draw, StorageError.
@@ -47,10 +49,10 @@ def write_film(folder: Path, path: Path, film: Film, console: Console) -> Path:
     # Imported here: what cannot be written is told before anything is loaded that draws.
     from walkerlab.figures.film import pictures, sticks_of, times, why_not
 
-    results = {file.stem: read(file) for file in sorted(folder.glob("*.h5")) if file.stem == film.model}
+    results = {film.model: result_in(folder, film.model)}
     why = why_not(results, film.model)
     if why is not None:
-        raise StaleError(f"the walk cannot be drawn: {why}.", f"`walkerlab {film.model} -c {folder}` makes it.")
+        raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
     sticks = sticks_of(results, film.model)
     at = times(sticks, film.steps, film.rate, film.slower)
     line = console.begin("animate", f"{at.size} pictures")

@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkerlab.errors import StaleError
+from walkerlab.errors import ConfigError, StaleError
 from walkerlab.report.outcomes import MODELS
 from walkerlab.stages.runs import run_named
+from walkerlab.store.runfolder import RunFolder
 
 PAGE = "report.html"
 
 
-def page_of(run: Path, runs: Path) -> Path:
-    """The page of a run, as an absolute path; StaleError if it was not written yet."""
-    folder = run_named(str(run), runs).path
-    page = (folder / PAGE).resolve()
+def page_of(run: str, runs: Path) -> Path:
+    """The page of a run, as an absolute path; ConfigError if there is no such run, StaleError if it has no page."""
+    folder = run_named(run, runs)
+    page = (folder.path / PAGE).resolve()
     if not page.is_file():
-        raise StaleError(f"{folder} has no page yet.", f"`walkerlab report -c {folder}` writes it.")
+        raise StaleError(f"{folder.path} has no page yet.", f"`walkerlab report -c {folder.typed}` writes it.")
     return page
 
 
-def walk_in(folder: Path) -> str:
-    """The stage whose walk is meant if none is named: the contact model's before the rigid model's."""
+def walk_in(folder: RunFolder, model: str | None = None) -> str:
+    """The stage whose walk is meant: if none is named the contact model's before the rigid model's.
+
+    Raises ConfigError if the one that is named does not walk.
+    """
+    if model is not None and model not in MODELS:
+        raise ConfigError(f"--model {model}: is no walk.", f"There are {', '.join(MODELS)}.")
+    if model is not None:
+        return model
     rigid, contact = MODELS
-    return rigid if (folder / f"{rigid}.h5").is_file() and not (folder / f"{contact}.h5").is_file() else contact
+    return rigid if folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file() else contact

@@ -37,12 +37,12 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 
 ConfigFile = Annotated[
-    Path | None,
+    str | None,
     typer.Option(
         "--config",
         "-c",
         metavar="FILE",
-        help="Config file, or name of a built-in config; default: paper.",
+        help="Config file, built-in config, or run by its name or folder; default: paper.",
         autocompletion=configs_and_files,
     ),
 ]
@@ -88,9 +88,9 @@ Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 RUNS = Path("runs")
 
 
-def typed_options(config: Path | None, sets: Sequence[str] | None, strides: int | None, runs: Path) -> str:
+def typed_options(config: str | None, sets: Sequence[str] | None, strides: int | None, runs: Path) -> str:
     """The options that say which run is meant, each with a blank before it; none if it is that of the paper config."""
-    words = [] if config is None else ["-c", str(config)]
+    words = [] if config is None else ["-c", config]
     for setting in sets or ():
         words += ["--set", setting]
     words += [] if strides is None else ["--set", f"strides={strides}"]

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from walkerlab.cli.console import Console
 from walkerlab.cli.options import typed_options
-from walkerlab.config.loader import EarlierRun, LoadedConfig, Template, template
+from walkerlab.config.loader import LoadedConfig, Template
 from walkerlab.config.schema import Config
+from walkerlab.stages.resolve import Asked, resolve
 from walkerlab.store.runfolder import RunFolder
 
 
@@ -17,13 +18,13 @@ from walkerlab.store.runfolder import RunFolder
 class Request:
     """The options that every command has.
 
-    config   file or built-in name; None is the built-in paper config
+    config   what `resolve` takes: file, built-in name or run; None is the built-in paper config
     sets     `--set` options
     strides  `--strides`, or None
     runs     the folder of all runs
     """
 
-    config: Path | None
+    config: str | None
     sets: tuple[str, ...] = ()
     strides: int | None = None
     runs: Path = Path("runs")
@@ -43,33 +44,28 @@ class Request:
         return typed_options(self.config, self.sets, self.strides, self.runs)
 
     @cached_property
-    def earlier(self) -> EarlierRun | None:
-        """The run that `--config` names, if it is a run's folder or one of its artifacts."""
-        if self.config is None or not (self.config.is_dir() or self.config.suffix == ".h5"):
-            return None
-        # Imported here: reading a config from a file needs no HDF5.
-        from walkerlab.cli.earlier import run_at
-
-        return run_at(self.config)
-
-    @cached_property
-    def template(self) -> Template:
-        """The config, ready to be varied, its warnings said; ConfigError if it is not usable."""
-        read = template(self.config, self.sets, self.strides, self.earlier)
-        loaded = read.base
+    def asked(self) -> Asked:
+        """The config and its run folder, its warnings said; ConfigError if it is not usable."""
+        found = resolve(self.config, self.sets, self.strides, self.runs)
+        loaded = found.template.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 
             judged(loaded.config.stability.cases)
         for warning in loaded.warnings:
             self.console.warn(warning)
-        self.console.detail(f"config: {loaded.source}; run folder: {self.runs / loaded.run_name}")
-        return read
+        self.console.detail(f"config: {loaded.source}; run folder: {found.folder.path}")
+        return found
+
+    @property
+    def template(self) -> Template:
+        """The config, ready to be varied."""
+        return self.asked.template
 
     @property
     def loaded(self) -> LoadedConfig:
         """The config as it is."""
-        return self.template.base
+        return self.asked.template.base
 
     @property
     def resolved(self) -> Config:
@@ -79,4 +75,4 @@ class Request:
     @property
     def folder(self) -> RunFolder:
         """The run's folder."""
-        return RunFolder(self.runs, self.loaded.run_name)
+        return self.asked.folder

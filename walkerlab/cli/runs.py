@@ -32,14 +32,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Say how two runs differ: configs, numbers with relative change, walks over one another."""
         with exit_on_failure("diff", as_json):
             from walkerlab.errors import StaleError
-            from walkerlab.stages.runs import difference, results_in, run_named
+            from walkerlab.stages.runs import config_of, difference, results_in, run_named
 
             folders = (run_named(first, runs), run_named(second, runs))
-            results = [results_in(folder, graph) for folder in folders]
+            names = [stage.name for stage in graph.stages]
+            results = [results_in(folder, names, graph) for folder in folders]
             for folder, found in zip(folders, results, strict=True):
                 if not found:
                     raise StaleError(f"{folder.path} has no results.", "A stage's command makes them.")
-            found_difference = difference(results[0], results[1])
+            found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
             figures = draw(folders, results)
             if as_json:
                 print_json(as_object(folders, found_difference, figures))

@@ -33,9 +33,12 @@ def print_status(request: Request, graph: Graph, check: bool) -> None:
 
 
 def print_status_of_run(request: Request, graph: Graph, check: bool, name: str) -> None:
-    """The same of a run folder, under the config that it was made with; StaleError if there is none."""
+    """The same of a run folder, under the config that its results are of.
+
+    Raises ConfigError if there is no such run, StaleError if nothing tells its config.
+    """
     folder = run_named(name, request.runs)
-    config = config_of(folder, graph)
+    config = config_of(folder)
     if config is None:
         raise StaleError(f"{folder.path} has no result that tells its config.", "`walkerlab status` lists all runs.")
     show(request, config, folder, graph, check, None)

@@ -147,7 +147,8 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
-        problem = Problem(asked, f"there is no {kind} {file.label}", wanted or _what_there_is(), _near(file))
+        there_is = wanted or _what_there_is() if asked else f"a run, {_what_there_is()}"
+        problem = Problem(asked, f"there is no {kind} {file.label}", there_is, _near(file))
         advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
         raise refusal([problem], advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop

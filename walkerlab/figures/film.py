@@ -24,8 +24,6 @@ NEEDS = {RIGID_STAGE: figure_02.FIGURE.needs, CONTACT_STAGE: figure_06.FIGURE.ne
 
 def why_not(results: Results, stage: str) -> str | None:
     """Why a walk cannot be drawn; None if it can."""
-    if stage not in NEEDS:
-        return f"{stage} is no walk; there are {', '.join(NEEDS)}"
     return next((why for need in NEEDS[stage] if (why := need.missing_in(results, {})) is not None), None)
 
 

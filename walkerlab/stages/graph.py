@@ -130,6 +130,11 @@ class Stage:
         return self.takes if self.takes_of_scene is None or of_the_paper(config.walker) else self.takes_of_scene
 
     @property
+    def command(self) -> str:
+        """What is typed to have its result."""
+        return f"{self.campaign_of} --full" if self.campaign_of else self.name
+
+    @property
     def optional(self) -> bool:
         """Whether it runs only if the user asks for it."""
         return self.on_demand or bool(self.campaign_of)

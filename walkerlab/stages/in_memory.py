@@ -7,16 +7,14 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
-from walkerlab.config.canonical import slice_of
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.stages.identity import Identities
 from walkerlab.stages.plan import why_unsuited
 from walkerlab.stages.progress import Progress, Silent
-from walkerlab.store.code import Sources
 from walkerlab.store.content import Content
-from walkerlab.store.key import Identity
 
 REMEMBERED = 256
 """Results of needed stages that are kept: those of neighbouring points are often the same."""
@@ -50,14 +48,11 @@ class Keys:
     def __init__(self, graph: Graph = PIPELINE) -> None:
         """Read no code yet."""
         self.graph = graph
-        self._sources = Sources()
-        self._digests: dict[str, str] = {}
+        self._identities = Identities()
 
-    def code_digest(self, stage: Stage) -> str:
+    def code_digest(self, target: str) -> str:
         """The digest of a stage's code, as it was when it was first asked for."""
-        if stage.name not in self._digests:
-            self._digests[stage.name] = self._sources.code_digest(stage.module)
-        return self._digests[stage.name]
+        return self._identities.code_digest(self.graph[target])
 
     def of(self, config: Config, target: str) -> dict[str, str]:
         """The key of a stage and of each that it needs, by name; ConfigError if the config has not what it needs."""
@@ -71,8 +66,7 @@ class Keys:
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}
-            part = slice_of(config, stage.takes_under(config))
-            keys[stage.name] = Identity(stage.name, part, given, self.code_digest(stage)).key
+            keys[stage.name] = self._identities.of(stage, config, given).key
         return keys
 
 

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from walkerlab.config.canonical import slice_of
-from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.stages.identity import Identities
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
-from walkerlab.store.code import Sources
 from walkerlab.store.elsewhere import Elsewhere, find_elsewhere
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
@@ -92,7 +90,7 @@ class Planner:
         self.left_out: dict[str, str] = {}
         self.results: dict[str, Stored] = {}
         self._keys: dict[str, str] = {}
-        self._sources = Sources()
+        self._identities = Identities()
 
     def plan(self, stages: Sequence[Stage]) -> tuple[Step, ...]:
         """Decide on stages in the order in which they run, taking it that each goes as decided."""
@@ -106,12 +104,17 @@ class Planner:
         return tuple(steps)
 
     def look_at_current(self, stage: Stage, planned: Sequence[Stage]) -> None:
-        """Take note of the results that a stage takes if they are current and that are not planned for themselves."""
+        """Take note of the results that a stage takes if they are current and that are not planned for themselves.
+
+        One that is damaged is not passed over in silence.
+        """
         for name in stage.if_current:
             if self.graph[name] not in planned:
                 step = self._judge(self.graph[name], force=False)
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
+                elif step.damaged:
+                    self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} makes it anew"
 
     def decide(self, stage: Stage) -> Step:
         """What is to happen with a stage, given what became of its inputs."""
@@ -148,12 +151,7 @@ class Planner:
         why = self._why_left_out(stage)
         if why is not None:
             return Step(stage, "leave out", why)
-        identity = Identity(
-            stage=stage.name,
-            config_slice=config_slice(self.config, stage),
-            input_keys=self._input_keys(stage),
-            code_digest=self._sources.code_digest(stage.module),
-        )
+        identity = self._identities.of(stage, self.config, self._input_keys(stage))
         verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
         reason = "--force" if force else self._why_run(stage, identity, verdict)
         if reason is None and verdict.artifact is not None:
@@ -173,12 +171,14 @@ class Planner:
         return found if found is not None and self._made_anew(stage, found.result) is None else None
 
     def _why_absent(self, name: str) -> str:
-        main = self.graph[name].campaign_of
+        command = self._command_of(name)
         if self.graph[name].optional:
-            command = f"{main} --full" if main else name
-            return self.left_out.get(name, f"it was not asked for; `walkerlab {command}` makes it")
-        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; `walkerlab {name}` makes one"
+            return self.left_out.get(name, f"it was not asked for; {command} makes it")
+        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; {command} makes one"
         return self.left_out.get(name, none_yet)
+
+    def _command_of(self, name: str) -> str:
+        return f"`walkerlab {self.graph[name].command}`"
 
     def _why_left_out(self, stage: Stage) -> str | None:
         unsuited = why_unsuited(stage, self.config)
@@ -213,19 +213,6 @@ class Planner:
             if found.provenance.input_digests.get(name) != input_digest(stage, result):
                 return f"input {name} was made anew"
         return None
-
-
-def config_slice(config: Config, stage: Stage) -> dict[str, Any]:
-    """What a stage takes of its config and, as `paper`, of the built-in one that its own cases stand on.
-
-    And, as `programs`, the versions of other programs that it drives.
-    """
-    own = slice_of(config, stage.takes_under(config))
-    if stage.takes_of_paper is not None:
-        own["paper"] = slice_of(paper_config(), stage.takes_of_paper)
-    if stage.programs is not None:
-        own["programs"] = dict(stage.programs())
-    return own
 
 
 def input_digest(stage: Stage, result: Stored) -> str:

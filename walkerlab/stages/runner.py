@@ -30,6 +30,7 @@ from walkerlab.stages.plan import (
 )
 from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
+from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.stages.task import Task, kernels_told_of, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
@@ -99,7 +100,8 @@ def execute(
     jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
     full   run the target's campaigns too
 
-    Raises ConfigError if the config has not what the target needs, LockedError (only without `wait`), StorageError.
+    Raises ConfigError if the config has not what the target needs or the folder holds results of another one,
+    LockedError (only without `wait`), StorageError.
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
@@ -108,12 +110,12 @@ def execute(
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
     run = Run(planner, reporter or Silent(), jobs)
-    to_run = [step.stage for step in steps if step.action == "run"]
-    if to_run or any(step.origin is not None for step in steps):
+    if writes(steps):
         with folder.locked(wait, run.reporter.note):
+            claim(folder, config)
             # Decided anew, stage by stage: another process may have worked here until now.
             run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
-            run.carry_out(stages, to_run)
+            run.carry_out(stages, [step.stage for step in steps if step.action == "run"])
     else:
         for step in steps:
             run.skip(step)
@@ -131,15 +133,23 @@ def preview(
 ) -> StageReport:
     """What `execute` would do, as the report it would give before anything has run; touches nothing.
 
-    Raises ConfigError if the config has not what the target needs.
+    Raises ConfigError as `execute` would.
     """
     started = time.perf_counter()
     refuse_unsuited(graph[target], config)
     planner = Planner(config, folder, graph, force)
     run = Run(planner, Silent(), jobs=1)
-    for step in planner.plan(asked_for(target, config, graph, full)):
+    steps = planner.plan(asked_for(target, config, graph, full))
+    if writes(steps):
+        refuse_another_config(folder, config)
+    for step in steps:
         run.skip(step)
     return run.report(graph[target], time.perf_counter() - started)
+
+
+def writes(steps: Sequence[Step]) -> bool:
+    """Whether anything is written into the run's folder."""
+    return any(step.action == "run" or step.origin is not None for step in steps)
 
 
 def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[Stage, ...]:

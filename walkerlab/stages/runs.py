@@ -1,9 +1,9 @@
-"""The runs in a folder: which there are, the config of each, and how two of them differ."""
+"""Run folders: which there are, what config and results each holds, and how two of them differ."""
 
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,17 @@ from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import typed
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.stages.graph import PIPELINE, Graph
+from walkerlab.report.numbers import listed
+from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import survey
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, Stored
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.store.artifact import Damaged, OtherLayout, Stored
+from walkerlab.store.key import differences
+from walkerlab.store.provenance import resolved_yaml
+from walkerlab.store.runfolder import Record, RunFolder
+
+SHOWN_CHANGES = 3
+"""Keys that a refusal names."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def summary_of(folder: RunFolder, stages: tuple[str, ...], sweeps: tuple[str, ..
     """What is to be said of one run."""
     stats = [file.stat() for file in folder.path.rglob("*") if file.is_file()]
     when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
-    config = config_of(folder, graph)
+    config = config_of(folder)
     current = None
     if config is not None:
         current = tuple(step.stage.name for step in survey(config, folder, graph) if step.action == "reuse")
@@ -65,41 +71,132 @@ def summary_of(folder: RunFolder, stages: tuple[str, ...], sweeps: tuple[str, ..
     )  # fmt: skip
 
 
-def config_of(folder: RunFolder, graph: Graph = PIPELINE) -> Config | None:
-    """The config that a run's last written result was made with; None if there is none that is still a config."""
-    found = sorted(results_in(folder, graph).values(), key=lambda stored: stored.provenance.ended_utc)
-    return resolved_config(found[-1]) if found else None
+def config_text(folder: RunFolder) -> str | None:
+    """The resolved config of a run, as YAML; None if nothing in its folder tells it."""
+    record = folder.record()
+    if record is not None:
+        return record.config
+    found = read_all(folder, (path.stem for path in folder.path.glob("*.h5")))[0].values()
+    return max(found, key=lambda stored: stored.provenance.ended_utc).provenance.config if found else None
 
 
-def resolved_config(stored: Stored) -> Config | None:
-    """The config that an artifact was made with; None if this program's schema does not take it any more."""
+def config_of(folder: RunFolder) -> Config | None:
+    """The config of a run; None if nothing tells it, or this program's schema does not take it any more."""
+    text = config_text(folder)
+    return None if text is None else config_in(text)
+
+
+def config_in(text: str) -> Config | None:
+    """A resolved config that is stored as YAML; None if this program's schema does not take it."""
     try:
-        tree = read_text(stored.provenance.config, "stored config")
+        tree = read_text(text, "stored config")
         return typed(tree) if isinstance(tree, Tree) else None
     except ConfigError:
         return None
 
 
-def results_in(folder: RunFolder, graph: Graph = PIPELINE) -> dict[str, Stored]:
-    """The intact results of a run, by stage."""
-    found = {}
-    for stage in graph.stages:
+def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
+    """The results of these stages that can be read, and what is wrong with the others that are there, in words."""
+    intact: dict[str, Stored] = {}
+    bad: dict[str, str] = {}
+    for stage in stages:
+        path = folder.artifact(stage)
         try:
-            found[stage.name] = artifact.read(folder.artifact(stage.name))
-        except (OSError, Damaged):
+            intact[stage] = artifact.read(path)
+        except (FileNotFoundError, NotADirectoryError):
             continue
-    return found
+        except OtherLayout as error:
+            bad[stage] = f"{path} cannot be read: {error}"
+        except Damaged as error:
+            bad[stage] = f"{path} is damaged: {error}"
+    return intact, bad
+
+
+def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE) -> dict[str, Stored]:
+    """The results of these stages, so far as they are there; StaleError that names all that cannot be read."""
+    intact, bad = read_all(folder, stages)
+    if bad:
+        commands = listed(makes(folder, graph[stage]) for stage in bad)
+        them = "makes it" if len(bad) == 1 else "make them"
+        raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them} anew.")
+    return intact
+
+
+def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
+    """A stage's result; StaleError if it is not there, or cannot be read."""
+    found = results_in(folder, [stage], graph)
+    if stage not in found:
+        raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} makes it.")
+    return found[stage]
+
+
+def makes(folder: RunFolder, stage: Stage) -> str:
+    """The command that makes a stage's result in a run's folder."""
+    return f"`walkerlab {stage.command} -c {folder.typed}`"
+
+
+def find_run(text: str, runs_dir: Path) -> RunFolder | None:
+    """The run of a name in the folder of all runs, or of a folder's path; None if there is none."""
+    path = Path(text)
+    is_name = path.name == text and text != ".."
+    places = (runs_dir / path, path) if is_name else (path,)
+    return next((RunFolder.at(place) for place in places if place.is_dir()), None)
 
 
 def run_named(text: str, runs_dir: Path) -> RunFolder:
-    """The run of a name in the folder of all runs, or of a path; StaleError if there is none."""
-    for path in (runs_dir / text, Path(text)):
-        if path.is_dir():
-            return RunFolder(path.parent, path.name)
+    """The run of a name in the folder of all runs, or of a folder's path; ConfigError if there is none."""
+    found = find_run(text, runs_dir)
+    if found is not None:
+        return found
     there = sorted(path.name for path in runs_dir.glob("*/"))
     near = nearest(Path(text).name, there)
     meant = f" Did you mean {near}?" if near else f" There are {', '.join(there)}." if there else ""
-    raise StaleError(f"there is no run {text}.{meant}", "`walkerlab report` makes the run of the paper config.")
+    raise ConfigError(f"there is no run {text}.{meant}", "`walkerlab report` makes the run of the paper config.")
+
+
+def claim(folder: RunFolder, config: Config) -> None:
+    """Have a folder say that its results are of a config, before one is written; to be called under its lock.
+
+    Raises ConfigError as `refuse_another_config`.
+    """
+    refuse_another_config(folder, config)
+    record = folder.record()
+    asked = Record(folder.name, folder.source, resolved_yaml(config))
+    if record is None or (comes_from(record, folder) and record != asked):
+        folder.write_record(asked)
+
+
+def refuse_another_config(folder: RunFolder, config: Config) -> None:
+    """Raise ConfigError if a folder has results of another config, unless that is an earlier state of the same file.
+
+    The name and the `sweep` block do not count: no number depends on them.
+    """
+    record = folder.record()
+    if (record is not None and comes_from(record, folder)) or not any(folder.path.glob("*.h5")):
+        return
+    held = config_of(folder)
+    if held is None and record is None:  # nothing there can be read
+        return
+    changes = ["it is no config any more"] if held is None else list(differences("", asked_of(held), asked_of(config)))
+    if changes:
+        origin = f", made from {record.source}" if record is not None and record.source else ""
+        more = ", …" if len(changes) > SHOWN_CHANGES else ""
+        raise ConfigError(
+            f"{folder.path} has results of another config{origin}; they are not overwritten "
+            f"({', '.join(changes[:SHOWN_CHANGES])}{more}).",
+            "`--set name=NAME` gives this one a folder of its own; "
+            f"`walkerlab clean -c {folder.typed}` removes what is there.",
+        )
+
+
+def comes_from(record: Record, folder: RunFolder) -> bool:
+    """Whether what a folder holds was made under its name from the same file, perhaps before that was edited."""
+    return (record.run, record.source) == (folder.name, folder.source)
+
+
+def asked_of(config: Config) -> dict[str, Any]:
+    """What a config asks, without its name and what is swept over."""
+    return config.model_dump(mode="json", exclude={"name", "sweep"})
 
 
 @dataclass(frozen=True)
@@ -127,25 +224,22 @@ class Difference:
     only_second: tuple[str, ...]
 
 
-def difference(first: Mapping[str, Stored], second: Mapping[str, Stored]) -> Difference:
-    """How the results of two runs differ."""
+def difference(
+    first: Mapping[str, Stored], second: Mapping[str, Stored], configs: Sequence[Config | None]
+) -> Difference:
+    """How the results of two runs differ, and the configs of both."""
     both = [name for name in first if name in second]
     return Difference(
-        config_difference(first, second),
+        config_difference(*configs),
         {name: pairs(first[name].summary, second[name].summary) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
     )
 
 
-def config_difference(first: Mapping[str, Stored], second: Mapping[str, Stored]) -> tuple[tuple[str, Any, Any], ...]:
-    """Keys in which the configs of two runs differ."""
-    configs = []
-    for results in (first, second):
-        last = max(results.values(), key=lambda stored: stored.provenance.ended_utc)
-        config = resolved_config(last)
-        configs.append({} if config is None else dict(leaves_of(config.model_dump(mode="json"))))
-    one, other = configs
+def config_difference(first: Config | None, second: Config | None) -> tuple[tuple[str, Any, Any], ...]:
+    """Keys in which two configs differ; none of a config that is not known."""
+    one, other = ({} if one is None else dict(leaves_of(one.model_dump(mode="json"))) for one in (first, second))
     return tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key))
 
 

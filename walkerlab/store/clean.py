@@ -9,7 +9,7 @@ from pathlib import Path
 from walkerlab.store.artifact import Damaged, read
 from walkerlab.store.files import TEMPORARY, storing
 from walkerlab.store.index import indexed_files
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.store.runfolder import RECORD, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """What the drawing stages write, for the case that the index of it is gone."""
@@ -37,11 +37,11 @@ def listed_files(folder: RunFolder, stage: str) -> Iterator[Path]:
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
-    """Remove files of a run folder, and its inner folders once they are empty; to be called under its lock.
+    """Remove files of a run folder, its record, and its inner folders if they are empty; to be called under its lock.
 
     Raises StorageError if the system refuses.
     """
-    for path in files:
+    for path in (*files, folder.path / RECORD):
         with storing(path):
             path.unlink(missing_ok=True)
     for emptied in (folder.figures, folder.path / "sweep-chunks"):

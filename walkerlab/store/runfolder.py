@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import os
+import shlex
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from walkerlab.errors import LockedError
-from walkerlab.store.files import make_folder, remove_leftovers, storing
+from walkerlab.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
+
+RECORD = ".run.json"
+RECORD_BYTES = 1 << 20
+"""No record is larger."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a run folder says of its results; a result that was taken over tells of the run that it was made in.
+
+    run     the folder's name when it was written
+    source  where the config is from, as in `RunFolder`
+    config  that they were asked for with, resolved, as YAML text
+    """
+
+    run: str
+    source: str
+    config: str
 
 
 @dataclass(frozen=True)
@@ -17,15 +38,30 @@ class RunFolder:
 
     runs_dir  the folder of all runs
     name      of the run; path-safe
+    source    where its config is from: a file as seen from `runs_dir`, or a built-in one; empty if unknown
     """
 
     runs_dir: Path
     name: str
+    source: str = ""
+
+    @classmethod
+    def at(cls, path: Path) -> RunFolder:
+        """The run in a folder; its source is the one that it was written from."""
+        whole = path if path.name not in ("", "..") else path.resolve()
+        record = cls(whole.parent, whole.name).record()
+        return cls(whole.parent, whole.name, "" if record is None else record.source)
 
     @property
     def path(self) -> Path:
         """The folder."""
         return self.runs_dir / self.name
+
+    @property
+    def typed(self) -> str:
+        """The folder as it is typed, so that it is not taken for a name."""
+        text = str(self.path)
+        return shlex.quote(text if os.sep in text else f".{os.sep}{text}")
 
     @property
     def figures(self) -> Path:
@@ -39,6 +75,18 @@ class RunFolder:
     def parts(self, stage: str) -> Path:
         """The file of what there is of a stage's result while it is in the making."""
         return self.path / f"{stage}.parts"
+
+    def record(self) -> Record | None:
+        """What the folder says of its results; None if it says nothing that can be read."""
+        try:
+            said = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
+            return Record(str(said["run"]), str(said["source"]), str(said["config"]))
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            return None
+
+    def write_record(self, record: Record) -> None:
+        """Have the folder say this of its results from now on; StorageError if the system refuses."""
+        write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     @contextlib.contextmanager
     def locked(self, wait: bool = True, say: Callable[[str], None] | None = None) -> Iterator[None]:

@@ -196,14 +196,14 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: 
     return path
 
 
-def stored_chunk(path: Path) -> Chunk | None:
-    """The chunk in a file; None for whatever is not intact, which is then computed again."""
+def stored_chunk(path: Path) -> Chunk:
+    """The chunk in a file; FileNotFoundError if it is gone, Damaged for whatever is not intact."""
+    content = artifact.read(path)
     try:
-        content = artifact.read(path)
         points = content["points"]
         columns = [points[name].tolist() for name in (*TEXTS, "wall_s")]
-    except (OSError, Damaged, KeyError):
-        return None
+    except KeyError as error:
+        raise Damaged(f"it has no {error}") from error
     rows = tuple(Row(*row) for row in zip(*columns, strict=True))
     return Chunk(rows, {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()})
 

@@ -20,7 +20,6 @@ class Points:
         """Check nothing yet."""
         self.question = question
         self.template = template
-        self.graph = graph
         self._keys = Keys(graph)
 
     def __len__(self) -> int:
@@ -38,7 +37,7 @@ class Points:
     @property
     def code_digest(self) -> str:
         """The digest of the stage's code."""
-        return self._keys.code_digest(self.graph[self.question.stage])
+        return self._keys.code_digest(self.question.stage)
 
     def checked_keys(self) -> list[bytes]:
         """The stage key of every point (32 bytes each), in order.

@@ -15,7 +15,9 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.stages.graph import PIPELINE, Graph
 from walkerlab.stages.progress import Progress, Reporter, Silent
+from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
+from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
@@ -137,7 +139,7 @@ class Sweep:
         Raises ConfigError for points that are no configs and for a stage that has no result without files.
         """
         refuse_unknown_stage(question.stage, graph)
-        self.question, self.folder = question, folder
+        self.question, self.folder, self.config = question, folder, template.base.config
         self.points = Points(question, template, graph)
         keys = np.frombuffer(b"".join(self.points.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
@@ -145,17 +147,18 @@ class Sweep:
         # any one of the points that have a result will do to compute it
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
-        base = template.base.config.model_dump(mode="json")
+        base = self.config.model_dump(mode="json")
         base.pop("sweep", None)
         self.slice = question_slice(question, base)
         self.name = result_name(question, self.slice)
         self.path = result_path(folder, self.name)
 
     def foresee(self, workers: int, shown: int) -> Foreseen:
-        """What would be done; touches nothing."""
+        """What would be done; touches nothing. Raises ConfigError as `run` would."""
+        refuse_another_config(self.folder, self.config)
         there = np.zeros(len(self.places), bool)
         rows: list[Row] = []
-        for chunk in self._stored():
+        for chunk in self._stored(Silent()):
             rows += chunk.rows
             there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
         count = len(self.question)
@@ -168,7 +171,8 @@ class Sweep:
     def run(self, work: Work, reporter: Reporter | None = None) -> Swept:
         """Have the sweep's file, computing the points that have no result yet.
 
-        Raises LockedError (only without `wait`), StorageError, and NoAnswer if no worker lives.
+        Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
+        StorageError, and NoAnswer if no worker lives.
         """
         started = time.perf_counter()
         reporter = reporter or Silent()
@@ -176,13 +180,14 @@ class Sweep:
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
+            claim(self.folder, self.config)
             merge = Merge(len(self.places))
             if not work.force:
-                self._take_over(merge)
+                self._take_over(merge, reporter)
             reused = int(merge.there[self.inverse].sum())
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
-            begun = provenance.begin(self.points.template.base.config, {})
+            begun = provenance.begin(self.config, {})
             progress = reporter.begin(
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
             )
@@ -196,18 +201,21 @@ class Sweep:
             artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
-    def _stored(self) -> Iterator[Chunk]:
+    def _stored(self, reporter: Reporter) -> Iterator[Chunk]:
         """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
         runs, stage = self.folder.runs_dir, self.question.stage
         for path in chunk_files(runs, stage, self.points.code_digest):
-            chunk = stored_chunk(path)
-            if chunk is not None:
-                yield chunk
+            try:
+                yield stored_chunk(path)
+            except (FileNotFoundError, OtherLayout):
+                continue
+            except Damaged as error:
+                reporter.warn(f"{path} is damaged: {error}; its points are computed again")
         for row, labels in rows_of_single_runs(runs, stage, self.places):
             yield Chunk((row,), labels)
 
-    def _take_over(self, merge: Merge) -> None:
-        for chunk in self._stored():
+    def _take_over(self, merge: Merge, reporter: Reporter) -> None:
+        for chunk in self._stored(reporter):
             merge.put(chunk, self.places)
 
     def _compute(

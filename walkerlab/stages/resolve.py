@@ -1,0 +1,90 @@
+"""What a command is asked about: a config, and the run folder that its results belong in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin, builtin_names, find
+from walkerlab.config.loader import EarlierRun, Template, template
+from walkerlab.errors import ConfigError
+from walkerlab.stages.runs import config_text, find_run
+from walkerlab.store import artifact
+from walkerlab.store.artifact import Damaged
+from walkerlab.store.runfolder import RunFolder
+
+SUFFIX = ".h5"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A config, ready to be varied, and its run folder."""
+
+    template: Template
+    folder: RunFolder
+
+
+def resolve(text: str | None, sets: Sequence[str] = (), strides: int | None = None, runs: Path = Path("runs")) -> Asked:
+    """What `--config` names: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
+
+    text     looked for in that order; None is the built-in paper config
+    sets     `--set` options, KEY=VALUE, in order
+    strides  `--strides`, over everything else
+    runs     the folder of all runs; a run that is given by a path stays in its own
+
+    Raises ConfigError if nothing has that name, and for a config that is not usable.
+    """
+    run = None if text is None or is_config(text) else artifact_at(Path(text)) or run_at(text, runs)
+    if run is not None:
+        folder, earlier = run
+        read = template(None, sets, strides, earlier)
+        return Asked(read, RunFolder(folder.runs_dir, read.base.run_name, folder.source))
+    path = None if text is None else Path(text)
+    read = template(path, sets, strides)
+    return Asked(read, RunFolder(runs, read.base.run_name, source_of(path, runs)))
+
+
+def is_config(text: str) -> bool:
+    """Whether a text names a config file or a built-in config."""
+    return text in builtin_names() or (Path(text).is_file() and Path(text).suffix != SUFFIX)
+
+
+def artifact_at(path: Path) -> tuple[RunFolder, EarlierRun] | None:
+    """The run of an artifact, with the config that it was made with; None if there is no such file."""
+    if path.suffix != SUFFIX or not path.is_file():
+        return None
+    folder = RunFolder.at(path.parent)
+    try:
+        stored = artifact.read(path)
+    except Damaged as error:
+        raise ConfigError(
+            f"{path} is damaged, and no config can be taken from it: {error}.",
+            f"`-c {folder.typed}` takes the one of its folder.",
+        ) from None
+    return folder, EarlierRun(stored.provenance.config, folder.name, str(path))
+
+
+def run_at(text: str, runs: Path) -> tuple[RunFolder, EarlierRun] | None:
+    """The run of a name or a folder, with its config; None if there is none."""
+    folder = find_run(text, runs)
+    if folder is None:
+        return None
+    config = config_text(folder)
+    if config is None:
+        raise ConfigError(
+            f"{folder.path} has no result to take a config from.", "Give a run folder, an artifact or a file."
+        )
+    return folder, EarlierRun(config, folder.name, str(folder.path))
+
+
+def source_of(path: Path | None, runs: Path) -> str:
+    """Where a config is from: a built-in one by its name, a file as seen from the folder of all runs.
+
+    Seen from there so that a project can be moved with its runs.
+    """
+    file = (builtin(DEFAULT) if path is None else find(path)).path.resolve()
+    if file.parent == BUILTIN_FOLDER.resolve():
+        return f"built-in {file.name}"
+    return os.path.relpath(file, runs.resolve())
