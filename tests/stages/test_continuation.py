@@ -144,7 +144,7 @@ def test_bad_questions_end_in_words(sets, said):
 
 
 def test_a_span_without_a_gait_has_no_answer():
-    with pytest.raises(NoAnswer, match="no gait with slope_deg from -3 to -1 deg"):
+    with pytest.raises(NoAnswer, match="no gait was found with slope_deg from -3 to -1 deg"):
         follow("over=slope_deg", "from=-3", "to=-1")
 
 
