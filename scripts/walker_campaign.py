@@ -3,9 +3,11 @@
     python scripts/walker_campaign.py                         # 200 walkers of each type, some two minutes
     python scripts/walker_campaign.py --walkers 20 --types kneed --seed 3
 
-Every search has to end in a gait or in words. A chosen gait is walked from starts 1e-6, and half as far, to either side
-of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps these walks within
-1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the multipliers' k-th powers.
+Every search has to end in a gait or in words. Where it finds none, SciPy's `root` tries the step map from all that walk
+of a few thousand other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
+to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps these
+walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the multipliers'
+k-th powers.
 Prints a table in Markdown, then what went wrong; exits 1 if anything did.
 """
 
@@ -20,17 +22,20 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.fixed_point import GaitSearch, SearchSettings, find_gaits
+from walkerlab.orbits.fixed_point import GaitSearch, Search, SearchSettings, find_gaits
 from walkerlab.orbits.gait import Gait
+from walkerlab.orbits.random_starts import LEAST_START, MOST_START, SHORTEST_STEP
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import on_section, section_of
+from walkerlab.orbits.step_map import NO_RESIDUAL, on_section, residual_alone, section_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.stepping import T
 
 Draw = np.random.Generator
 STEPS = 10
@@ -40,6 +45,8 @@ AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
+OTHER_STARTS = 3000  # drawn where nothing is found
+SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
 def straight_legs(draw: Draw) -> StraightLegs:
@@ -86,6 +93,29 @@ def kneed_free(draw: Draw) -> Kneed:
     return kneed(draw, "free")
 
 
+def kneed_with_torso(draw: Draw) -> Kneed:
+    """Shanks of up to a third of their thighs' mass, and an upper body."""
+    upper = draw.uniform(0.35, 0.65)
+    return Kneed(
+        type="kneed",
+        thigh=Thigh(
+            length_m=upper,
+            mass_kg=1.0,
+            mass_below_hip_m=upper * draw.uniform(0.3, 0.8),
+            inertia_kg_m2=draw.uniform(0.0, 0.01),
+        ),
+        shank=Shank(
+            length_m=1.0 - upper,
+            mass_kg=draw.uniform(0.02, 0.3),
+            mass_below_knee_m=draw.uniform(0.05, 0.25),
+            mass_ahead_m=draw.uniform(-0.005, 0.005),
+        ),
+        hip_mass_kg=draw.uniform(0.0, 2.0),
+        foot_radius_m=float(draw.choice((0.0, draw.uniform(0.02, 0.25)))),
+        torso=Torso(mass_kg=draw.uniform(0.1, 2.0), above_hip_m=draw.uniform(0.05, 0.5)),
+    )
+
+
 def torso(draw: Draw) -> CompassWalker:
     """The compass with an upper body."""
     return CompassWalker(
@@ -126,6 +156,7 @@ TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
     "straight-legs": straight_legs,
     "kneed": kneed,
     "kneed-free": kneed_free,
+    "kneed-torso": kneed_with_torso,
     "torso": torso,
     "parts": parts,
 }
@@ -164,14 +195,36 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
 def end_of(search: GaitSearch) -> str:
     """What a search came to."""
     if search.gait is None:
-        return "only gaits that cannot be walked" if search.gaits else "no gait"
+        return "only gaits that cannot be walked" if search.gaits else "none found"
     return "a stable gait" if search.gait.stable else "an unstable gait"
+
+
+def overlooked(walker: Standing) -> list[str]:
+    """Gaits of a walker of which a search finds none."""
+    search = Search(walker, SETTINGS)
+    looking, still = search.looking, search.walker.slope + search.walker.lean
+    d = len(search.walker.picked)
+    starts = np.random.default_rng(7).uniform(LEAST_START[:d], MOST_START[:d], (OTHER_STARTS, d))
+    starts[:, 0] = 0.5 * starts[:, 0] - still
+
+    def residual(z: NDArray[np.float64]) -> NDArray[np.float64]:
+        walks = residual_alone(looking, z) < NO_RESIDUAL
+        return looking.z_next - z if walks else np.ones(d)
+
+    for z in starts:
+        if residual_alone(looking, z) == NO_RESIDUAL:
+            continue
+        solved = root(residual, z)
+        left = residual_alone(looking, solved.x)
+        if left < SOLVED and abs(solved.x[0] + still) > APART and looking.plain.clock[T] > SHORTEST_STEP:
+            return [f"a gait at {solved.x.tolist()} was overlooked"]
+    return []
 
 
 def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
     """What is wrong with what was found, and over how many steps the chosen gait's multipliers were seen."""
     if search.gait is None:
-        return ([] if search.reason else ["no gait and no reason"]), 0
+        return (overlooked(walker) if search.reason else ["no gait and no reason"]) if not search.gaits else [], 0
     faults = [f"the chosen gait cannot be walked: {objection}" for objection in search.gait.objections]
     steps = 0
     for steps, (seen, expected, size) in enumerate(traces(walker, search.gait), 1):
@@ -214,7 +267,7 @@ def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
     return [section_of(walker, y) for y in take_walk(walker, method, on_section(walker, z.tolist()), STEPS).after]
 
 
-ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked", "no gait")
+ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked", "none found")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

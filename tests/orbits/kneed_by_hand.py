@@ -1,7 +1,7 @@
-"""A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy, apart from the package.
+"""A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy alone.
 
-Masses at i exp(i theta) times arms in the complex plane, feet a point each. Bodies: swing thigh, stance leg, swing shank
-and torso; section coordinates: stance angle, rates of swing and stance leg just after heel strike.
+Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points. Bodies: swing
+thigh, stance leg, swing shank and torso. Section: stance angle, rates of swing and stance leg just after heel strike.
 """
 
 from typing import NamedTuple

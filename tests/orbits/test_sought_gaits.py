@@ -49,6 +49,12 @@ def test_an_unstable_gait_is_found_where_few_starts_walk(found):
     assert gait.period == pytest.approx(1.3290071109, abs=1e-9)
 
 
+def test_more_starts_are_drawn_only_where_the_first_find_nothing():
+    few, enough = (find_gaits(with_torso(), settings=SearchSettings(random_starts=count)) for count in (2, 100))
+    assert len(few.gaits) == len(enough.gaits) == 1
+    assert (few.random_starts, enough.random_starts) == (1002, 100)
+
+
 def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_gait(found):
     walker, gait = by_hand(), found.gaits[0]
     z = np.array([gait.state[1], gait.state[4], gait.state[5]])
@@ -66,7 +72,7 @@ def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_g
 def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found):
     search = Search(with_torso(), SearchSettings())
     looking, walker = search.looking, search.walker
-    starts = np.random.default_rng(1).uniform(LEAST_START[:3], MOST_START[:3], (300, 3))
+    starts = np.random.default_rng(1).uniform(LEAST_START[:3], MOST_START[:3], (2000, 3))
     starts[:, 0] = 0.5 * starts[:, 0] - walker.slope
     walked = 0
     for z in starts:

@@ -101,7 +101,7 @@ NO_DESCENT = (
     "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
     "standing still is no gait"
 )
-NONE_TO_FOLLOW = "the small-slope theory has no gait to follow to this slope"
+NONE_TO_FOLLOW = "the theory of small slopes has no gait of this walker to follow"
 
 
 def shooting(walker: Standing, rtol: float, atol: float, budget: int) -> Shooting:
@@ -205,7 +205,8 @@ class Search:
         hits = tuple(each.by.count(RANDOM_START) for each in found)
         chosen, reason = choice(gaits)
         if not gaits:
-            reason = "none found: " + "; ".join([*(self.lost or [NONE_TO_FOLLOW]), self.drawn_in_vain()])
+            followed = f"followed from a vanishing slope, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW
+            reason = f"none found: {followed}; {self.drawn_in_vain()}"
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost))
 
     def drawn_in_vain(self) -> str:
