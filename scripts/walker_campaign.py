@@ -3,8 +3,8 @@
     python scripts/walker_campaign.py                         # 200 walkers of each type, some two minutes
     python scripts/walker_campaign.py --walkers 20 --types kneed --seed 3
 
-Every search has to end in a gait or in words. Where it finds none, SciPy's `root` tries the step map from all that walk
-of a few thousand other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
+Every search has to end in a gait or in words. Where it finds none, SciPy's `root` tries the step map from the first
+forty that walk of other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
 to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps these
 walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the multipliers'
 k-th powers.
@@ -45,7 +45,11 @@ AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
-OTHER_STARTS = 3000  # drawn where nothing is found
+OTHER_STARTS, TRIED, EVALUATIONS = (
+    3000,
+    40,
+    60,
+)  # drawn where nothing is found, tried of those that walk; steps for each
 SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
@@ -211,10 +215,9 @@ def overlooked(walker: Standing) -> list[str]:
         walks = residual_alone(looking, z) < NO_RESIDUAL
         return looking.z_next - z if walks else np.ones(d)
 
-    for z in starts:
-        if residual_alone(looking, z) == NO_RESIDUAL:
-            continue
-        solved = root(residual, z)
+    walking = [z for z in starts if residual_alone(looking, z) < NO_RESIDUAL]
+    for z in walking[:TRIED]:
+        solved = root(residual, z, options={"maxfev": EVALUATIONS})
         left = residual_alone(looking, solved.x)
         if left < SOLVED and abs(solved.x[0] + still) > APART and looking.plain.clock[T] > SHORTEST_STEP:
             return [f"a gait at {solved.x.tolist()} was overlooked"]

@@ -351,7 +351,7 @@ def beyond_flips(
         flip, start = begun
         begin, end = max(span.least, flip - BEFORE_FLIP * span.size), span.most
     else:
-        followed, first = flipped_outside(followed, follower, asked, samples, progress)
+        followed, first = doubled_outside(followed, follower, asked, samples, progress)
         if first is None:
             return followed
         start, begin = first.last, first.value
@@ -375,7 +375,7 @@ def beyond_flips(
     return replace(followed, attractors=attractors, exponents=found)
 
 
-def flipped_outside(
+def doubled_outside(
     followed: Followed, follower: Follower, asked: Question, samples: Samples, progress: Progress
 ) -> tuple[Followed, Attractor | None]:
     """Gaits of 2, 4, 8, ... steps where all of a branch lies beyond a flip outside the span, and where walks settle.
