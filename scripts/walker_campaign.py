@@ -287,8 +287,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wrong: list[str] = []
     for name in options.types:
         found = tally(name, options.walkers, options.seed)
-        counts = " | ".join(str(found.ends[end]) for end in ENDS)
-        row = f"| `{name}` | {counts} | {found.overlooked} | {found.steps_seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
+        counts = " | ".join(str(count) for count in (*(found.ends[end] for end in ENDS), found.overlooked))
+        row = f"| `{name}` | {counts} | {found.steps_seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
         print(row, flush=True)
         wrong += found.wrong
     print("\n".join(wrong))
