@@ -63,7 +63,7 @@ def question(config: Config) -> Question:
 
 def flip(ground: Ground) -> float:
     """Where the contact model's gait of one step first doubles its period (deg)."""
-    found = first_flip(contact_branches(question(config_of(ground)), Silent()).branches)
+    found = first_flip(contact_branches(question(config_of(ground)), Silent())[0].branches)
     assert found is not None, "the span holds the flip"
     return found[0]
 

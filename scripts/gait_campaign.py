@@ -22,7 +22,7 @@ from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import method_named
 
-FOLLOWED_ONLY = SearchSettings(random_starts=0)
+FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
 RTOL, ATOL, BUDGET = 1e-11, 1e-13, 100_000
 RETURNS_TO = 1e-7  # rad, rad/s: the tolerance above, grown by an unstable gait's multipliers
 

@@ -143,8 +143,62 @@ def test_bad_questions_end_in_words(sets, said):
     assert refused.value.advice
 
 
+def follow_coarsely(*sets):
+    """With the attractor at fewer values, and without gaits of other numbers of steps than 1, 2, 4."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(continuation, "RIGID_SAMPLES", continuation.Samples(36, 500, 96, 12, 400))
+        patch.setattr(continuation, "OTHER_PERIODS", ())
+        patch.setattr(continuation, "STARTS", 0)
+        return follow(*sets, "periods=4").summary
+
+
+@pytest.fixture(scope="module")
+def beyond_the_first_flip():
+    return follow_coarsely("over=slope_deg", "from=4.9", "to=5.25")
+
+
+def test_a_span_that_begins_beyond_the_first_flip_has_the_flips_of_one_that_begins_before(beyond_the_first_flip):
+    wider = follow_coarsely("over=slope_deg", "from=4.2", "to=5.25")
+    for steps in (2, 4):
+        (flip,), (wanted,) = (flips_of(said, steps) for said in (beyond_the_first_flip, wider))
+        assert flip == pytest.approx(wanted, abs=1e-9)
+    (doubled,) = [one for one in beyond_the_first_flip["branches"] if one["period"] == 2]
+    assert (doubled["from"], doubled["to"]) == pytest.approx((4.9, 5.25))
+
+
+def test_a_span_that_begins_beyond_the_first_flip_has_its_chaos(beyond_the_first_flip):
+    (attractor,) = beyond_the_first_flip["attractors"]
+    # the cascade's flips accumulate at 5.03922 deg, and walks are looked at every 0.01
+    assert 5.0392 < attractor["aperiodic_from"] < 5.06
+    assert attractor["from"] == 4.9
+    steepest = max(beyond_the_first_flip["lyapunov"], key=lambda one: one["value"])
+    assert steepest["value"] > 5.15
+    assert steepest["exponent"] > 5.0 * steepest["uncertainty"]
+
+
+@pytest.mark.parametrize(("least", "settled"), [(4.95, 4), (5.1, 0)])
+def test_gaits_of_fewer_steps_than_walks_settle_on_are_found_too(least, settled):
+    said = follow_coarsely("over=slope_deg", f"from={least}", "to=5.15")
+    assert {one["period"] for one in said["branches"] if one["from"] == least} >= {1, 2, 4}
+    assert settled in said["attractors"][0]["periods"]
+
+
+def test_an_attractor_that_only_the_end_of_a_span_has_is_followed_downwards():
+    # on this slope the lighter the legs are the further the cascade has gone, until walks fall
+    said = follow_coarsely("over=walker.leg_mass_kg", "slope_deg=5.1", "from=3.8", "to=7")
+    assert {one["period"] for one in said["branches"]} >= {1, 2}
+    (attractor,) = said["attractors"]
+    assert attractor["to"] == 7.0
+    assert 3.8 < attractor["lost_at"] < attractor["from"]
+    assert attractor["ended"] == "fell"
+
+
+def flips_of(said, steps):
+    return [one["value"] for one in said["bifurcations"] if (one["kind"], one["period"]) == ("flip", steps)]
+
+
 def test_a_span_without_a_gait_has_no_answer():
-    with pytest.raises(NoAnswer, match="no gait with slope_deg from -3 to -1 deg"):
+    with pytest.raises(NoAnswer, match="no gait was found with slope_deg from -3 to -1 deg"):
         follow("over=slope_deg", "from=-3", "to=-1")
 
 

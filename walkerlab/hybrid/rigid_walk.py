@@ -47,6 +47,7 @@ from walkerlab.solvers.vectors import load
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
+RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
 EVENTS = 4
@@ -245,8 +246,10 @@ def events_in_step(knee: Any, finder: CrossingFinder, at_start: bool) -> tuple[f
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, at_start)
-    struck = first_crossing(finder, KNEE, RISING, 0.0, at_start) if is_bent(knee) else NO_CROSSING
-    return strike, first_crossing(finder, FALL, FALLING, 0.0, False), struck
+    fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
+    if is_bent(knee):
+        struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
+    return strike, fall, struck
 
 
 @by_type

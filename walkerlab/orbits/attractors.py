@@ -16,13 +16,15 @@ from itertools import pairwise
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.bifurcations import eigenvector
 from walkerlab.orbits.continuation import Floats
-from walkerlab.orbits.families import Seed
+from walkerlab.orbits.families import GaitPoint, Seed
 from walkerlab.orbits.step_maps import StepMap
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
 NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how much so from first to last third
+ASIDE = 1e-2  # of a start from the unstable gait that it is to leave, as a share of the largest coordinate
 BLOCKS = 10
 SMALLER_STEPS = 8
 CANDIDATES = 4  # near returns that are tried, of one number of steps
@@ -115,6 +117,13 @@ def swept(
         found.append(here)
         z = here.last
     return Attractors(tuple(found), None, "")
+
+
+def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) -> Attractor | Outcome:
+    """Where walks settle that leave an unstable gait along the direction in which every step changes sides."""
+    flipping = min(gait.multipliers.real)
+    aside = ASIDE * np.max(np.abs(gait.z)) * eigenvector(gait.solved.evaluated.data.DP, flipping)
+    return settled(step_map, gait.z + aside, gait.value, transient, kept)
 
 
 def led(step_map: StepMap, last: Attractor, value: float, transient: int, kept: int) -> Attractor | Outcome:

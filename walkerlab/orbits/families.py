@@ -22,6 +22,7 @@ from walkerlab.orbits.bifurcations import (
     FlipForm,
     GaitEquations,
     bifurcation_in,
+    critical_value,
     flip_form,
     onto_doubled,
 )
@@ -149,6 +150,12 @@ class Branch:
         if stable:
             found.append([*values, self.points[-1].value, self.ends[1].value])
         return tuple((min(stretch), max(stretch)) for stretch in found)
+
+    @property
+    def flipped_outside(self) -> bool:
+        """Whether all of it lies beyond a flip that is not on it: an odd number of multipliers below -1 throughout."""
+        on_it = any(one.kind == "flip" for one in self.bifurcations)
+        return not on_it and critical_value("flip", self.points[0].solved.evaluated.data.DP) < 0.0
 
     def _edge(self, one: GaitPoint, other: GaitPoint) -> float:
         """The bifurcation between two neighbours, of which one is stable."""

@@ -1,7 +1,8 @@
 """The periodic gaits of a rigid walker: sought in two ways, solved to rounding, judged and compared.
 
 Followed: the two gaits of the small-slope theory are followed to the walker's slope. Drawn: the step map is solved from
-random starting values, the paper's way (section 3.3). All of it happens with the similar walker of unit size.
+random starting values, the paper's way (section 3.3), and from many more where those find nothing: of some walkers few
+starts reach a heel strike at all. All of it happens with the similar walker of unit size.
 """
 
 from dataclasses import dataclass, replace
@@ -38,12 +39,14 @@ class SearchSettings:
     """How hard to look.
 
     random_starts  starting values to draw
+    further_starts  to draw where nothing is found
     rtol, atol     tolerances while looking; gaits are then solved with the `solved_` ones, down to that residual
     residual       of an acceptable gait, which may be rounding on a steep slope
     budget         right-hand sides for one call of the solver
     """
 
     random_starts: int = 100
+    further_starts: int = 1000
     rtol: float = 1e-8
     atol: float = 1e-11
     solved_rtol: float = 1e-13
@@ -86,8 +89,11 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
     if walker.slope <= 0.0 and walker.centrifugal == walker.tree:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker, settings)
+    generator = np.random.default_rng(seed)
     search.follow_seeds()
-    search.draw(np.random.default_rng(seed))
+    search.draw(generator, settings.random_starts)
+    if not search.found:
+        search.draw(generator, settings.further_starts)
     return search.result()
 
 
@@ -95,6 +101,7 @@ NO_DESCENT = (
     "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
     "standing still is no gait"
 )
+NONE_TO_FOLLOW = "the theory of small slopes has no gait of this walker to follow"
 
 
 def shooting(walker: Standing, rtol: float, atol: float, budget: int) -> Shooting:
@@ -129,6 +136,7 @@ class Search:
         self.settings = settings
         self.found: list[Found] = []
         self.lost: list[str] = []
+        self.drawn = 0
         rtol, atol = settings.solved_rtol, settings.solved_atol
         self.method = new_dop853(len(self.walker.blank), rtol, atol, settings.budget)
         self.looking = shooting(self.walker, settings.rtol, settings.atol, settings.budget)
@@ -145,10 +153,11 @@ class Search:
             elif not self.keep(reached.z, name):
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
-    def draw(self, generator: np.random.Generator) -> None:
-        """Solve the step map from random starting values, unless they lead to a gait that was followed."""
-        d, settings = len(self.walker.picked), self.settings
-        starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (settings.random_starts, d))
+    def draw(self, generator: np.random.Generator, count: int) -> None:
+        """Solve the step map from random starting values, unless they lead to a gait that was found before."""
+        d = len(self.walker.picked)
+        self.drawn += count
+        starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (count, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
         known = known_gaits(self.looking, [(found.z, found.DP) for found in self.found])
         led = np.zeros(len(starts), np.int64)
@@ -196,9 +205,16 @@ class Search:
         hits = tuple(each.by.count(RANDOM_START) for each in found)
         chosen, reason = choice(gaits)
         if not gaits:
-            drawn = self.settings.random_starts
-            reason = "; ".join([*self.lost, f"none of {drawn} random starting values led to a gait"])
-        return GaitSearch(gaits, chosen, reason, hits, self.settings.random_starts, tuple(self.lost))
+            followed = f"followed from a vanishing slope, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW
+            reason = f"none found: {followed}; {self.drawn_in_vain()}"
+        return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost))
+
+    def drawn_in_vain(self) -> str:
+        """How many starting values led to no gait, and from which range they were drawn."""
+        return (
+            f"none of {self.drawn} random starting values (legs up to {MOST_START[0]:g} rad apart, rates up to "
+            f"{MOST_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
+        )
 
 
 def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:

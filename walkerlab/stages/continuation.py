@@ -15,10 +15,12 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
+    Attractor,
     Attractors,
     Lyapunov,
     close_returns,
     largest_exponent,
+    left_by_flip,
     settled_elsewhere,
     swept,
 )
@@ -135,7 +137,8 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     content = Content({**groups(found, parameter, block), **moving}, said)
     if not any(followed.branches for followed in found):
         raise NoAnswer(
-            f"no gait with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}",
+            f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
+            f"none at any of {len(asked.looked_at())} values looked at",
             "Choose another span (--from, --to), or change what else the config fixes.",
             content,
         )
@@ -271,7 +274,7 @@ def over_plane(followed: Followed, asked: Question, progress: Progress) -> Follo
 def follow_rigid(asked: Question, progress: Progress) -> Followed:
     """All of the rigid model: branches, cascades, attractor, exponents, and gaits of other numbers of steps."""
     followed, follower = rigid_branches(asked, progress)
-    return with_others(beyond_flips(followed, asked, RIGID_SAMPLES, progress), asked, follower, progress)
+    return with_others(beyond_flips(followed, follower, asked, RIGID_SAMPLES, progress), asked, follower, progress)
 
 
 def rigid_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower]:
@@ -299,10 +302,12 @@ def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
 
 def follow_contact(asked: Question, progress: Progress) -> Followed:
     """All of the contact model: its branch, its cascade, its attractor and exponents."""
-    return beyond_flips(contact_branches(asked, progress), asked, CONTACT_SAMPLES, progress)
+    asked = replace(asked, periods=min(asked.periods, CONTACT_PERIODS))
+    followed, follower = contact_branches(asked, progress)
+    return followed if follower is None else beyond_flips(followed, follower, asked, CONTACT_SAMPLES, progress)
 
 
-def contact_branches(asked: Question, progress: Progress) -> Followed:
+def contact_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower | None]:
     """The branch of the contact model's gait, and the cascade beyond its flips."""
     from walkerlab.scene.contact import contact_gait
 
@@ -327,33 +332,70 @@ def contact_branches(asked: Question, progress: Progress) -> Followed:
         control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
         follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
         seed = Seed(step_map.of_section(found.gait.z, value), value)
-        branches = follower.family([seed], min(asked.periods, CONTACT_PERIODS))
-        return Followed(CONTACT, step_map, branches, map_of)
-    return Followed(CONTACT, None, ())
+        return Followed(CONTACT, step_map, follower.family([seed], asked.periods), map_of), follower
+    return Followed(CONTACT, None, ()), None
 
 
-def beyond_flips(followed: Followed, asked: Question, samples: Samples, progress: Progress) -> Followed:
-    """The attractor from before the first flip of a stable branch on, and the exponents along it."""
-    begun = first_flip(followed.branches)
-    if begun is None or followed.step_map is None or asked.periods == 1:
+def beyond_flips(
+    followed: Followed, follower: Follower, asked: Question, samples: Samples, progress: Progress
+) -> Followed:
+    """The attractor beyond the first flip of a stable branch, and the exponents along it.
+
+    It is followed from before that flip on or, where that lies outside the span, from an end of the span.
+    """
+    span = asked.span
+    if followed.step_map is None or asked.periods == 1:
         return followed
-    flip, start = begun
-    begin = max(asked.span.least, flip - BEFORE_FLIP * asked.span.size)
-    values = np.linspace(begin, asked.span.most, samples.values)
+    begun = first_flip(followed.branches)
+    if begun is not None:
+        flip, start = begun
+        begin, end = max(span.least, flip - BEFORE_FLIP * span.size), span.most
+    else:
+        followed, first = doubled_outside(followed, follower, asked, samples, progress)
+        if first is None:
+            return followed
+        start, begin = first.last, first.value
+        end = span.most if begin - span.least < span.most - begin else span.least
+    values = np.linspace(begin, end, samples.values)
     progress.start(f"continuation: attractor of the {followed.model} model", samples.values)
-    attractors = swept(followed.step_map, start, values, samples.transient, samples.kept, progress.advance)
+    attractors = swept(follower.step_map, start, values, samples.transient, samples.kept, progress.advance)
     if not attractors.found:
         return replace(followed, attractors=attractors)
+    if end < begin:
+        attractors = replace(attractors, found=attractors.found[::-1])
     chosen = attractors.found[:: max(1, len(attractors.found) // samples.exponents)]
     progress.start(f"continuation: Lyapunov exponents of the {followed.model} model", len(chosen))
     exponents = []
     for attractor in chosen:
         exponents.append(
-            largest_exponent(followed.step_map, attractor.last, attractor.value, samples.kept, samples.averaged)
+            largest_exponent(follower.step_map, attractor.last, attractor.value, samples.kept, samples.averaged)
         )
         progress.advance()
     found = tuple(one for one in exponents if one is not None)
     return replace(followed, attractors=attractors, exponents=found)
+
+
+def doubled_outside(
+    followed: Followed, follower: Follower, asked: Question, samples: Samples, progress: Progress
+) -> tuple[Followed, Attractor | None]:
+    """Gaits of 2, 4, 8, ... steps where all of a branch lies beyond a flip outside the span, and where walks settle.
+
+    Both are sought at the branch's ends: a walk leaves its gait there for the attractor, whose near returns are tried.
+    Returns the attractor at the least of these values too; None if there is none.
+    """
+    progress.start(f"continuation: gaits of the {followed.model} model beyond flips outside the span")
+    ends = [
+        branch.points[place] for branch in followed.branches if branch.period == 1 and branch.flipped_outside
+        for place in (0, -1)
+    ]  # fmt: skip
+    reached = [left_by_flip(follower.step_map, end, samples.transient, samples.kept) for end in ends]
+    found = [one for one in reached if isinstance(one, Attractor) and one.period != 1]
+    if not found:
+        return followed, None
+    doublings = [2**k for k in range(1, asked.periods.bit_length())]
+    seeds = [seed for one in found for seed in close_returns(follower.step_map, one, doublings, samples.averaged)]
+    branches = follower.family(seeds, asked.periods, followed.branches)
+    return replace(followed, branches=branches), min(found, key=lambda one: one.value)
 
 
 def with_others(followed: Followed, asked: Question, follower: Follower, progress: Progress) -> Followed:

@@ -49,7 +49,8 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
         summary(config, searches),
     )
     if chosen.gait is None:
-        raise NoAnswer(f"no gait at a slope of {config.slope_rad:.4g} rad: {chosen.reason}", advice(config), content)
+        nothing = "no gait was found" if chosen.random_starts and not chosen.gaits else "no gait"
+        raise NoAnswer(f"{nothing} at a slope of {config.slope_rad:.4g} rad: {chosen.reason}", advice(config), content)
     return content
 
 

@@ -1,0 +1,102 @@
+"""A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy alone.
+
+Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points. Bodies: swing
+thigh, stance leg, swing shank and torso. Section: stance angle, rates of swing and stance leg just after heel strike.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+BENT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]])  # rates of bodies by free ones
+STRAIGHT = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]])
+ARMED_S = 0.01  # after its release a knee cannot strike for so long
+FIRST_STEP_S = 1e-3
+
+
+class Walker(NamedTuple):
+    """Masses, arms (masses, bodies) from the stance foot, inertias of the bodies, thigh and shank length, SI."""
+
+    masses: np.ndarray
+    arms: np.ndarray
+    inertias: np.ndarray
+    leg: float
+    gravity: float
+    slope: float
+
+
+def walker_of(thigh, shank, hip_mass, torso, gravity, slope):
+    """From (length, mass, below, ahead, inertia) of thigh and shank and (mass, above, inertia) of the torso."""
+    upper, _, below_hip, thigh_ahead, _ = thigh
+    lower, _, below_knee, shank_ahead, _ = shank
+    leg = upper + lower
+    arms = np.zeros((6, 4), complex)
+    arms[0:2, 1] = [1j * (leg - below_hip) + thigh_ahead, 1j * (lower - below_knee) + shank_ahead]
+    arms[2:, 1] = 1j * leg  # the hip and all that hangs on it
+    arms[3, 3] = 1j * torso[1]
+    arms[4, 0], arms[5, 0] = -1j * below_hip + thigh_ahead, -1j * upper
+    arms[5, 2] = -1j * below_knee + shank_ahead
+    masses = np.array([thigh[1], shank[1], hip_mass, torso[0], thigh[1], shank[1]])
+    return Walker(masses, arms, np.array([thigh[4], thigh[4] + shank[4], shank[4], torso[2]]), leg, gravity, slope)
+
+
+def mass_matrix(walker, theta):
+    """Of the bodies' angles (4,), and the velocities of the masses by their rates."""
+    J = 1j * walker.arms * np.exp(1j * theta)
+    return (J.conj().T * walker.masses @ J).real + np.diag(walker.inertias), J
+
+
+def accelerations(walker, free, theta, omega):
+    """Of the bodies, whose rates are `free` times those of the free ones."""
+    M, J = mass_matrix(walker, theta)
+    turning = 1j * J @ omega**2
+    forces = (J.conj().T @ (walker.masses * (-1j * walker.gravity - turning))).real
+    return free @ np.linalg.solve(free.T @ M @ free, free.T @ forces)
+
+
+def swung(walker, free, y, t, event, longest=10.0):
+    """Time and state at an event, from y (8,) at t on."""
+
+    def rates(_t, y):
+        return np.concatenate((y[4:], accelerations(walker, free, y[:4], y[4:])))
+
+    walk = solve_ivp(
+        rates, (t, t + longest), y, method="DOP853", rtol=1e-11, atol=1e-13, events=event, max_step=0.05,
+        first_step=FIRST_STEP_S,
+    )  # fmt: skip
+    return walk.t[-1], walk.y[:, -1]
+
+
+def step(walker, z):
+    """Where z (3,) leads, how long it takes, and when the knee strikes (s)."""
+    swing, stance = -2.0 * walker.slope - z[0], z[0]
+    y = np.array([swing, stance, swing, -walker.slope, z[1], z[2], z[1], 0.5 * (z[1] + z[2])])
+
+    def knee(_t, y):
+        return y[2] - y[0]
+
+    def heel(_t, y):
+        return y[0] + y[1] + 2.0 * walker.slope if y[0] > y[1] else 1.0
+
+    knee.terminal = heel.terminal = True
+    knee.direction, heel.direction = 1.0, -1.0
+    t, y = swung(walker, BENT, y, 0.0, None, ARMED_S)
+    struck, y = swung(walker, BENT, y, t, knee)
+    M, _ = mass_matrix(walker, y[:4])
+    y[4:] = STRAIGHT @ np.linalg.solve(STRAIGHT.T @ M @ STRAIGHT, STRAIGHT.T @ M @ y[4:])
+    t, y = swung(walker, STRAIGHT, y, struck, heel)
+    return strike(walker, y), t, struck
+
+
+def strike(walker, y):
+    """Section coordinates after the heel strike that y (8,) leads to: roles change, momenta are projected."""
+    _, J = mass_matrix(walker, y[:4])
+    velocity, spin = J @ y[4:], y[4:]
+    # the same masses and bodies, seen from the other foot
+    masses, bodies = [4, 5, 2, 3, 0, 1], [1, 0, 1, 3]
+    theta = y[:4][bodies]
+    M, J = mass_matrix(walker, theta)
+    momentum = (J.conj().T @ (walker.masses * velocity[masses])).real + walker.inertias * spin[bodies]
+    omega = np.linalg.solve(STRAIGHT.T @ M @ STRAIGHT, STRAIGHT.T @ momentum)
+    return np.array([theta[1], omega[0], omega[1]])
