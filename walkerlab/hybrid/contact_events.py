@@ -371,8 +371,9 @@ def earliest_crossing(
 def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: bool) -> float:
     """Fraction at which a signal crosses to the other side of zero than it is known to be on.
 
-    At once if it is there already: the step before, which ended for another event, went past its zero.
+    At once if it is there already: the step before, which ended for another event, went past its zero, or on it.
     """
+    zero_at_start = zero_at_start or finder.values[signal, 0] == 0.0
     if side != NO_SIDE:
         beyond = zero_at_start or side * finder.values[signal, 0] < 0.0
         if zero_at_start:
