@@ -73,23 +73,6 @@ def hinged_state(system: Pinned, y: State) -> State:
 
 
 @by_type
-def feels_ground(system: Any, carried: bool, height: float) -> bool:
-    """Whether a foot's force law is at work."""
-
-
-@feels_ground.case(OnGround)
-def free_feels(system: OnGround, carried: bool, height: float) -> bool:
-    """A carried foot inside the ground does."""
-    return carried and height < 0.0
-
-
-@feels_ground.case(Pinned)
-def hinged_feels(system: Pinned, carried: bool, height: float) -> bool:
-    """The hinge carries the walker."""
-    return False
-
-
-@by_type
 def is_free(system: Any, foot: int) -> bool:
     """Whether a foot may touch and lift."""
 
@@ -342,7 +325,7 @@ def earliest_crossing(
         lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
-        inside = feels_ground(system, carried[foot] != 0, lowest)
+        inside = carried[foot] != 0 and lowest < 0.0
         last = joins(walker.friction) if inside and frame.locate_joins else RELEASE
         for index in range(first, first + last):
             if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
@@ -350,7 +333,7 @@ def earliest_crossing(
             at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
-        if foot == stance and sides[first + HEIGHT] < 0 and feels_ground(system, carried[foot] != 0, -1.0):
+        if foot == stance and sides[first + HEIGHT] < 0 and carried[foot] != 0:
             at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
                 best, signal = at, SLIDE

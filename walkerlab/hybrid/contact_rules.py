@@ -183,6 +183,9 @@ def touch(
     down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     """
     stance = ledger.feet[STANCE]
+    if foot != stance and ledger.at_zero[PASSING] != 0:
+        # it passes the other one at this instant, as equal hinged legs do: it has not been above the ground ahead
+        ledger.carried[foot] = carried_in_air(terrain, ledger.carried[foot] != 0, False, False)
     if ledger.carried[foot] == 0:
         return GOES_ON
     material = material_along(walker, foot, feet[foot].along, y)

@@ -68,10 +68,10 @@ def free_mode(system: OnGround, ledger: Ledger) -> OnGround:
 
 @in_mode.case(Pinned)
 def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
-    """The hinge does not ask for ground."""
-    walker = system.walker
+    """The other foot finds ground or not."""
+    walker, carried = system.walker, ledger.carried[1 - system.foot] != 0
     held, stops = held_flags(walker.held, walker.knees, ledger.knee), stop_flags(walker.knees, ledger.knee)
-    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops)
+    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops, carried)
 
 
 @by_type
