@@ -44,7 +44,8 @@ def test_compiled_walker_on_ground_moves_as_in_python(carried):
         check(OnGround(walker, carried), state)
 
 
-def test_compiled_hinged_walker_moves_as_in_python():
-    pinned = pinned_walker(compass_assembly(ground.parts()), ground.compass(), 1, 0.0)
+@pytest.mark.parametrize("carried", [False, True])
+def test_compiled_hinged_walker_moves_as_in_python(carried):
+    pinned = pinned_walker(compass_assembly(ground.parts()), ground.compass(), 1, 0.0)._replace(carried=carried)
     for state in states_on_ground(pinned.walker, 20):
         check(pinned, (*state[2:4], *state[6:]))

@@ -247,6 +247,22 @@ def walk(walker, y, steps, h, hinged):
     """Walk up to `steps` steps from y = (hip, angles, their velocities), foot 1 standing, `hinged` or not (-1).
 
     Returns outcome, steps, times and places of touches, slips, rolling, time and state at the end, times of knee locks.
+    The slip of the last step is taken where its foot lifts, after the end; it is left out if that foot does not.
+    """
+    end, leaving = np.zeros(1 + y.size), np.zeros(2, np.bool_)
+    found = walk_to_lift(walker, y, steps, h, hinged, end, leaving)
+    outcome, done, times, places, slips, rolled, t, y, locks = found
+    if done == steps:
+        outcome, t, y = WALKED, end[0], end[1:]
+    lifted = done - 1 if leaving.any() else done
+    return outcome, done, times, places, slips[:lifted], rolled[:lifted], t, y, locks
+
+
+@njit
+def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
+    """`walk` on to the lift of the foot of the last step; time and state at its touch into `end`.
+
+    leaving  (2,) which feet are still to lift from the step that they carried
     """
     knees = walker.knees.shape[0]
     tau = np.sqrt(walker.leg / walker.gravity)
@@ -255,7 +271,7 @@ def walk(walker, y, steps, h, hinged):
     stance, done, t, last, grounded_at, releasing = 1, 0, 0.0, 0.0, 0.0, False
     cells, left, carried = np.zeros(2, np.int64), np.zeros(2, np.int64), np.ones(2, np.bool_)
     foothold, touched = np.zeros(2), np.zeros(2)
-    stood, leaving, armed = np.zeros((2, 2)), np.zeros(2, np.bool_), np.zeros(max(knees, 1), np.bool_)
+    stood, armed = np.zeros((2, 2)), np.zeros(max(knees, 1), np.bool_)
     locked = np.zeros(knees, np.bool_)
     if knees:
         locked[1] = True
@@ -272,7 +288,7 @@ def walk(walker, y, steps, h, hinged):
         inside = climb <= 1e-12 if abs(height) < 1e-13 else height < 0.0
         side[3 * foot] = -1.0 if inside else 1.0
     side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
-    while done < steps:
+    while done < steps or leaving.any():
         both = side[0] < 0.0 and side[3] < 0.0 and carried[0] and carried[1] and hinged < 0
         aloft = grounded_at + 0.25 * tau - t
         dt = min(h / SHORTER if both else h, aloft)
@@ -394,6 +410,7 @@ def walk(walker, y, steps, h, hinged):
         times[done], places[done], slips[done], rolled[done] = t, along[foot], stood[other, 0], stood[other, 1]
         foothold[foot], touched[foot], left[foot] = along[foot], material(walker, foot, y), cells[foot]
         stance, last, done = foot, t, done + 1
+        end[0], end[1:] = t, y
         if walker.terrain == AFTER_MID_SWING and side[3 * other] > 0.0:
             carried[other] = (side[PASSING] > 0.0) == (other == 1)
         if knees:

@@ -1,5 +1,8 @@
 """Slip is what a foot's material moves; what a ball rolls is no slip."""
 
+from functools import partial
+
+import kneed_walks
 import numpy as np
 import pytest
 from contact_walks import FIXED_POINT, scene_of, walked
@@ -33,6 +36,32 @@ def test_a_round_foot_on_ground_like_glue_rolls_and_walks():
     assert np.all(np.abs(walk.slip_m) < 1e-3 * walk.rolling_m)
 
 
-def test_a_hinged_foot_neither_slips_nor_rolls():
+def test_a_hinged_foot_slips_and_rolls_from_its_release_to_its_lift_alone():
+    """The same foot free slips and rolls by half a millimetre."""
     walk = walked("contact.stance=pinned", steps=1)
-    assert walk.slip_m[0] == walk.rolling_m[0] == 0.0
+    assert 0.0 < abs(walk.slip_m[0]) < 1e-6
+    assert abs(walk.rolling_m[0]) < 1e-6
+
+
+@pytest.mark.parametrize("walked_of", [walked, partial(walked, "contact.stance=pinned"), kneed_walks.walked],
+                         ids=["compass", "hinged", "kneed"])  # fmt: skip
+@pytest.mark.parametrize("steps", [1, 2])
+def test_the_last_step_slips_and_rolls_as_it_does_in_a_longer_walk(walked_of, steps):
+    short, longer = walked_of(steps=steps), walked_of(steps=3)
+    np.testing.assert_allclose(short.slip_m, longer.slip_m[:steps], rtol=1e-9)
+    np.testing.assert_allclose(short.rolling_m, longer.rolling_m[:steps], rtol=1e-9)
+
+
+def test_a_walk_ends_at_its_last_touch_though_its_foot_lifts_later():
+    short, longer = walked(steps=2), walked(steps=3)
+    assert short.end_time_s == short.touch_time_s[-1] == longer.touch_time_s[1]
+    assert short.work[0] < longer.work[0]
+
+
+@pytest.mark.parametrize(("steps", "outcome"), [(1, Outcome.WALKED), (2, Outcome.BUDGET_EXHAUSTED)])
+def test_a_step_whose_foot_does_not_lift_has_no_slip(steps, outcome):
+    until_touch = int(walked(steps=1).work[0])
+    walk = walked(steps=steps, budget=until_touch + 10)
+    assert walk.outcome is outcome
+    assert walk.touch_time_s.size == 1
+    assert walk.slip_m.size == walk.rolling_m.size == 0

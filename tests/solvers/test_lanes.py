@@ -4,24 +4,22 @@ import math
 
 import numpy as np
 import pytest
-from compass_parts import CompassParts, compass_assembly
 
-from walkerlab.ground.compliant import contact_walker, pinned_walker
-from walkerlab.ground.friction import Frictionless
-from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.kernels import kernel
 from walkerlab.mechanics.fused import fused
+from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Mode
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.mechanics.tuples import put
+from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes
-from walkerlab.solvers.system import derivative
+from walkerlab.solvers.lanes import WIDTH, any_positive, choose, in_lanes, load_lanes, nearest, store_lanes
+from walkerlab.solvers.system import blank, derivative
 
 MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))
 WALKER = Mode(MODEL, MODEL.bent)
-PARTS = compass_assembly(CompassParts(1.0, 0.4, 5.0, 10.0, 0.1, 0.05))
-FREE = contact_walker(PARTS, NormalLaw(1e8, 2.2, 1e4, 1e-4), Frictionless(), 9.81, 0.05)
-HINGED = pinned_walker(PARTS, FREE, 1, 0.0)
+KNEED = standing(kneed_legs(Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5, Arc(0.2)), 9.81, 0.05)
+BENT = Mode(KNEED, KNEED.bent)
 
 
 @kernel
@@ -44,8 +42,11 @@ def sines(x, out):
 
 @kernel
 def rates(system, y, out):
-    rate = derivative(system, 0.0, (load_lanes(y, 0), load_lanes(y, 1), load_lanes(y, 2), load_lanes(y, 3)))
-    for i in range(4):
+    state = in_lanes(blank(system))
+    for i in range(len(state)):
+        state = put(state, i, load_lanes(y, i))
+    rate = derivative(system, 0.0, state)
+    for i in range(len(state)):
         store_lanes(rate[i], out, i)
 
 
@@ -87,10 +88,10 @@ def test_a_lane_does_not_feel_its_neighbours():
     assert (alone[:, 0] == beside[:, 0]).all()
 
 
-@pytest.mark.parametrize("system", [WALKER, HINGED], ids=["closed form", "tree of parts"])
+@pytest.mark.parametrize("system", [WALKER, BENT], ids=["straight legs", "knees"])
 def test_equations_of_motion_are_those_of_a_walker_alone(system):
-    y = np.random.default_rng(2).uniform(-2.0, 2.0, (4, WIDTH))
-    out = np.zeros((4, WIDTH))
+    y = np.random.default_rng(2).uniform(-2.0, 2.0, (len(blank(system)), WIDTH))
+    out = np.zeros(y.shape)
     rates(system, y, out)
 
     @kernel

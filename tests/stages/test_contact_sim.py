@@ -184,7 +184,7 @@ def test_a_walk_that_ends_before_its_first_step_is_an_answer_that_can_be_stored(
     assert summary["steps"] == 0
     assert summary["rolling_per_step_m"] is None
     assert summary["step_periods_s"] == []
-    assert summary["slip_per_step_m"] == 0.0
+    assert summary["slip_per_step_m"] is summary["rolling_per_step_m"] is None
     assert len(summary["advice"]) > 20
     artifact.write(tmp_path / "walk.h5", content, Identity("contact-sim", {}, {}, "code"), begin(Config(), {}))
     back = artifact.read(tmp_path / "walk.h5")
@@ -214,6 +214,30 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch)
     assert 0 < partial.summary["steps"] < 10
     assert partial["steps"]["period_s"].size == partial.summary["steps"]
     assert "rtol" in caught.value.advice
+
+
+def test_a_step_whose_foot_did_not_lift_has_a_gap_and_is_not_in_the_mean(monkeypatch):
+    whole = run("strides=1")
+    # ten more right-hand sides than to the last touch, of hundreds to the lift
+    monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", whole.summary["rhs_evaluations"] // 2 + 5)
+    cut = run("strides=1")
+    first = whole.summary["slips_m"][0]
+    assert cut.summary["outcome"] == "walked"
+    assert (cut.summary["slips_m"], cut.summary["slip_per_step_m"]) == ([first], first)
+    assert len(cut.summary["rolling_m"]) == 1
+    np.testing.assert_array_equal(cut["steps"]["slip_m"], [first, np.nan])
+    assert np.isfinite(cut["steps"]["touch_time_s"]).all()
+
+
+def test_a_hinged_walk_that_scuffs_feels_the_ground_and_its_energy_balances():
+    """The rigid gait on 3 degrees: pulled down by its scuffing foot it falls before its first step."""
+    gait = Content({}, {"state": [-0.3233886, 0.2186688, -0.3773739, -1.0923836], "step_length_m": 0.5354454})
+    scuffing = ("contact.stance=pinned", "contact.terrain=plane", "slope_deg=3")
+    content = run(*scuffing, inputs=(("fixedpoint", gait),))
+    assert (content.summary["outcome"], content.summary["steps"]) == ("fell", 0)
+    assert content.summary["end_time_s"] == pytest.approx(1.454326, abs=2e-6)
+    assert content.summary["energy_balance_residual_J"] < 1e-6
+    assert content["trajectory"]["normal_force_N"][:, 0].max() > 100.0
 
 
 @pytest.mark.parametrize(("atol", "told"), [("1e-7", True), ("1e-9", False)])

@@ -11,7 +11,7 @@ from typing import Any
 from walkerlab.cli.text import aligned, described_summary, paragraph
 from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.report.gait_diagram import parameter
-from walkerlab.report.numbers import count, fixed, length, listed, number, quantity, told_apart
+from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity, told_apart
 from walkerlab.report.outcomes import LOOKED_FORWARD_TO, MODELS, ends, walks
 from walkerlab.report.sections.basin import shares
 from walkerlab.report.sections.families import findings as families
@@ -122,7 +122,8 @@ def walk(model: str, summary: Summary) -> list[str | Rows]:
         if values:
             rows.append([words, *elided([fixed(value, 4) for value in values]), unit])
     if summary.get("slips_m"):
-        rows.append(["slip", *elided([fixed(1e3 * value, 2) for value in summary["slips_m"]]), "mm"])
+        slips = [fixed(1e3 * value, 2) for value in summary["slips_m"]]
+        rows.append(["slip", *elided([*slips, *[NONE] * (steps - len(slips))]), "mm"])
     own = [[words, said] for words, said in walk_measures(summary) if said]
     advised = summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO
     return [f"{head}.", rows, own, f"advice: {summary['advice']}" if advised else ""]

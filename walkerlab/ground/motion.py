@@ -81,26 +81,31 @@ def on_ground_derivative(system: OnGround, t: float, y: State) -> State:
 
 
 @inlined
-def ground_gradients(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
+def ground_gradients(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State, first: int, J: Any) -> None:
+    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them.
+
+    first  where the angles begin in J's own state: after the root's two coordinates, or at once if the root is fixed
+    """
     motion = foot_motion(walker, foot, s, c, y)
     if motion.height >= 0.0:
         return
     force = foot_force(walker, motion)
-    n = len(s)
-    for j in range(4 + 2 * n):
+    n, size = len(s), J.shape[0]
+    for j in range(size):
+        place = j + (2 - first if j < first + n else 4 - 2 * first)  # in the free walker's state
         # how penetration, its rate and the slip change along coordinate or velocity j
-        deeper, deeper_rate, faster = motion_gradient(foot, s, c, y, j)
+        deeper, deeper_rate, faster = motion_gradient(foot, s, c, y, place)
         normal = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
         along = force.coefficient * normal + force.by_slip * faster
-        J[2 + n, j] += along
-        J[3 + n, j] += normal
+        if first > 0:
+            J[2 + n, j] += along
+            J[3 + n, j] += normal
         for k in range(n):
             forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
             upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
-            J[4 + n + k, j] += along * (foot.rolling[k] - upward) + normal * forward
-            if j == 2 + k:
-                J[4 + n + k, j] -= force.along * forward + force.normal.force * upward
+            J[size - n + k, j] += along * (foot.rolling[k] - upward) + normal * forward
+            if place == 2 + k:
+                J[size - n + k, j] -= force.along * forward + force.normal.force * upward
 
 
 @inlined
@@ -135,9 +140,9 @@ def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
             J[i, j] = 1.0 if j == i + 2 + n else 0.0
     s, c = sines_cosines(tree, y, 2, walker.slope)
     if system.carried[0]:
-        ground_gradients(walker, walker.feet[0], s, c, y, J)
+        ground_gradients(walker, walker.feet[0], s, c, y, 2, J)
     if system.carried[1]:
-        ground_gradients(walker, walker.feet[1], s, c, y, J)
+        ground_gradients(walker, walker.feet[1], s, c, y, 2, J)
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, 4 + n, all_wrenches(system, s, c, y)[2])
     torques = knee_torques(walker.knees, system.stops, y, 2, torques)

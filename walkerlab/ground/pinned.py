@@ -7,7 +7,8 @@ ground while the leg turns over it.
 from typing import Any, NamedTuple
 
 from walkerlab.ground.held import divide_by_held_mass, knee_gradients, knee_torques, turned_by
-from walkerlab.ground.walker import ContactWalker
+from walkerlab.ground.motion import ground_gradients, ground_wrench
+from walkerlab.ground.walker import ContactWalker, Foot
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.tree import (
     Tree,
@@ -30,6 +31,7 @@ class Pinned(NamedTuple):
     blank: State
     held: tuple[bool, ...] = ()  # as of OnGround
     stops: tuple[bool, ...] = ()
+    carried: bool = False  # whether there is ground under the other foot
 
 
 @blank.case(Pinned)
@@ -50,13 +52,46 @@ def gravity_torques(system: Pinned, s: Vector, c: Vector) -> Vector:
     return torques
 
 
+@inlined
+def swing_foot(system: Pinned) -> Foot:
+    """The other foot, its levers from the hinge."""
+    hinged, foot = system.walker.feet[system.foot], system.walker.feet[1 - system.foot]
+    lever_x, lever_y = foot.lever_x, foot.lever_y
+    for k in range(len(lever_x)):
+        lever_x = put(lever_x, k, lever_x[k] - hinged.lever_x[k])
+        lever_y = put(lever_y, k, lever_y[k] - hinged.lever_y[k])
+    return Foot(lever_x, lever_y, foot.rolling, foot.radius)
+
+
+@inlined
+def rooted_state(system: Pinned, y: State) -> State:
+    """The free walker's state with the hinge in the place of the centre of mass: what `swing_foot` moves by."""
+    walker = system.walker
+    n = len(system.tree.arm_x)
+    full = put(put(walker.blank, 0, system.along), 1, walker.feet[system.foot].radius)
+    for k in range(n):
+        full = put(full, 2 + k, y[k])
+        full = put(full, 4 + n + k, y[n + k])
+    return full
+
+
+@inlined
+def outer_torques(system: Pinned, s: Vector, c: Vector, y: State) -> Vector:
+    """Torques on the bodies about the hinge (N m) of gravity and of the ground under the other foot."""
+    torques = gravity_torques(system, s, c)
+    if system.carried:
+        rooted = rooted_state(system, y)
+        torques = ground_wrench(system.walker, swing_foot(system), s, c, rooted, (0.0, 0.0, torques))[2]
+    return torques
+
+
 @derivative.case(Pinned)
 def pinned_derivative(system: Pinned, t: float, y: State) -> State:
     """The tree's equations about the hinge."""
     tree = system.tree
     n = len(tree.arm_x)
     s, c = sines_cosines(tree, y, 0, system.walker.slope)
-    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    torques = with_centrifugal(tree, s, c, y, n, outer_torques(system, s, c, y))
     torques = knee_torques(system.walker.knees, system.stops, y, 0, torques)
     alpha = turned_by(system.walker.held, system.held, mass_matrix(tree, s, c), torques)
     rate = system.blank
@@ -79,8 +114,10 @@ def pinned_jacobian(system: Pinned, t: float, y: State, J: Any) -> None:
         forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
         upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
         J[n + k, k] = walker.gravity_down * upward - walker.gravity_along * forward
+    if system.carried:
+        ground_gradients(walker, swing_foot(system), s, c, rooted_state(system, y), 0, J)
     M = mass_matrix(tree, s, c)
-    torques = with_centrifugal(tree, s, c, y, n, gravity_torques(system, s, c))
+    torques = with_centrifugal(tree, s, c, y, n, outer_torques(system, s, c, y))
     torques = knee_torques(walker.knees, system.stops, y, 0, torques)
     knee_gradients(walker.knees, system.stops, y, 0, J)
     tree_gradients(tree, s, c, y, 0, turned_by(walker.held, system.held, M, torques), J)

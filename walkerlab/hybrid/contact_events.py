@@ -73,23 +73,6 @@ def hinged_state(system: Pinned, y: State) -> State:
 
 
 @by_type
-def feels_ground(system: Any, carried: bool, height: float) -> bool:
-    """Whether a foot's force law is at work."""
-
-
-@feels_ground.case(OnGround)
-def free_feels(system: OnGround, carried: bool, height: float) -> bool:
-    """A carried foot inside the ground does."""
-    return carried and height < 0.0
-
-
-@feels_ground.case(Pinned)
-def hinged_feels(system: Pinned, carried: bool, height: float) -> bool:
-    """The hinge carries the walker."""
-    return False
-
-
-@by_type
 def is_free(system: Any, foot: int) -> bool:
     """Whether a foot may touch and lift."""
 
@@ -305,7 +288,7 @@ def earliest_crossing(
         lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
-        inside = feels_ground(system, carried[foot] != 0, lowest)
+        inside = carried[foot] != 0 and lowest < 0.0
         last = RELEASE
         if inside and frame.locate_joins:
             last = FRICTION_SWITCHES + switching_count(walker.friction)
@@ -315,7 +298,7 @@ def earliest_crossing(
             at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, signal = at, index
-        if foot == stance and sides[first + HEIGHT] < 0 and feels_ground(system, carried[foot] != 0, -1.0):
+        if foot == stance and sides[first + HEIGHT] < 0 and carried[foot] != 0:
             at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
                 best, signal = at, SLIDE
@@ -336,8 +319,9 @@ def earliest_crossing(
 def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: bool) -> float:
     """Fraction at which a signal crosses to the other side of zero than it is known to be on.
 
-    At once if it is there already: the step before, which ended for another event, went past its zero.
+    At once if it is there already: the step before, which ended for another event, went past its zero, or on it.
     """
+    zero_at_start = zero_at_start or finder.values[signal, 0] == 0.0
     if side != NO_SIDE:
         beyond = zero_at_start or side * finder.values[signal, 0] < 0.0
         if zero_at_start:

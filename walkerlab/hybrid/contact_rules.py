@@ -60,7 +60,7 @@ class Ledger(NamedTuple):
 
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
-    slip: Any  # (steps,) m, net slip of the stance foot of each step
+    slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
     rolling: Any  # (steps,) m, how far it rolled
     carried: Any  # (2,) whether there is ground under a foot
     cells: Any  # (2,) which cell of its lane a foot is over
@@ -71,7 +71,7 @@ class Ledger(NamedTuple):
     leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
     knee: Any  # (2,) what each knee is doing
     releasing: Any  # (1,) whether the trailing knee is still to be released
-    knee_strike: Any  # (steps,) s, when the knee of the step's swing leg locked; -1 if it has not
+    knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
     sides: Any  # (signals,) on which side of zero each signal is known to be
     at_zero: Any  # (signals,) which signals the last event left at zero
     times: Any  # (2,) see the indices above
@@ -129,6 +129,17 @@ def is_above(ledger: Ledger, foot: int) -> bool:
 
 
 @inlined
+def is_to_lift(ledger: Ledger) -> bool:
+    """Whether the foot that carried the last step is still to lift from it."""
+    return ledger.leaving[1 - ledger.feet[STANCE]] != 0
+
+
+def steps_with_lift(ledger: Ledger) -> int:
+    """How many steps have a slip and a rolling, which end where their foot lifts: all, or all but the last."""
+    return int(ledger.feet[STEPS]) - int(is_to_lift(ledger))
+
+
+@inlined
 def is_ahead(ledger: Ledger, foot: int) -> bool:
     """Whether a foot is further along than the other; known where the order of the feet is watched."""
     return (ledger.sides[PASSING] > 0) == (foot == 1)
@@ -183,6 +194,9 @@ def touch(
     down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     """
     stance = ledger.feet[STANCE]
+    if foot != stance and ledger.at_zero[PASSING] != 0:
+        # it passes the other one at this instant, as equal hinged legs do: it has not been above the ground ahead
+        ledger.carried[foot] = carried_in_air(terrain, ledger.carried[foot] != 0, False, False)
     if ledger.carried[foot] == 0:
         return GOES_ON
     material = material_along(walker, foot, feet[foot].along, y)

@@ -40,9 +40,9 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
 from walkerlab.hybrid.contact_phases import method_by_knees, walk_by_knees
-from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger
+from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger, steps_with_lift
 from walkerlab.hybrid.contact_tangent import Tangent, new_tangent
-from walkerlab.hybrid.contact_walk import walk_part
+from walkerlab.hybrid.contact_walk import AT_LIFT, walk_part
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import kernel, uncompiled
 from walkerlab.solvers.events import CrossingFinder
@@ -110,7 +110,8 @@ def walk_free(
 ) -> int:
     """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends.
 
-    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
+    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other; with
+    AT_LIFT a walk whose ledger is full goes on until the foot that carried its last step has lifted.
     """
     terrain, frame = ground.terrain, ground.frame
     return walk_by_knees(
@@ -179,8 +180,8 @@ class ContactWalkResult:
     outcome: Outcome
     touch_time_s: Floats  # (steps,)
     touch_along_m: Floats  # (steps,)
-    slip_m: Floats  # (steps,) of the stance foot's material
-    rolling_m: Floats  # (steps,) how far the stance foot rolled
+    slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
+    rolling_m: Floats  # likewise, how far the stance foot rolled
     end_time_s: float
     end_state: State
     max_penetration_m: float
@@ -223,7 +224,7 @@ def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: 
         stood=np.zeros((2, 2)),
         knee=knees_at_start(walker, stance, y),
         releasing=np.zeros(1, np.int8),
-        knee_strike=np.full(steps, -1.0),
+        knee_strike=np.full(steps + 1, -1.0),
         leaving=np.zeros(2, np.int8),
         sides=sides,
         at_zero=at_zero,
@@ -361,7 +362,10 @@ def run_parts(
     observer: ContactObserver,
     ledger: Ledger,
 ) -> tuple[Outcome, Stopped]:
-    """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped."""
+    """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped.
+
+    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
+    """
     t, y = 0.0, start
     spent = np.zeros(4, np.int64)
     if pinned is not None:
@@ -373,13 +377,18 @@ def run_parts(
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
         release_hinge(walker, pinned.foot, ledger, y)
-        if outcome is not Outcome.WALKED or ledger.feet[STEPS] == ledger.touch_time.size:
+        if outcome is not Outcome.WALKED:
             return outcome, Stopped(t, y, spent)
     method = methods.of(walker)
     ledger.times[AIRBORNE_SINCE] = t
     free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
-    outcome = Outcome(free_walk(walker, ground, method, finder_for(method, SIGNALS), observer, ledger, t, y, NEVER))
-    return outcome, Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+    finder = finder_for(method, SIGNALS)
+    outcome = Outcome(free_walk(walker, ground, method, finder, observer, ledger, t, y, NEVER))
+    stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
+    if outcome is Outcome.WALKED:
+        unseen = new_observer(walker, ledger, stopped.state)
+        free_walk(walker, ground, method, finder, unseen, ledger, stopped.time_s, stopped.state, AT_LIFT)
+    return outcome, stopped
 
 
 def by_channel(walker: ContactWalker, books: Floats) -> dict[str, float]:
@@ -389,7 +398,7 @@ def by_channel(walker: ContactWalker, books: Floats) -> dict[str, float]:
 
 
 def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) -> None:
-    """A hinged foot has neither slipped nor rolled; it is on the ground, about to leave."""
+    """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
     steps = ledger.feet[STEPS]
     ledger.slip[:steps], ledger.rolling[:steps] = 0.0, 0.0
     ledger.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
@@ -401,7 +410,7 @@ def gather(
     outcome: Outcome, stopped: Stopped, ledger: Ledger, observer: ContactObserver, walker: ContactWalker
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
-    done, seen = int(ledger.feet[STEPS]), int(observer.recorded[0])
+    done, lifted, seen = int(ledger.feet[STEPS]), steps_with_lift(ledger), int(observer.recorded[0])
     samples = None
     if observer.times.size:
         samples = ContactSamples(
@@ -416,8 +425,8 @@ def gather(
         outcome,
         ledger.touch_time[:done],
         ledger.touch_along[:done],
-        ledger.slip[:done],
-        ledger.rolling[:done],
+        ledger.slip[:lifted],
+        ledger.rolling[:lifted],
         stopped.time_s,
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),

@@ -22,6 +22,7 @@ from walkerlab.hybrid.contact_rules import (
     Ledger,
     happen,
     is_above,
+    is_to_lift,
     note_flexion,
 )
 from walkerlab.hybrid.contact_scan import Feet, Scene, scan
@@ -42,6 +43,7 @@ from walkerlab.solvers.stepping import (
 )
 from walkerlab.solvers.system import State
 
+AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
 EVENT_TIME = 1e-12  # s, how exactly an event is located
@@ -68,10 +70,10 @@ def free_mode(system: OnGround, ledger: Ledger) -> OnGround:
 
 @in_mode.case(Pinned)
 def hinged_mode(system: Pinned, ledger: Ledger) -> Pinned:
-    """The hinge does not ask for ground."""
-    walker = system.walker
+    """The other foot finds ground or not."""
+    walker, carried = system.walker, ledger.carried[1 - system.foot] != 0
     held, stops = held_flags(walker.held, walker.knees, ledger.knee), stop_flags(walker.knees, ledger.knee)
-    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops)
+    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops, carried)
 
 
 @by_type
@@ -107,7 +109,8 @@ def walk_part(
 ) -> int:
     """Walk from state y at time t (s) until the ledger is full, the hinge is released, or the walk ends.
 
-    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other.
+    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other; with
+    AT_LIFT a walk whose ledger is full goes on until the foot that carried its last step has lifted.
 
     Returns the outcome's number, or GOES_ON if the walker has to go on with other bodies; the method stands at the end.
     """
@@ -127,7 +130,7 @@ def walk_part(
         ledger.knee,
         ledger.releasing,
     )
-    while ledger.feet[STEPS] < ledger.touch_time.size:
+    while ledger.feet[STEPS] < ledger.touch_time.size or (stop_passing_after == AT_LIFT and is_to_lift(ledger)):
         status = advance(method, mode, target)
         if status != STEP_DONE:
             return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED

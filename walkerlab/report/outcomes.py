@@ -118,8 +118,9 @@ def lift(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
 
 def slide(_config: RigidConfig, summary: Mapping[str, Any]) -> list[str]:
     """How far it slid, and how far it may."""
-    pitch = summary.get("pitch_m")
-    slips = summary.get("slips_m") or [summary.get("slip_per_step_m", 0.0)]
+    pitch, slips = summary.get("pitch_m"), summary.get("slips_m")
+    if not slips:
+        return []
     worst = max(slips, key=abs)
     allowed = "" if pitch is None else f", the limit is a quarter of the pitch, {length(0.25 * pitch)}"
     return [f"The largest net slip of a completed step was {length(worst)}{allowed}."]

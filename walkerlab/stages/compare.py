@@ -92,7 +92,7 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
     summary = {
         "steps": {
             "rigid": last_step(rigid),
-            "contact": {**last_step(contact), "slip_m": float(contact["slip_per_step_m"])},
+            "contact": {**last_step(contact), "slip_m": contact["slip_per_step_m"]},
             "gait": {
                 "period_s": gait.get("period_s"),
                 "length_m": gait.get("step_length_m"),

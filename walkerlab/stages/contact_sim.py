@@ -139,7 +139,6 @@ def own_pitch(config: ContactConfig, rigid_step: float, rigid_state: tuple[float
 
 def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
     """What the command prints."""
-    slips = result.slip_m
     return {
         "outcome": result.outcome.label,
         "advice": result.outcome.advice,
@@ -148,9 +147,9 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         "step_lengths_m": result.lengths_m.tolist(),
         "end_time_s": result.end_time_s,
         "max_penetration_m": result.max_penetration_m,
-        "slip_per_step_m": float(np.mean(slips)) if slips.size else 0.0,
-        "slips_m": slips.tolist(),
-        "rolling_per_step_m": float(np.mean(result.rolling_m)) if slips.size else None,
+        "slip_per_step_m": mean_of(result.slip_m),
+        "slips_m": result.slip_m.tolist(),
+        "rolling_per_step_m": mean_of(result.rolling_m),
         "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, result.dissipated_J),
@@ -163,6 +162,11 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         **scene_measures(scene),
         "left_out": list(of_contact_walk(config)),
     }
+
+
+def mean_of(values: Floats) -> float | None:
+    """The mean of a number of each step; None of no step."""
+    return float(np.mean(values)) if values.size else None
 
 
 def knee_times(result: ContactWalkResult) -> dict[str, Any]:
@@ -186,10 +190,15 @@ def steps_group(result: ContactWalkResult) -> Group:
         ("period_s", result.periods_s, "s", "time from touch to touch"),
         ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
         ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
-        ("slip_m", result.slip_m, "m", "net slip of the stance foot's material from its touch to its lift"),
-        ("rolling_m", result.rolling_m, "m", "how far the stance foot rolled from its touch to its lift"),
+    )
+    to_lift = (
+        ("slip_m", result.slip_m, "net slip of the stance foot's material from its touch to its lift"),
+        ("rolling_m", result.rolling_m, "how far the stance foot rolled from its touch to its lift"),
     )
     variables = {name: Variable(values, (STEP,), units, text) for name, values, units, text in rows}
+    for name, values, text in to_lift:
+        gap = np.full(result.touch_time_s.size - values.size, np.nan)
+        variables[name] = Variable(np.append(values, gap), (STEP,), "m", text, missing=True)
     return Group(touches(result.touch_time_s) | variables)
 
 

@@ -189,11 +189,15 @@ def same_law_row(
 
 
 def last_step(answer: WalkAnswer) -> tuple[float | None, float | None, float | None]:
-    """Period (s), length (m) and slip (m) of the last step; of less than two steps there are none."""
+    """Period (s), length (m) and slip (m) of the last step; of less than two steps there are none.
+
+    There is no slip either where its foot did not lift.
+    """
     if answer.touches_s.size < 2:
         return None, None, None
     period, length = np.diff(answer.touches_s)[-1], np.diff(answer.along_m)[-1]
-    return float(period), float(length), float(answer.slips_m[-1])
+    slip = float(answer.slips_m[-1]) if answer.slips_m.size == answer.touches_s.size else None
+    return float(period), float(length), slip
 
 
 def lost_row(

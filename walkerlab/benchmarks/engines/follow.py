@@ -37,6 +37,7 @@ from walkerlab.hybrid.contact_rules import (
     STANCE,
     STEPS,
     Ledger,
+    is_to_lift,
     knee_stops,
     lift,
     pass_by,
@@ -128,7 +129,7 @@ class Follower:
                 lift(walker, terrain, ledger, there, foot, y)
             else:
                 self._end(touch(walker, terrain, ledger, there, foot, self.time_s + share * h, y))
-        if ledger.feet[STEPS] == ledger.touch_time.size:
+        if ledger.feet[STEPS] == ledger.touch_time.size and not is_to_lift(ledger):
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: Feet) -> Turn | None:

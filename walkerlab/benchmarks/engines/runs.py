@@ -23,7 +23,7 @@ from walkerlab.benchmarks.engines.planar import (
 )
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
-from walkerlab.hybrid.contact_rules import STEPS
+from walkerlab.hybrid.contact_rules import STEPS, steps_with_lift
 from walkerlab.hybrid.outcome import Outcome
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ class WalkAnswer:
     """A walk in an engine.
 
     end      state of the free walker when it was over; None if it ended otherwise
-    touches  (steps,) s; along: (steps,) m; slips: (steps,) m
+    touches  (steps,) s; along: (steps,) m; slips: (steps,) m, without the last step if its foot did not lift
     steps    of the engine
     time_s   when it was over
     wall_s   processor time of its loop: it has a process of its own, and others may be running
@@ -85,7 +85,7 @@ class WalkTask:
             rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None,
             ledger.touch_time[:done].copy(),
             ledger.touch_along[:done].copy(),
-            ledger.slip[:done].copy(),
+            ledger.slip[: steps_with_lift(ledger)].copy(),
             walk.steps,
             walk.time_s,
             walk.wall_s,

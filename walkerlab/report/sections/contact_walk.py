@@ -35,11 +35,9 @@ def section(results: Results) -> Section | None:
 def finding(results: Results, summary: Mapping[str, Any]) -> str:
     """How far it walked and slipped, and how well its energy balances."""
     asked = 2 * results.config.strides
-    residual = residual_in_words(summary["energy_balance_residual_J"])
-    return (
-        f"{summary['steps']} of {asked} steps; the stance foot slips {length(summary.get('slip_per_step_m'))} a step, "
-        f"and the energy balances to {residual} J."
-    )
+    residual, slip = residual_in_words(summary["energy_balance_residual_J"]), summary.get("slip_per_step_m")
+    slips = "" if slip is None else f"the stance foot slips {length(slip)} a step, and "
+    return f"{summary['steps']} of {asked} steps; {slips}the energy balances to {residual} J."
 
 
 def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:

@@ -106,11 +106,12 @@ def departure(results: Results) -> str:
 def last_step_in_words(steps: Mapping[str, Mapping[str, Any]]) -> str:
     """The contact model's last step against the gait's, and its slip."""
     walk, gait = steps["contact"], steps["gait"]
+    slips = "" if walk["slip_m"] is None else f"; its stance foot slips {length(walk['slip_m'])} a step on average"
     return (
         f"The contact model's last step takes {quantity(walk['period_s'], 's')} and is "
         f"{quantity(walk['length_m'], 'm')} long, {percent(walk['period_s'], gait['period_s'])} and "
         f"{percent(walk['length_m'], gait['length_m'])} against the rigid gait's {quantity(gait['period_s'], 's')} and "
-        f"{quantity(gait['length_m'], 'm')}; its stance foot slips {length(walk['slip_m'])} a step on average."
+        f"{quantity(gait['length_m'], 'm')}{slips}."
     )
 
 
