@@ -174,7 +174,7 @@ def reductions() -> list[Reduction]:
             "dissipation: the energy's books",
             "kept along the walk",
             works=(partial(with_books, True), partial(with_books, False)),
-            note="contact-sim keeps them, whose summary says how well they balance; searches and maps do without",
+            note="contact-sim keeps them, and so do searches and maps: a walk that does not balance is no answer",
         ),
         Reduction("matplotlib: nothing is drawn", "a command that draws", imports=(drawing, walking)),
         Reduction(

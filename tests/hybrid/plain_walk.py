@@ -1,9 +1,9 @@
 """Walking on compliant ground as one would write it in an afternoon: the rules of docs/theory.md, and nothing else.
 
 Masses on levers from the hip, Newton's equations with multipliers for whatever is held, Runge-Kutta's classical method
-with one small step for everything, a smaller one with both feet in the ground, events by halving that step. It knows
-nothing of the package: what the two agree on is in the rules. Angles are absolute, from the vertical; positions are
-along and over the slope.
+with one step for everything, shorter the faster the ground reacts, events by halving that step. It knows nothing of the
+package: what the two agree on is in the rules. Angles are absolute, from the vertical; positions are along and over the
+slope. A state is (hip, angles, their velocities, work lost to damping, work lost to friction).
 """
 
 from typing import NamedTuple
@@ -18,9 +18,10 @@ PASSING, FALL, SLIDE, KNEES, SINKING, EVENTS = 6, 7, 8, 9, 11, 12
 ARMED = 0.01  # rad of flexion from which on a knee locks
 ROUNDING = 1e-12  # s, m
 HALVINGS = 60
-# so many times shorter are steps with both feet in the ground: friction holds a foot below a light, unlocked shank at
-# rates of 1e6/s and more while the other strikes
-SHORTER = 8.0
+REACTION = 2e-4  # s; where the ground reacts at a rate r (1/s) a step is 1 + r * REACTION times shorter
+CHANNELS = ("damping", "friction", "edges", "knee strikes")  # what work is lost to
+DAMPING, FRICTION, EDGES, KNEE_STRIKES = 0, 1, 2, 3
+STEPS, SLIPS, LOCKS, ROUNDS = 0, 1, 2, 3  # counts of a diary
 
 
 class Plain(NamedTuple):
@@ -47,6 +48,34 @@ class Plain(NamedTuple):
     terrain: int
     pitch: float
     release_at_touch: bool
+
+
+class Walked(NamedTuple):
+    """A walk: its steps, and how and where it ended."""
+
+    outcome: int
+    times: np.ndarray  # (steps,) s of touches
+    places: np.ndarray  # (steps,) m
+    slips: np.ndarray  # (steps,) m, or one fewer where the last foot did not lift
+    rolled: np.ndarray  # likewise
+    locks: np.ndarray  # s, of knees
+    end_s: float
+    end: np.ndarray
+    ground: np.ndarray  # (2,) whether each foot had ground there
+    lost: np.ndarray  # (4,) J
+    rounds: int  # steps of the method
+
+
+class Diary(NamedTuple):
+    """What is written on the way."""
+
+    times: np.ndarray
+    places: np.ndarray
+    slips: np.ndarray
+    rolled: np.ndarray
+    locks: np.ndarray
+    counts: np.ndarray  # steps, slips known, locks, steps of the method
+    lost: np.ndarray  # J at edges and knees' strikes
 
 
 def straight_legs(leg, foot_to_mass, leg_mass, hip_mass, radius, inertia=0.0):
@@ -165,11 +194,13 @@ def rate(walker, y, hinged, locked, carried):
     """dy/dt."""
     n = walker.inertias.size
     A, b = matrices(walker, y, hinged, locked)
+    dy = np.zeros_like(y)
     for foot in range(2):
         _, h, slip, climb, _ = foot_at(walker, foot, y)
         if h < 0.0 and carried[foot] and foot != hinged:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
-            normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * climb)
+            spring = walker.stiffness * (-h) ** walker.exponent
+            normal = max(0.0, spring - c * climb)
             if abs(slip) < walker.stiction:
                 mu = -cubic(slip, -walker.stiction, -walker.static, walker.stiction, walker.static)
             else:
@@ -181,10 +212,35 @@ def rate(walker, y, hinged, locked, carried):
                 rx, rh = turned(walker, walker.foot_levers[foot], y, k)
                 b[2 + k] += rx * normal - rh * push
             b[2 + walker.foot_bodies[foot]] += walker.radius * push
-    dy = np.zeros_like(y)
-    dy[: 2 + n] = y[2 + n :]
-    dy[2 + n :] = solve(A, b)[: 2 + n]
+            dy[4 + 2 * n + DAMPING] += (spring - normal) * climb
+            dy[4 + 2 * n + FRICTION] -= push * slip
+    dy[: 2 + n] = y[2 + n : 4 + 2 * n]
+    dy[2 + n : 4 + 2 * n] = solve(A, b)[: 2 + n]
     return dy
+
+
+@njit
+def reaction(walker, y, hinged, locked, carried):
+    """How fast (1/s) the ground reacts to a foot's velocity, and a foot crosses the depth where damping sets in."""
+    n, fastest = walker.inertias.size, 0.0
+    for foot in range(2):
+        _, h, _, climb, _ = foot_at(walker, foot, y)
+        if h < 0.0 and carried[foot] and foot != hinged:
+            c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
+            normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * climb)
+            gives, (A, J) = np.zeros(2), matrices(walker, y, hinged, locked)
+            for axis in range(2):
+                J[:] = 0.0
+                J[axis] = 1.0
+                for k in range(n):
+                    rx, rh = turned(walker, walker.foot_levers[foot], y, k)
+                    J[2 + k] = rx if axis == 1 else -rh
+                if axis == 0:
+                    J[2 + walker.foot_bodies[foot]] += walker.radius
+                gives[axis] = J @ solve(A.copy(), J.copy())
+            grip = 1.5 * walker.static * normal / walker.stiction
+            fastest = max(fastest, grip * gives[0], c * gives[1], abs(climb) / walker.full)
+    return fastest
 
 
 @njit
@@ -203,10 +259,37 @@ def struck(walker, y, hinged, locked):
     n = walker.inertias.size
     A, b = matrices(walker, y, hinged, locked)
     b[:] = 0.0
-    b[: 2 + n] = np.ascontiguousarray(A[: 2 + n, : 2 + n]) @ y[2 + n :]
+    b[: 2 + n] = np.ascontiguousarray(A[: 2 + n, : 2 + n]) @ y[2 + n : 4 + 2 * n]
     after = y.copy()
-    after[2 + n :] = solve(A, b)[: 2 + n]
+    after[2 + n : 4 + 2 * n] = solve(A, b)[: 2 + n]
     return after
+
+
+@njit
+def stored(walker, foot, y):
+    """Energy (J) in the ground under a foot."""
+    depth = max(0.0, -foot_at(walker, foot, y)[1])
+    return walker.stiffness * depth ** (walker.exponent + 1.0) / (walker.exponent + 1.0)
+
+
+@njit
+def energy(walker, y, carried):
+    """Energy (J) of motion, of weight over the slope's first foothold, and in the ground."""
+    n = walker.inertias.size
+    total = 0.0
+    for i in range(walker.masses.size):
+        x, h, v, w = y[0], y[1], y[2 + n], y[3 + n]
+        for k in range(n):
+            rx, rh = turned(walker, walker.levers[i], y, k)
+            x, h, v, w = x + rx, h + rh, v - y[4 + n + k] * rh, w + y[4 + n + k] * rx
+        height = np.cos(walker.slope) * h - np.sin(walker.slope) * x
+        total += walker.masses[i] * (0.5 * (v * v + w * w) + walker.gravity * height)
+    for k in range(n):
+        total += 0.5 * walker.inertias[k] * y[4 + n + k] ** 2
+    for foot in range(2):
+        if carried[foot]:
+            total += stored(walker, foot, y)
+    return total
 
 
 @njit
@@ -243,35 +326,21 @@ def event_values(walker, y, cells, stance, touched):
 
 
 @njit
-def walk(walker, y, steps, h, hinged):
-    """Walk up to `steps` steps from y = (hip, angles, their velocities), foot 1 standing, `hinged` or not (-1).
+def take_steps(walker, y, h, hinged, diary):
+    """Walk from y, foot 1 standing, `hinged` or not (-1), until the diary is full or the walk ends.
 
-    Returns outcome, steps, times and places of touches, slips, rolling, time and state at the end, times of knee locks.
-    The slip of the last step is taken where its foot lifts, after the end; it is left out if that foot does not.
-    """
-    end, leaving = np.zeros(1 + y.size), np.zeros(2, np.bool_)
-    found = walk_to_lift(walker, y, steps, h, hinged, end, leaving)
-    outcome, done, times, places, slips, rolled, t, y, locks = found
-    if done == steps:
-        outcome, t, y = WALKED, end[0], end[1:]
-    lifted = done - 1 if leaving.any() else done
-    return outcome, done, times, places, slips[:lifted], rolled[:lifted], t, y, locks
-
-
-@njit
-def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
-    """`walk` on to the lift of the foot of the last step; time and state at its touch into `end`.
-
-    leaving  (2,) which feet are still to lift from the step that they carried
+    Then walk on until the last step's foot lifts, if it does: a slip is from touch to lift. Returns outcome, time and
+    state at the end, and whether each foot had ground there.
     """
     knees = walker.knees.shape[0]
     tau = np.sqrt(walker.leg / walker.gravity)
-    times, places, slips, rolled = np.zeros(steps), np.zeros(steps), np.zeros(steps), np.zeros(steps)
-    locks, lock_count = np.zeros(2 * steps + 2), 0
+    times, places, slips, rolled, locks, counts, lost = diary
+    steps = times.size
+    outcome, end_s, end, ground = WALKED, 0.0, y, np.ones(2, np.bool_)
     stance, done, t, last, grounded_at, releasing = 1, 0, 0.0, 0.0, 0.0, False
     cells, left, carried = np.zeros(2, np.int64), np.zeros(2, np.int64), np.ones(2, np.bool_)
     foothold, touched = np.zeros(2), np.zeros(2)
-    stood, armed = np.zeros((2, 2)), np.zeros(max(knees, 1), np.bool_)
+    stood, leaving, armed = np.zeros((2, 2)), np.zeros(2, np.bool_), np.zeros(max(knees, 1), np.bool_)
     locked = np.zeros(knees, np.bool_)
     if knees:
         locked[1] = True
@@ -288,10 +357,10 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
         inside = climb <= 1e-12 if abs(height) < 1e-13 else height < 0.0
         side[3 * foot] = -1.0 if inside else 1.0
     side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
-    while done < steps or leaving.any():
-        both = side[0] < 0.0 and side[3] < 0.0 and carried[0] and carried[1] and hinged < 0
+    while done < steps or leaving[0] or leaving[1]:
+        counts[ROUNDS] += 1
         aloft = grounded_at + 0.25 * tau - t
-        dt = min(h / SHORTER if both else h, aloft)
+        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, carried)), aloft)
         new = runge_kutta(walker, y, dt, hinged, locked, carried)
         g = event_values(walker, new, cells, stance, touched)
         low, high, event = 0.0, dt, -1
@@ -334,23 +403,30 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
             if side[3 * foot] < 0.0 and carried[foot]:
                 grounded_at = t
         if t - last > 10.0 * tau:
-            return NO_HEEL_STRIKE, done, times, places, slips, rolled, t, y, locks[:lock_count]
+            outcome = NO_HEEL_STRIKE
+            break
         if t - grounded_at > 0.25 * tau - ROUNDING:
-            return LIFTED_OFF, done, times, places, slips, rolled, t, y, locks[:lock_count]
+            outcome = LIFTED_OFF
+            break
         if event < 0:
             continue
         if event == FALL:
-            return FELL, done, times, places, slips, rolled, t, y, locks[:lock_count]
+            outcome = FELL
+            break
         if event == SLIDE:
-            return SLID, done, times, places, slips, rolled, t, y, locks[:lock_count]
+            outcome = SLID
+            break
         if event == SINKING:
             releasing, locked[1 - stance], armed[1 - stance] = False, False, False
             continue
         if event == KNEES or event == KNEES + 1:
             locked[event - KNEES] = True
+            before = energy(walker, y, carried)
             y = struck(walker, y, hinged, locked)
-            locks[lock_count] = t
-            lock_count += 1
+            if done < steps:
+                lost[KNEE_STRIKES] += before - energy(walker, y, carried)
+                locks[counts[LOCKS]] = t
+                counts[LOCKS] += 1
             continue
         x0, x1 = foot_at(walker, 0, y)[0], foot_at(walker, 1, y)[0]
         along = np.array([x0, x1])
@@ -368,11 +444,14 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
         if kind > 0:
             cells[foot] += 1 if kind == 2 else -1
             if cells[foot] % 2 != 0:
+                if carried[foot] and done < steps:
+                    lost[EDGES] += stored(walker, foot, y)
                 carried[foot] = False
             elif side[3 * foot] > 0.0:
                 carried[foot] = True
             else:
-                return OFF_PAD, done, times, places, slips, rolled, t, y, locks[:lock_count]
+                outcome = OFF_PAD
+                break
             continue
         side[event] = -side[event]
         slip = material(walker, foot, y) - touched[foot]
@@ -381,6 +460,7 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
                 stood[foot, 0], stood[foot, 1] = slip, along[foot] - foothold[foot] - slip
                 if foot != stance:
                     slips[done - 1], rolled[done - 1] = stood[foot]
+                    counts[SLIPS] = done
                 leaving[foot] = False
             if walker.terrain == AFTER_MID_SWING and foot != stance:
                 carried[foot] = (side[PASSING] > 0.0) == (foot == 1)
@@ -389,28 +469,33 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
             continue
         if foot == stance:
             if abs(slip) > 0.25 * walker.pitch:
-                return SLID, done, times, places, slips, rolled, t, y, locks[:lock_count]
+                outcome = SLID
+                break
             continue
         if walker.terrain == CHECKERBOARD and cells[foot] == left[foot]:
             if abs(along[foot] - foothold[foot] - stood[foot, 1]) > 0.25 * walker.pitch:
-                return OFF_PAD, done, times, places, slips, rolled, t, y, locks[:lock_count]
+                outcome = OFF_PAD
+                break
             continue
         if along[foot] - along[other] < 0.25 * walker.pitch:
             continue
         if knees and not locked[foot]:
-            return BENT_KNEE, done, times, places, slips, rolled, t, y, locks[:lock_count]
-        if side[3 * other] < 0.0 and hinged < 0:
-            slip = material(walker, other, y) - touched[other]
-            stood[other, 0], stood[other, 1] = slip, along[other] - foothold[other] - slip
+            outcome = BENT_KNEE
+            break
         if hinged >= 0:
             touched[other], stood[other, 0], stood[other, 1] = material(walker, other, y), 0.0, 0.0
             side[3 * other] = -1.0
             hinged = -1
         leaving[other], leaving[foot] = side[3 * other] < 0.0, False
-        times[done], places[done], slips[done], rolled[done] = t, along[foot], stood[other, 0], stood[other, 1]
+        times[done], places[done] = t, along[foot]
+        if not leaving[other]:
+            slips[done], rolled[done] = stood[other]
+            counts[SLIPS] = done + 1
         foothold[foot], touched[foot], left[foot] = along[foot], material(walker, foot, y), cells[foot]
         stance, last, done = foot, t, done + 1
-        end[0], end[1:] = t, y
+        counts[STEPS] = done
+        if done == steps:
+            end_s, end, ground = t, y.copy(), carried.copy()
         if walker.terrain == AFTER_MID_SWING and side[3 * other] > 0.0:
             carried[other] = (side[PASSING] > 0.0) == (other == 1)
         if knees:
@@ -418,13 +503,40 @@ def walk_to_lift(walker, y, steps, h, hinged, end, leaving):
                 locked[other], armed[other] = False, False
             else:
                 releasing = True
-    return WALKED, done, times, places, slips, rolled, t, y, locks[:lock_count]
+    if done < steps:
+        return outcome, t, y, carried
+    return WALKED, end_s, end, ground
+
+
+def walk(walker, y, steps, h, hinged=-1):
+    """Walk up to `steps` steps from y in steps of the method of h (s) at most, foot `hinged` hinged until the first."""
+    locks, counts = np.zeros(2 * steps + 2), np.zeros(4, np.int64)
+    diary = Diary(*np.zeros((4, steps)), locks, counts, np.zeros(4))
+    outcome, end_s, end, ground = take_steps(walker, y, h, hinged, diary)
+    done, known = counts[STEPS], counts[SLIPS]
+    diary.lost[[DAMPING, FRICTION]] = end[-2:]
+    return Walked(
+        outcome, diary.times[:done], diary.places[:done], diary.slips[:known], diary.rolled[:known],
+        locks[: counts[LOCKS]], end_s, end, ground, diary.lost, int(counts[ROUNDS]),
+    )  # fmt: skip
+
+
+def of_centre(walker, y):
+    """The state of a walker of whose hip's place and velocity those of its centre of mass are given."""
+    n, mass = walker.inertias.size, walker.masses.sum()
+    moved = np.append(y, [0.0, 0.0])
+    for m, levers in zip(walker.masses, walker.levers, strict=True):
+        for k in range(n):
+            rx, rh = turned(walker, levers, y, k)
+            moved[:2] -= m / mass * np.array([rx, rh])
+            moved[2 + n : 4 + n] -= m / mass * y[4 + n + k] * np.array([-rh, rx])
+    return moved
 
 
 def start(walker, angles, rates, hinged=False):
     """The state with foot 1 just touching at the origin, at rest and rolling, or hinged at its centre."""
     n = walker.inertias.size
-    y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates]).astype(float)
+    y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates, [0.0, 0.0]]).astype(float)
     x, height, slip, climb, centre = foot_at(walker, 1, y)
     y[0], y[1] = -x, -height
     y[2 + n], y[3 + n] = -(centre if hinged else slip), -climb

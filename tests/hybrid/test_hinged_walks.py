@@ -62,8 +62,8 @@ def plainly(walk, step_s=1e-5):
         1e5 * 1000.0**2.2, 2.2, 9e4, 1e-4, 0.9, 0.7, 0.1, 1.0, TERRAINS[walk.terrain], MEASURE, False,
     )  # fmt: skip
     start = plain_walk.start(ground, np.array(walk.state[:2]), np.array(walk.state[2:]), hinged=True)
-    outcome, done, times, *_, end_time, _, _ = plain_walk.walk(ground, start, walk.steps, step_s, STANCE_FOOT)
-    return Outcome(outcome), times[:done], end_time
+    other = plain_walk.walk(ground, start, walk.steps, step_s, STANCE_FOOT)
+    return Outcome(other.outcome), other.times, other.end_s
 
 
 @pytest.mark.parametrize(

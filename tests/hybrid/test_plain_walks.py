@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "contact_campaign.py"
+# straight legs, free and hinged, on every terrain; knees, free and hinged
+SEEDS = (18, 3, 19, 1, 0, 40, 8, 2)
 
 
 @pytest.fixture(scope="module")
@@ -18,16 +20,16 @@ def campaign():
     return module
 
 
-@pytest.mark.parametrize(("walker", "seed"), [("compass", 1), ("compass", 2), ("kneed", 5), ("kneed", 7)])
-def test_a_drawn_walk_ends_as_the_plain_integration_says(campaign, walker, seed):
-    one = campaign.compare(campaign.WALKERS[walker](seed), steps=1, step_s=2e-5)
-    assert one.outcome == one.expected
-    # what halving the plain step still changes bounds what can be asked for
-    assert one.apart_s < max(campaign.APART_S, 2.0 * one.own_s)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_drawn_walk_differs_from_the_plain_integration_by_no_more_than_their_errors(campaign, seed):
+    one = campaign.compare(campaign.both(seed), steps=1)
+    assert one.wrong == []
+    # errors that could hide a fault judge nothing
+    assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-5
 
 
-def test_a_flight_ends_the_walk_a_quarter_of_a_pendulum_time_after_the_foot_left(campaign):
-    # the foot leaves where the force law nearly lets go, which the implicit method's dense output takes for a crossing
-    one = campaign.compare(campaign.compass(5), steps=2, step_s=2e-5)
-    assert one.outcome == one.expected == "lifted-off"
-    assert one.apart_s < 1e-8
+def test_the_walks_of_the_short_campaign_are_on_every_ground(campaign):
+    grounds = {campaign.both(seed).ground for seed in SEEDS}
+    assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds
+    assert any(ground.startswith("kneed") and ground.endswith("pinned") for ground in grounds)
+    assert any(ground.startswith("kneed") and ground.endswith("free") for ground in grounds)

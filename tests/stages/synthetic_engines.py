@@ -61,6 +61,7 @@ def truth():
         end_state=(0.0,) * 8,
         max_penetration_m=1e-4,
         energy_balance_residual_J=0.0,
+        explained_residual_J=0.0,
         dissipated_J=np.zeros(5),
         knee_strike_s=np.zeros(0),
         work=np.zeros(4, np.int64),

@@ -58,6 +58,10 @@ OF_STRAIGHT_LEGS = 3  # channels
 NEVER = -1
 ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+# Residuals of random walks, over rtol times energy and work exchanged, are at most 0.5 by radau5 at any rtol from 1e-2
+# to 1e-9 (scripts/contact_campaign.py prints those of its walks) and 9 by the libraries' multistep methods.
+UNEXPLAINED = 100.0
+FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
 
 
 @dataclass(frozen=True)
@@ -186,10 +190,22 @@ class ContactWalkResult:
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
+    explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
     knee_strike_s: Floats  # (steps,) when the knee of each step's swing leg locked; of straight legs, none
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     samples: ContactSamples | None
+
+    @property
+    def advice(self) -> str:
+        """What the outcome means and what to try next."""
+        if self.energy_balance_residual_J <= self.explained_residual_J:
+            return self.outcome.advice
+        return (
+            f"The energy balance does not close: it is off by {self.energy_balance_residual_J:.3g} J, of which the "
+            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; tighten "
+            "solver.contact.rtol or choose another solver.contact.method. If neither helps, the program is at fault."
+        )
 
     @property
     def periods_s(self) -> Floats:
@@ -281,13 +297,13 @@ def new_observer(
     y: State,
     interval_s: float = 1.0,
     samples: int = 0,
-    booked: bool = False,
+    booked: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
     """An observer of a walk from state y.
 
     interval_s, samples  time between samples, and how many there is room for
-    booked               whether to keep the energy's books
+    booked               whether to keep the energy's books, by which a walk is judged; ladders of methods do without
     directions           how many directions of the start to carry along as the tangent
     """
     extremes = np.zeros(3)
@@ -334,7 +350,7 @@ def walk_contact(
     start       state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
     methods     how to integrate
     interval_s  time between samples, or None for none
-    booked      whether to keep the energy's books
+    booked      whether to keep the energy's books, by which the walk is judged; ladders of methods do without
 
     The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
     """
@@ -342,14 +358,14 @@ def walk_contact(
     if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
         ledger = new_ledger(walker, ground.terrain, stance, steps, start)
         here = Stopped(0.0, start, np.zeros(4, np.int64))
-        return gather(Outcome.REJECTED, here, ledger, new_observer(walker, ledger, start), walker)
+        return gather(Outcome.REJECTED, here, ledger, new_observer(walker, ledger, start), walker, methods)
     room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
     while True:
         ledger = new_ledger(walker, ground.terrain, stance, steps, start)
         observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked)
         outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
         if room == 0 or observer.recorded[0] < room:
-            return gather(outcome, stopped, ledger, observer, walker)
+            return gather(outcome, stopped, ledger, observer, walker, methods)
         room *= 2
 
 
@@ -406,8 +422,32 @@ def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) ->
     ledger.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
+def explained_residual(observer: ContactObserver, methods: MethodSettings) -> float:
+    """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
+
+    It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
+    potential over the first foothold, and all that has been dissipated since.
+    """
+    exchanged = observer.extremes[START_ENERGY] + np.abs(observer.books).sum()
+    return float(UNEXPLAINED * max(methods.rtol, FINEST) * exchanged)
+
+
+def balanced(ended: int, observer: ContactObserver, methods: MethodSettings) -> Outcome:
+    """How a walk ended: `SOLVER_FAILED`, however it did, if its energy balance does not close.
+
+    This detects faults and estimates no error: a walk may be off by far more than its balance.
+    """
+    closes = observer.extremes[RESIDUAL] <= explained_residual(observer, methods)
+    return Outcome(ended) if closes else Outcome.SOLVER_FAILED
+
+
 def gather(
-    outcome: Outcome, stopped: Stopped, ledger: Ledger, observer: ContactObserver, walker: ContactWalker
+    outcome: Outcome,
+    stopped: Stopped,
+    ledger: Ledger,
+    observer: ContactObserver,
+    walker: ContactWalker,
+    methods: MethodSettings,
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
     done, lifted, seen = int(ledger.feet[STEPS]), steps_with_lift(ledger), int(observer.recorded[0])
@@ -422,7 +462,7 @@ def gather(
             observer.sampled_books[:seen],
         )
     return ContactWalkResult(
-        outcome,
+        balanced(outcome, observer, methods),
         ledger.touch_time[:done],
         ledger.touch_along[:done],
         ledger.slip[:lifted],
@@ -431,6 +471,7 @@ def gather(
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),
         float(observer.extremes[RESIDUAL]),
+        explained_residual(observer, methods),
         observer.books.copy(),
         ledger.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
         stopped.work,

@@ -46,7 +46,8 @@ ADVICE = {
     "walking.",
     Outcome.BUDGET_EXHAUSTED: "The run used up its right-hand sides; loosen solver.*.rtol, soften the contact, or ask "
     "for fewer strides.",
-    Outcome.SOLVER_FAILED: "The step size fell to rounding; loosen solver.*.rtol or choose another solver.*.method.",
+    Outcome.SOLVER_FAILED: "The step size fell to rounding, or the energy balance does not close; choose another "
+    "solver.*.rtol or solver.*.method.",
     Outcome.BENT_KNEE: "A foot came down on a knee that had not locked; start nearer to a gait (start: fixed-point), "
     "or, on compliant ground, release the trailing knee by compression (walker.knee.release).",
     Outcome.REJECTED: "The start is not a state this walker can be in.",

@@ -18,7 +18,7 @@ from walkerlab.ground.terrain import stride_measure
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, SIGNALS
 from walkerlab.hybrid.contact_rules import STANCE, STEPS
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
 from walkerlab.solvers.registry import finder_for
@@ -92,7 +92,8 @@ def section_points(
         observer = new_observer(walker, ledger, start)
         method = replace(methods, budget=(steps + 1) * methods.budget).of(walker)
         finder = finder_for(method, SIGNALS)
-        outcome = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
+        ended = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
+        outcome = balanced(ended, observer, methods)
         if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:
             yield steps, coordinates_of(walker, method.y, int(ledger.feet[STANCE]))
         elif ledger.feet[STEPS] > steps:

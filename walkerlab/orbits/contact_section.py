@@ -26,7 +26,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_rules import Ledger
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.scipy_methods import right_hand_side
@@ -161,31 +161,30 @@ def pads_for(ground: Ground, walker: ContactWalker, state: State, stance: int, p
 
 
 def step_from_section(
-    walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float, booked: bool = False
+    walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float
 ) -> SectionStep:
     """Walk from the section to the section.
 
     z        section coordinates
     pitch_m  what the pads are laid for
-    booked   whether to keep the energy's books
     """
     stance = STANCE_FOOT
     start = state_on_section(walker, z, stance)
     laid = pads_for(ground, walker, start, stance, pitch_m)
     ledger = new_ledger(walker, laid.terrain, stance, 2, start)
     stand_on_section(ledger, walker, laid, start, stance)
-    observer = new_observer(walker, ledger, start, booked=booked, directions=z.size)
+    observer = new_observer(walker, ledger, start, directions=z.size)
     observer.tangent.Phi[:, :] = directions(walker, start, stance)
     method = methods.of(walker)
     finder = finder_for(method, SIGNALS)
-    outcome = Outcome(walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1))
+    ended = walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1)
     end = method.y.copy()
     slipped, rolled = since_touch(walker, ledger, tuple(end.tolist()), 1 - stance)
     DP = section_derivative(walker, ledger, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
-        outcome,
+        balanced(ended, observer, methods),
         coordinates_of(walker, end, 1 - stance),
         DP,
         float(method.clock[T]),
@@ -269,7 +268,7 @@ def find_contact_gait(
     Returns the gait, or the last step that could be walked if no gait is near.
     """
     z = np.asarray(z, float).copy()
-    step = step_from_section(walker, ground, methods, z, pitch_m, booked=True)
+    step = step_from_section(walker, ground, methods, z, pitch_m)
     iteration, walked = 0, 1
     while step.outcome is Outcome.WALKED and walked < most_steps:
         residual = float(np.max(np.abs(step.z - z)))
@@ -300,7 +299,7 @@ def damped(
     while True:
         tried += 1
         candidate = z + scale * move
-        ahead = step_from_section(walker, ground, methods, candidate, step.length_m, booked=True)
+        ahead = step_from_section(walker, ground, methods, candidate, step.length_m)
         fine = ahead.outcome is Outcome.WALKED and float(np.max(np.abs(ahead.z - candidate))) < 2.0 * residual
         if fine or scale < 1e-3:
             return candidate, ahead, tried

@@ -417,7 +417,7 @@ WHY = {
     Outcome.SLID: "the stance foot slides away",
     Outcome.NO_HEEL_STRIKE: "the swinging foot does not come down",
     Outcome.BUDGET_EXHAUSTED: "a step takes more right-hand sides than it may",
-    Outcome.SOLVER_FAILED: "the solver's step fell to rounding",
+    Outcome.SOLVER_FAILED: "the solver's step fell to rounding, or the energy balance does not close",
     Outcome.BENT_KNEE: "the foot comes down on a knee that has not locked",
 }
 

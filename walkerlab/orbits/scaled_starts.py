@@ -17,7 +17,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import SIGNALS
 from walkerlab.hybrid.contact_rules import STEPS
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import finder_for, method_named
 from walkerlab.solvers.system import State
@@ -84,9 +84,11 @@ class ScaledStarts:
         """Walk from a state of the free walker."""
         ledger = new_ledger(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
         observer = new_observer(self.walker, ledger, start)
-        method = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget).of(self.walker)
+        methods = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget)
+        method = methods.of(self.walker)
         finder = finder_for(method, SIGNALS)
-        outcome = walk_free(self.walker, self.ground, method, finder, observer, ledger, 0.0, start, NEVER)
+        ended = walk_free(self.walker, self.ground, method, finder, observer, ledger, 0.0, start, NEVER)
+        outcome = balanced(ended, observer, methods)
         steps = int(ledger.feet[STEPS])
         return Walk(int(outcome), ledger.touch_time[:steps], ledger.touch_along[:steps], int(method.counts[0]))
 

@@ -78,7 +78,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     if not result.outcome.answered:
         raise NoAnswer(
             f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
-            result.outcome.advice,
+            result.advice,
             partial=content,
         )
     return content
@@ -141,7 +141,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
     """What the command prints."""
     return {
         "outcome": result.outcome.label,
-        "advice": result.outcome.advice,
+        "advice": result.advice,
         "steps": int(result.touch_time_s.size),
         "step_periods_s": result.periods_s.tolist(),
         "step_lengths_m": result.lengths_m.tolist(),

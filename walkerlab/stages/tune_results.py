@@ -185,7 +185,7 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     """How one walk went."""
     return {
         "outcome": walk.outcome.label,
-        "advice": walk.outcome.advice,
+        "advice": walk.advice,
         "steps": int(walk.touch_time_s.size),
         "step_periods_s": walk.periods_s.tolist(),
         "step_lengths_m": walk.lengths_m.tolist(),

@@ -127,7 +127,7 @@ def looked_at(ready: Prepared, config: WalksConfig, case: Case, times: Array) ->
     ledger = new_ledger(scene.walker, scene.terrain, STANCE_FOOT, case.steps, ready.start)
     observer = new_observer(scene.walker, ledger, ready.start, 1.0, times.size)._replace(times=times)
     outcome, stopped = run_parts(scene.walker, scene.ground, scene.pinned, ready.start, methods, observer, ledger)
-    return gather(outcome, stopped, ledger, observer, scene.walker)
+    return gather(outcome, stopped, ledger, observer, scene.walker, methods)
 
 
 def with_middles(grid: Array) -> Array:

@@ -84,7 +84,7 @@ def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol
     ledger = new_ledger(of.walker, ground.terrain, 1, 1, start)
     ledger.at_zero[:] = 0
     ledger.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
-    observer = new_observer(of.walker, ledger, start, duration_s / SAMPLES, SAMPLES, booked=True)
+    observer = new_observer(of.walker, ledger, start, duration_s / SAMPLES, SAMPLES)
     method = MethodSettings(method_named("radau5"), rtol, atol, BUDGET).new(len(of.walker.blank))
     finder = finder_for(method, SIGNALS)
     outcome = Outcome(walk_free(of.walker, ground, method, finder, observer, ledger, 0.0, start, NEVER))

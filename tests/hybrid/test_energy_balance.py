@@ -1,0 +1,84 @@
+"""A walk whose energy balance does not close is no answer, whoever asked for it; ladders of methods may err."""
+
+import contact_walks
+import numpy as np
+import pytest
+from contact_walks import FIXED_POINT, RIGID_STEP, scene_of, settings
+
+from walkerlab.benchmarks.trials import ContactTrial
+from walkerlab.errors import NoAnswer
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.hybrid import contact_run
+from walkerlab.hybrid.contact_run import Ground, walk_contact
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.contact_gait import find_gait_from
+from walkerlab.orbits.contact_section import step_from_section
+from walkerlab.orbits.scaled_starts import scaled_starts
+from walkerlab.scene.contact import start_state
+from walkerlab.stages import contact_sim
+from walkerlab.stages.progress import Silent
+
+# m, rad, m/s, rad/s: the stance leg upright and the swing leg beside it, somewhere near the gait
+FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])
+
+
+@pytest.fixture
+def nothing_explained(monkeypatch):
+    """Every residual but none is too large."""
+    monkeypatch.setattr(contact_run, "UNEXPLAINED", 0.0)
+
+
+def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_words():
+    """The hinged walker moves as one with a heavier hip would; its energy is its own."""
+    scene, heavier = scene_of("contact.stance=pinned"), scene_of("contact.stance=pinned", "walker.hip_mass_kg=20")
+    assert scene.pinned is not None
+    assert heavier.pinned is not None
+    taken = walk_contact(
+        scene.walker,
+        Ground(scene.terrain, scene.frame),
+        scene.pinned._replace(tree=heavier.pinned.tree),
+        STANCE_FOOT,
+        start_state(scene, FIXED_POINT),
+        settings(method="scipy-radau"),
+        1,
+        None,
+    )
+    assert taken.outcome is Outcome.SOLVER_FAILED
+    assert not taken.outcome.answered
+    assert f"off by {taken.energy_balance_residual_J:.3g} J" in taken.advice
+    assert taken.energy_balance_residual_J > 0.01  # J: five kilograms differ by more than numbers do
+
+
+def test_what_the_tolerance_explains_grows_with_it():
+    loose, tight = (contact_walks.walked(steps=1, tolerance=tolerance) for tolerance in (1e-5, 1e-8))
+    # what was turned into heat differs by little
+    assert loose.explained_residual_J == pytest.approx(1e3 * tight.explained_residual_J, rel=1e-3)
+    assert tight.energy_balance_residual_J < tight.explained_residual_J
+
+
+def test_a_command_gives_no_answer_and_says_by_how_much_the_balance_is_off(nothing_explained):
+    scene_sets = ("slope_deg=1", f"start={list(FIXED_POINT)}", f"contact.pad_pitch={RIGID_STEP}", "outputs=[]")
+    with pytest.raises(NoAnswer) as refused:
+        contact_sim.run(contact_walks.load(None, scene_sets).config, {}, Silent())
+    assert refused.value.partial.summary["outcome"] == "solver-failed"
+    residual = refused.value.partial.summary["energy_balance_residual_J"]
+    assert 0.0 < residual < 1e-3
+    assert f"off by {residual:.3g} J" in refused.value.advice
+
+
+def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
+    scene = scene_of()
+    ground, start = Ground(scene.terrain, scene.frame), start_state(scene, FIXED_POINT)
+    starts = scaled_starts(scene.walker, ground, lambda *_: start, 2, None)
+    assert starts.walk(1.0, 1.0).outcome == Outcome.SOLVER_FAILED
+    assert (
+        step_from_section(scene.walker, ground, settings(), FEET_ABREAST, RIGID_STEP).outcome is Outcome.SOLVER_FAILED
+    )
+    assert find_gait_from(scene.walker, ground, settings(), start).gait is None
+
+
+def test_a_ladder_of_methods_is_measured_by_its_errors_alone(nothing_explained):
+    scene = scene_of()
+    ground, start = Ground(scene.terrain, scene.frame), start_state(scene, FIXED_POINT)
+    trial = ContactTrial(scene.walker, ground, start, STANCE_FOOT, 1, "contact")
+    assert trial.prepare("radau5", 1e-3, 100_000)().outcome == "walked"
