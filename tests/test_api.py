@@ -116,3 +116,9 @@ def test_what_is_left_out_is_as_the_built_in_config_has_it(monkeypatch):
     walkerlab.find_gait(walkerlab.kneed(), slope_deg=np.int64(3), strides=7)
     assert asked[-1].walker == walkerlab.kneed()
     assert (asked[-1].slope_rad, asked[-1].strides) == (np.deg2rad(3.0), 7)
+    walkerlab.basin(cells=np.array([5, 6]), seed=2)
+    assert asked[-1].basin.cells == (5, 6)
+    walkerlab.continue_gait(span=(0.01, 0.02))
+    assert (asked[-1].continuation.over, asked[-1].continuation.least) == ("slope_rad", 0.01)
+    walkerlab.basin(basin={"steps": 10})
+    assert asked[-1].basin.steps == 10
