@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import NoneType
 from typing import Any
 
 from walkerlab.config.fields import Block
@@ -15,6 +14,7 @@ from walkerlab.config.layers import stacked
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.schema import Config, Contact
+from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.tree import Position
 from walkerlab.config.validation import typed
@@ -31,7 +31,7 @@ from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 
 RUNS = "runs"
-MADE_HERE = {
+MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     "walker": (tuple(WALKERS.values()), "walkerlab.compass(), kneed() and walker(type) make one."),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
@@ -192,8 +192,8 @@ def sweep(
 
     found = resolve(str(config), settings(set), runs=Path(runs))
     listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
-    drawn = (found.template.base.config.sweep or Sweep()).seed if seed is None else seed
-    question = asked(stage, listed, zip, sample, drawn)
+    block = found.template.base.config.sweep or SweepBlock()
+    question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
     chosen, address = engine_named(engine)
     order = Order(jobs, address, modules_of(stage, found.template.base.config, PIPELINE), found.folder.path)
     swept = Sweep(question, found.template, found.folder).run(Work(chosen, order))
@@ -298,8 +298,9 @@ def continue_gait(
     """
     asked = {} if over is None else {"over": over}
     if span is not None:
-        asked |= dict(zip(("from", "to"), two_numbers("span", span), strict=True))
-    return in_memory("continuation", config_of_scene(walker, {"slope_deg": slope_deg, "continuation": asked}, keys))
+        asked |= dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
+    given = {"slope_deg": slope_deg, "continuation": asked or None}
+    return in_memory("continuation", config_of_scene(walker, given, keys))
 
 
 def basin(
@@ -312,7 +313,7 @@ def basin(
     cells      along either axis of the window
     keys       other keys of a config, such as seed
     """
-    asked = {} if cells is None else {"cells": cells}
+    asked = None if cells is None else {"cells": plain(cells)}
     return in_memory("basin", config_of_scene(walker, {"slope_deg": slope_deg, "basin": asked}, keys))
 
 
@@ -347,11 +348,12 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
 
     Raises ConfigError for keys and values that configs do not have.
     """
-    named = {"name": "memory", "walker": walker, **given}
-    for name, (kinds, makers) in MADE_HERE.items():
-        if not isinstance(named.get(name), (NoneType, *kinds)):
+    named = {key: value for key, value in {"walker": walker, **given}.items() if value is not None}
+    for name in named.keys() & MADE_HERE.keys():
+        kinds, makers = MADE_HERE[name]
+        if not isinstance(named[name], kinds):
             raise ConfigError(f"{name}: {named[name]!r} is not a {name} block.", makers)
-    lines = {key: plain(value) for key, value in {**keys, **named}.items() if value is not None}
+    lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, Position("walkerlab", 1, 1))
     assert isinstance(upper, Tree)

@@ -72,7 +72,7 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
     if friction == 0.0:
         return (
             "without friction nothing holds the walker back: it gathers speed along the slope",
-            "Give the feet friction: contact.friction: coulomb.",
+            f"Give the feet friction: contact.friction: coulomb, contact.static_friction above {wanted:.3g}.",
         )
     if friction < wanted:
         return (

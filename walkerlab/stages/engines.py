@@ -203,7 +203,7 @@ def ratios(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
         for engine in dict.fromkeys(row.engine for row in of(rows, scene, SAME_LAW)):
             theirs = least_wall([row for row in of(rows, scene, SAME_LAW) if row.engine == engine], level)
             if own is not None and theirs is not None:
-                found.setdefault(f"{level:.0e}".replace("e-0", "e-"), {})[engine] = theirs.wall_s / own.wall_s
+                found.setdefault(f"{level:.0e}".replace("e-0", "e-"), {})[engine] = theirs / own
     return found
 
 

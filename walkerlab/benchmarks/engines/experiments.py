@@ -419,7 +419,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     return np.asarray(done.y[:, -1]), energy
 
 
-def least_wall(rows: Sequence[Row], error: float) -> Row | None:
-    """The quickest of the runs with at most this error."""
+def least_wall(rows: Sequence[Row], error: float) -> float | None:
+    """Run time (s) of the quickest run with at most this error."""
     good = [row for row in rows if row.error is not None and row.error <= error]
-    return min(good, key=lambda row: row.wall_s or math.inf, default=None)
+    return min((row.wall_s for row in good if row.wall_s is not None), default=None)
