@@ -116,7 +116,12 @@ def test_what_is_left_out_is_as_the_built_in_config_has_it(monkeypatch):
     walkerlab.find_gait(walkerlab.kneed(), slope_deg=np.int64(3), strides=7)
     assert asked[-1].walker == walkerlab.kneed()
     assert (asked[-1].slope_rad, asked[-1].strides) == (np.deg2rad(3.0), 7)
-<<<<<<< HEAD
+    walkerlab.basin(cells=np.array([5, 6]), seed=2)
+    assert asked[-1].basin.cells == (5, 6)
+    walkerlab.continue_gait(span=(0.01, 0.02))
+    assert (asked[-1].continuation.over, asked[-1].continuation.least) == ("slope_rad", 0.01)
+    walkerlab.basin(basin={"steps": 10})
+    assert asked[-1].basin.steps == 10
 
 
 UNGUARDED = """
@@ -153,11 +158,3 @@ def test_where_a_guard_is_needed_this_is_said_at_once(tmp_path, from_standard_in
     done = run_unguarded(tmp_path, "dask", from_standard_input)
     assert done.returncode == 1
     assert "ConfigError: --engine dask: its processes did not start" in done.stderr
-=======
-    walkerlab.basin(cells=np.array([5, 6]), seed=2)
-    assert asked[-1].basin.cells == (5, 6)
-    walkerlab.continue_gait(span=(0.01, 0.02))
-    assert (asked[-1].continuation.over, asked[-1].continuation.least) == ("slope_rad", 0.01)
-    walkerlab.basin(basin={"steps": 10})
-    assert asked[-1].basin.steps == 10
->>>>>>> words
