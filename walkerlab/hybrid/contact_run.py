@@ -403,7 +403,7 @@ def run_parts(
     outcome = Outcome(free_walk(walker, ground, method, finder, observer, ledger, t, y, NEVER))
     stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
     if outcome is Outcome.WALKED:
-        unseen = new_observer(walker, ledger, stopped.state)
+        unseen = new_observer(walker, ledger, stopped.state, booked=False)
         free_walk(walker, ground, method, finder, unseen, ledger, stopped.time_s, stopped.state, AT_LIFT)
     return outcome, stopped
 
