@@ -32,6 +32,7 @@ LAYERS = (
     "config",
     "kernels",
     "labels",
+    "prose",
     "errors",
 )
 SOURCES = sorted(PACKAGE.rglob("*.py"))

@@ -9,11 +9,12 @@ import pytest
 from html_page import Page
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
-from walkerlab.report.blocks import MAIN, Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
+from walkerlab.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
 from walkerlab.report.page import Page as Sheet
 from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.tables import Cell, Column, table
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"
@@ -152,7 +153,7 @@ def test_any_block_may_hold_any_text():
         NASTY,
         (
             Paragraph(NASTY, "bad"),
-            Findings((Finding(NASTY, NASTY, NASTY, "fair"),)),
+            Statements((Statement(NASTY, NASTY, NASTY, "fair"),)),
             Shares(NASTY, ((NASTY, 2, "good"), (NASTY, 1, "bad"))),
             table(NASTY, [Column(NASTY), Column(NASTY, numeric=True)], [[NASTY, NASTY]], wordy=True, note=NASTY),
         ),

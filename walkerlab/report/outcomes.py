@@ -7,15 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.report.blocks import Finding, Tone
+from walkerlab.report.blocks import Statement
 from walkerlab.report.numbers import count, length, number, quantity, span, whole
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Tone
 
 RIGID, CONTACT = "simulate", "contact-sim"
 MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
 """The stages that walk, and what they walk."""
 
-LOOKED_FORWARD_TO = "walked"
+WALKED = "walked"
 
 ENDS = {
     "walked": "walks to the end",
@@ -32,7 +33,7 @@ ENDS = {
 """What a walker does in the end, by the outcome of its walk."""
 
 
-def finding(results: Results, stage: str) -> Finding | None:
+def finding(results: Results, stage: str) -> Statement | None:
     """How the walk of a stage ended; None if there is none."""
     result = results.stored.get(stage)
     if result is None:
@@ -40,12 +41,12 @@ def finding(results: Results, stage: str) -> Finding | None:
     summary = result.summary
     outcome = str(summary["outcome"])
     asked, taken = 2 * results.config.strides, int(summary["steps"])
-    if outcome == LOOKED_FORWARD_TO:
+    if outcome == WALKED:
         sentences = [f"It took all {asked} steps.", gait_sentence(summary)]
     else:
         took = f"It took {taken} of {count(asked, 'step')}."
         sentences = [took, gait_sentence(summary), *why(results, stage, outcome)]
-    return Finding(MODELS[stage], " ".join(text for text in sentences if text), outcome, tone(outcome))
+    return Statement(MODELS[stage], " ".join(text for text in sentences if text), outcome, tone(outcome))
 
 
 def ends(outcome: str) -> str:
@@ -55,14 +56,14 @@ def ends(outcome: str) -> str:
 
 def walks(steps: int, outcome: str) -> str:
     """How far a walker comes, as the rest of a sentence that it begins."""
-    if outcome == LOOKED_FORWARD_TO:
+    if outcome == WALKED:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
 
 
 def tone(outcome: str) -> Tone:
     """Whether a walk went as hoped."""
-    return "good" if outcome == LOOKED_FORWARD_TO else "bad"
+    return "good" if outcome == WALKED else "bad"
 
 
 def gait_sentence(summary: Mapping[str, Any]) -> str:

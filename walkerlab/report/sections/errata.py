@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from walkerlab.report.blocks import PAPER, Column, Section, table
+from walkerlab.report.blocks import PAPER, Section
 from walkerlab.report.numbers import count
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.tables import Column, table
 
-COLUMNS = {
+HEADS = {
     "where": "where",
     "printed": "printed",
     "right": "right",
@@ -15,15 +16,15 @@ COLUMNS = {
     "measured": "measured here",
 }
 """Variables of the stored errata, and their heads."""
+COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in HEADS.items()]
 
 
 def section(results: Results) -> Section | None:
     """The errata, each with what it was measured by."""
-    rows = [[in_signs(erratum[name]) for name in COLUMNS] for erratum in errata(results)]
+    rows = errata(results)
     if not rows:
         return None
-    columns = [Column(head, wide=index > 0) for index, head in enumerate(COLUMNS.values())]
-    found = table("What is printed, and what is right", columns, rows, wordy=True)
+    found = table("What is printed, and what is right", COLUMNS, rows, wordy=True)
     finding = f"{count(len(rows), 'place')} where the paper does not say what is right."
     return Section("errata", "Errata of the paper", (found,), finding, PAPER)
 
@@ -33,6 +34,4 @@ def errata(results: Results) -> list[dict[str, str]]:
     group = results.group("compare", "errata")
     if group is None:
         return []
-    return [
-        dict(zip(COLUMNS, row, strict=True)) for row in zip(*(group[name].tolist() for name in COLUMNS), strict=True)
-    ]
+    return [dict(zip(HEADS, row, strict=True)) for row in zip(*(group[name].tolist() for name in HEADS), strict=True)]

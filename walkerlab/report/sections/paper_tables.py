@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import PAPER, Block, Column, Section, Table, table
+from walkerlab.report.blocks import PAPER, PageBlock, Section
 from walkerlab.report.numbers import NONE, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.tables import Column, Table, table
 
 CAPTIONS = {
     "table1": "Table 1: parameters of the walker, in the paper and as used here",
@@ -47,21 +49,25 @@ Rows = Mapping[str, Mapping[str, Any]]
 def section(results: Results) -> Section | None:
     """The tables that there are."""
     summary = results.summary("compare") or {}
-    tables: list[Block] = [paper_table(caption, summary[key]) for key, caption in CAPTIONS.items() if summary.get(key)]
+    tables: list[PageBlock] = [
+        paper_table(caption, summary[key]) for key, caption in CAPTIONS.items() if summary.get(key)
+    ]
     return Section("tables", "The paper’s tables", tuple(tables), page=PAPER) if tables else None
 
 
 def paper_table(caption: str, rows: Rows) -> Table:
     """One table; its rows are named by their symbol and unit, and columns without any value are left away."""
     found = dict.fromkeys(name for row in rows.values() for name, value in row.items() if value is not None)
-    names = [name for name in found if name != UNIT]
-    numeric = {name: not any(isinstance(row.get(name), str) for row in rows.values()) for name in names}
-    columns = [Column("row"), *(Column(HEADS.get(name, name.replace("_", " ")), numeric[name]) for name in names)]
-    lines = [
-        [row_name(symbol, row), *(shown(row.get(name), 3 if "percent" in name else 6) for name in names)]
-        for symbol, row in rows.items()
-    ]
-    return table(caption, columns, lines)
+    columns = [column_of(name, rows) for name in found if name != UNIT]
+    named = [{"row": row_name(symbol, row), **row} for symbol, row in rows.items()]
+    return table(caption, [Column("row", "row"), *columns], named)
+
+
+def column_of(name: str, rows: Rows) -> Column:
+    """The column of a name, of texts or of numbers."""
+    texts = any(isinstance(row.get(name), str) for row in rows.values())
+    digits = 3 if "percent" in name else 6
+    return Column(HEADS.get(name, name.replace("_", " ")), name, partial(shown, digits=digits), numeric=not texts)
 
 
 def row_name(symbol: str, row: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import Block, Finding, Findings, Paragraph, Section, Shares
+from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, finding
 from walkerlab.report.results import Absent, Results
@@ -31,11 +31,11 @@ Rows = Sequence[Mapping[str, Any]]
 
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
-    blocks: list[Block] = [Paragraph(failure, "bad") for failure in failures(results)]
+    blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
     told = (*(finding(results, stage) for stage in MODELS), gait(results), adjustment(results))
     fared = [found for found in told if found is not None]
     if fared:
-        blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
+        blocks.append(Statements(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
     departs = departure(results)
     if departs:
         blocks.append(Paragraph(departs))
@@ -61,7 +61,7 @@ def failure(results: Results, absent: Absent) -> str:
     return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
 
 
-def gait(results: Results) -> Finding | None:
+def gait(results: Results) -> Statement | None:
     """The periodic gait in a sentence; None if there is none."""
     summary = results.summary("fixedpoint")
     if summary is None:
@@ -70,21 +70,21 @@ def gait(results: Results) -> Finding | None:
     factor = number(summary["spectral_radius"], 3)
     text = f"Its steps take {size}; a small disturbance is in the long run multiplied by {factor} a step."
     if summary["stable"]:
-        return Finding("Periodic gait", text, "stable", "good")
-    return Finding("Periodic gait", text, "unstable", "fair")
+        return Statement("Periodic gait", text, "stable", "good")
+    return Statement("Periodic gait", text, "unstable", "fair")
 
 
-def adjustment(results: Results) -> Finding | None:
+def adjustment(results: Results) -> Statement | None:
     """That no start walks in the contact model; None if one does, or none was sought."""
     found = (results.summary("tune") or {}).get("adjustment")
     if found is None or found["found"]:
         return None
-    return Finding("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
+    return Statement("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
 
 
-def of_the_paper(results: Results, rows: Rows) -> list[Block]:
+def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:
     """How the paper's numbers fared, and its gravest errors."""
-    blocks: list[Block] = [shares(rows), Findings(by_verdict(rows), "lines")]
+    blocks: list[PageBlock] = [shares(rows), Statements(by_verdict(rows), "lines")]
     gravest = headlines(results)
     if gravest:
         blocks += [
@@ -92,7 +92,7 @@ def of_the_paper(results: Results, rows: Rows) -> list[Block]:
                 "The reasons; printed, corrected and measured values stand side by side on the page of the paper’s "
                 "numbers."
             ),
-            Findings(gravest, "columns"),
+            Statements(gravest, "columns"),
         ]
     return blocks
 
@@ -105,7 +105,7 @@ def shares(rows: Rows) -> Shares:
     return Shares(title, tuple(part for part in parts if part[1]))
 
 
-def by_verdict(rows: Rows) -> tuple[Finding, ...]:
+def by_verdict(rows: Rows) -> tuple[Statement, ...]:
     """Which numbers fared how, by where they stand."""
     all_there = Counter(str(row["where"]) for row in rows)
     found = []
@@ -113,7 +113,7 @@ def by_verdict(rows: Rows) -> tuple[Finding, ...]:
         here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
         if here:
             said = "; ".join(share(where, here[where], all_there[where]) for where in here)
-            found.append(Finding(f"{verdict.capitalize()}:", f"{said}.", tone=tone))
+            found.append(Statement(f"{verdict.capitalize()}:", f"{said}.", tone=tone))
     return tuple(found)
 
 
@@ -124,7 +124,7 @@ def share(where: str, some: int, every: int) -> str:
     return f"{where} ({some} of {every})"
 
 
-def headlines(results: Results) -> tuple[Finding, ...]:
+def headlines(results: Results) -> tuple[Statement, ...]:
     """The gravest errata that were found, with what was measured for them."""
     found = errata(results)
     return tuple(
@@ -135,7 +135,7 @@ def headlines(results: Results) -> tuple[Finding, ...]:
     )
 
 
-def headline(words: str, erratum: Mapping[str, str]) -> Finding:
+def headline(words: str, erratum: Mapping[str, str]) -> Statement:
     """An erratum in a line: what it comes to, and what was measured."""
     first, _, _ = erratum["measured"].partition("; ")
-    return Finding(in_signs(f"{words} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")
+    return Statement(in_signs(f"{words} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")
