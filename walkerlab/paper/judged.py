@@ -18,7 +18,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Row:
+class JudgedNumber:
     """A printed number beside the measured ones, in the unit it is printed in; None where a model has none."""
 
     printed: Printed
@@ -46,7 +46,7 @@ def weigh(agrees: bool, otherwise: Verdict, departures: tuple[str, ...], evidenc
 
     agrees      the number came out
     otherwise   what is said if it did not, of the paper's own scene
-    departures  in what the scene is not the paper's: then a number that did not come out is refuted by nothing
+    departures  in what the scene is not the paper's: a mismatch refutes nothing then
     """
     if agrees:
         return Verdict.REPRODUCED, evidence
