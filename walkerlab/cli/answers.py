@@ -9,6 +9,7 @@ from typing import Any
 
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
+from walkerlab.report.gait_diagram import parameter
 from walkerlab.report.numbers import count, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, WALKED, ends, walks
 from walkerlab.report.sections import adjustment, basin, families, gaits, stability
@@ -204,7 +205,7 @@ def extreme_cases(summary: Summary) -> list[str | Table]:
 def continuation(summary: Summary) -> list[str | Table]:
     """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
     branches = count(len(summary["branches"]), "branch", "branches")
-    head = f"{branches} of gaits over {families.parameter(summary)}."
+    head = f"{branches} of gaits over {parameter(summary)}."
     return [head, *families.findings(summary), families.bifurcations(summary)]
 
 

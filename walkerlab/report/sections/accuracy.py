@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import COSTS, Gallery, Paragraph, Section, Statement, Statements
+from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import NONE, listed, number, power_of_ten, whole
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, Table, table
@@ -24,7 +24,7 @@ def section(results: Results) -> Section | None:
         return None
     scenes = list(summary["reference"])
     concluded = tuple(Statement(scene, spoken(summary["conclusions"][scene], scene)) for scene in scenes)
-    blocks = (
+    blocks: tuple[PageBlock, ...] = (
         Paragraph(introduction(summary)),
         Statements(concluded),
         costs(summary),

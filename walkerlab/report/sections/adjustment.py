@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import tone, walks
+from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.gaits import symbol
 from walkerlab.report.symbols import in_signs
@@ -81,20 +81,9 @@ def needed(summary: Summary) -> str:
     if not found["found"]:
         return f"No adjustment of the two initial velocities helps: {found['reason']}."
     if found["needed"]:
-        released = summary["procedure"]["released"]
-        return (
-            "This contact needs an adjustment: from the rigid start the walker "
-            f"{walks(released['steps'], released['outcome'])}. "
-            f"The smallest change that walks {found['walked_steps']} steps scales the velocities of "
-            f"{swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "
-            f"{number(found['scale_dtheta2'], 4)}."
-        )
-    down, up = (number(abs(found["margins"][f"dtheta_2 {way}"]["percent"]), 3) for way in ("down", "up"))
-    return (
-        f"No adjustment is needed: from the rigid start as it stands the contact model walks all "
-        f"{found['walked_steps']} steps and settles on its own gait. It still does so if {stance} starts {down} % "
-        f"slower or {up} % faster."
-    )
+        return words("adjustment.needed", found, summary["procedure"]["released"], swing, stance)
+    down, up = (abs(found["margins"][f"dtheta_2 {way}"]["percent"]) for way in ("down", "up"))
+    return words("adjustment.not_needed", found, stance, down, up)
 
 
 def explained(summary: Summary) -> str:
@@ -102,16 +91,12 @@ def explained(summary: Summary) -> str:
     gait = summary["gait"]
     if not gait["found"]:
         return f"The contact model has no gait of its own: {gait['reason']}."
-    lost, slip = gait["lost_J"], length(gait["slip_m"])
-    goes = (
-        f"{quantity(lost[key], 'J', digits)} into {name}" for key, (name, digits) in CHANNELS.items() if lost.get(key)
-    )
-    into = listed(goes).replace(" into ", " go into ", 1)
-    size = f"{quantity(gait['period_s'], 's')} and {quantity(gait['step_length_m'], 'm')}"
-    return (
-        f"That gait takes {size} a step, its foot slips by {slip}; of the "
-        f"{quantity(gait['height_lost_J'], 'J', 4)} that a step descends, {into}."
-    )
+    goes = [
+        f"{quantity(gait['lost_J'][key], 'J', digits)} into {name}"
+        for key, (name, digits) in CHANNELS.items()
+        if gait["lost_J"].get(key)
+    ]
+    return words("adjustment.explained", gait, listed(goes).replace(" into ", " go into ", 1))
 
 
 def caused(summary: Summary) -> str:
@@ -124,8 +109,7 @@ def caused(summary: Summary) -> str:
     sizes = [f"{milliseconds(part)} ({number(100.0 * part / total, 3)} %)" for part in made.values()]
     first, *others = [f"from {CAUSES[key]}" for key in made]
     parts = listed([f"{sizes[0]} come {first}", *(" ".join(pair) for pair in zip(sizes[1:], others, strict=True))])
-    differs = f"Its period differs from the rigid gait's by {milliseconds(total)}"
-    return f"{differs}. With each cause switched off alone, {parts}."
+    return words("adjustment.caused", milliseconds(total), parts)
 
 
 def reached(summary: Summary) -> str:

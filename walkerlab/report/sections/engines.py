@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.benchmarks.engines import rows as engines
 from walkerlab.benchmarks.engines.rows import OWN_LAW, SAME_LAW
-from walkerlab.report.blocks import Paragraph, Section, Statement, Statements
+from walkerlab.report.blocks import PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import NONE, fixed, number, power_of_ten
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, Table, measured, table
@@ -30,7 +30,7 @@ def section(results: Results) -> Section | None:
         for experiment, text in told.items()
         if text
     ]
-    blocks = (
+    blocks: tuple[PageBlock, ...] = (
         Paragraph(
             words("engines.introduction", [f"{name} {version}" for name, version in summary["versions"].items()])
         ),

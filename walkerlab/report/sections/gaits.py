@@ -71,7 +71,7 @@ CHECKS = (
     Column("stable", "stable"),
     measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
     measured("energy drift", "energy_drift_J", partial(number, digits=2)),
-    measured("least normal force", "min_normal_force_N", partial(fixed, decimals=1)),
+    measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
     Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
     measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(told_apart(depth), 4)),
     Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),

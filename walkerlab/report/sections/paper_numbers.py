@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import PAPER, Paragraph, Section, Statement, Statements
+from walkerlab.report.blocks import PAPER, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import count, listed, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
@@ -36,7 +36,7 @@ def section(results: Results) -> Section | None:
     counts = listed(f"{verdicts[name]} {name}" for name in TONES if verdicts[name])
     finding = f"Of {count(len(rows), 'number')} that the paper prints: {counts}."
     told = [Statement(f"{name.capitalize()}:", MEANINGS[name], tone=TONES[name]) for name in MEANINGS]
-    blocks = (*departures(results), Statements(tuple(told), "lines"), numbers_table(rows))
+    blocks: tuple[PageBlock, ...] = (*departures(results), Statements(tuple(told), "lines"), numbers_table(rows))
     return Section("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
