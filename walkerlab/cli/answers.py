@@ -14,7 +14,7 @@ from walkerlab.report.numbers import count, fixed, length, listed, number, quant
 from walkerlab.report.outcomes import MODELS, WALKED, ends, walks
 from walkerlab.report.sections import adjustment, basin, families, gaits, stability
 from walkerlab.report.sections.models import CHANNELS
-from walkerlab.report.sections.paper_numbers import numbers_table
+from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Column, Table, in_lines, measured, side_by_side, table
 

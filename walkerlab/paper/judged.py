@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from enum import StrEnum
@@ -27,6 +28,13 @@ class JudgedNumber:
     contact: float | None
     verdict: Verdict
     evidence: str
+
+
+def judged(
+    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[Verdict, str]
+) -> JudgedNumber:
+    """A printed number beside those of the rigid model, by set of equations, and of the contact model."""
+    return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, *found)
 
 
 def agreement(printed: Printed, value: float | None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from walkerlab.paper.arithmetic import speed_difference
-from walkerlab.paper.judged import JudgedNumber, Verdict, agreement, regardless, weigh
+from walkerlab.paper.judged import JudgedNumber, Verdict, agreement, judged, regardless, weigh
 from walkerlab.paper.measured import Characteristics, LegErrors, Measured
 from walkerlab.paper.printed import (
     ANGLE_ERROR,
@@ -48,8 +48,9 @@ def strides_row(measured: Measured) -> JudgedNumber:
     went_on = contact.outcome == "walked"
     text = prose("evidence.strides", contact, done, went_on and done < STRIDES.value)
     otherwise = Verdict.EXPLAINED if went_on else Verdict.REFUTED
-    verdict, evidence = weigh(done >= STRIDES.value, otherwise, measured.departures.contact, text)
-    return JudgedNumber(STRIDES, strides.get("as-printed"), strides.get("corrected"), float(done), verdict, evidence)
+    return judged(
+        STRIDES, strides, float(done), weigh(done >= STRIDES.value, otherwise, measured.departures.contact, text)
+    )
 
 
 def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
@@ -70,7 +71,7 @@ def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str)
     otherwise = Verdict.EXPLAINED if aligned is not None and aligned <= limit else Verdict.REFUTED
     verdict = Verdict.REPRODUCED if raw is not None and raw <= limit else otherwise
     text = regardless(measured.departures.contact, text)
-    return JudgedNumber(entry, None, None, raw if aligned is None else aligned, verdict, text)
+    return judged(entry, {}, raw if aligned is None else aligned, (verdict, text))
 
 
 def of_legs(errors: LegErrors, which: str) -> tuple[float, ...]:
@@ -90,8 +91,7 @@ def step_length_row(measured: Measured) -> JudgedNumber:
     longest = max((*lengths.values(), *([] if contact is None else [contact])), default=0.0)
     text = prose("evidence.step_length", lengths, contact, longest)
     agrees = any(agreement(STEP_LENGTH, length) for length in lengths.values())
-    verdict, evidence = weigh(agrees, Verdict.REFUTED, measured.departures.rigid, text)
-    return JudgedNumber(STEP_LENGTH, lengths.get("as-printed"), lengths.get("corrected"), contact, verdict, evidence)
+    return judged(STEP_LENGTH, lengths, contact, weigh(agrees, Verdict.REFUTED, measured.departures.rigid, text))
 
 
 def velocity_difference_row(measured: Measured) -> JudgedNumber:
@@ -108,7 +108,7 @@ def velocity_difference_row(measured: Measured) -> JudgedNumber:
     agrees = bool(found) and max(found.values()) < VELOCITY_DIFFERENCE.value
     refuted = Verdict.REFUTED if sums >= VELOCITY_DIFFERENCE.value else Verdict.EXPLAINED
     verdict = Verdict.REPRODUCED if agrees else refuted
-    return JudgedNumber(VELOCITY_DIFFERENCE, found.get("as-printed"), found.get("corrected"), None, verdict, text)
+    return judged(VELOCITY_DIFFERENCE, found, None, (verdict, text))
 
 
 def of_row(table: Characteristics, name: str) -> float | None:
@@ -138,8 +138,7 @@ def matlab_row(entry: ResultRow, measured: Measured, study: PaperStudy) -> Judge
     otherwise = Verdict.EXPLAINED if taken else Verdict.REFUTED
     text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
     agrees = any(agreement(entry.matlab, value) for value in rigid.values())
-    verdict, evidence = weigh(agrees, otherwise, measured.departures.rigid, text)
-    return JudgedNumber(entry.matlab, rigid.get("as-printed"), rigid.get("corrected"), contact, verdict, evidence)
+    return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
 
 
 def adams_row(entry: ResultRow, measured: Measured) -> JudgedNumber:
@@ -148,5 +147,4 @@ def adams_row(entry: ResultRow, measured: Measured) -> JudgedNumber:
     text = prose("evidence.adams", entry, measured, names_of(entry))
     otherwise = Verdict.EXPLAINED if contact is None else Verdict.REFUTED
     agrees = bool(agreement(entry.adams, contact))
-    verdict, evidence = weigh(agrees, otherwise, measured.departures.contact, text)
-    return JudgedNumber(entry.adams, rigid.get("as-printed"), rigid.get("corrected"), contact, verdict, evidence)
+    return judged(entry.adams, rigid, contact, weigh(agrees, otherwise, measured.departures.contact, text))

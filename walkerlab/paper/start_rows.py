@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from walkerlab.paper.arithmetic import MM, percent_of
-from walkerlab.paper.judged import JudgedNumber, Verdict, agreement, regardless, weigh
+from walkerlab.paper.judged import JudgedNumber, Verdict, agreement, judged, regardless, weigh
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import (
     COORDINATES,
@@ -63,8 +63,7 @@ def input_of_contact(entry: Printed, value: float, measured: Measured) -> Judged
     """A parameter of the contact model alone."""
     agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
     text = prose("evidence.input", value, entry.unit)
-    verdict, evidence = weigh(agrees, Verdict.EXPLAINED, measured.departures.contact, text)
-    return JudgedNumber(entry, None, None, value, verdict, evidence)
+    return judged(entry, {}, value, weigh(agrees, Verdict.EXPLAINED, measured.departures.contact, text))
 
 
 def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> JudgedNumber:
@@ -72,8 +71,7 @@ def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> Judg
     values = {name: model.state[coordinate] for name, model in measured.models.items()}
     found = {name: agreement(entry, value) for name, value in values.items()}
     text = prose("evidence.fixed_point", values, found)
-    verdict, evidence = weigh(any(found.values()), Verdict.REFUTED, measured.departures.rigid, text)
-    return JudgedNumber(entry, values.get("as-printed"), values.get("corrected"), None, verdict, evidence)
+    return judged(entry, values, None, weigh(any(found.values()), Verdict.REFUTED, measured.departures.rigid, text))
 
 
 def eigenvalue_row(measured: Measured) -> JudgedNumber:
@@ -81,15 +79,13 @@ def eigenvalue_row(measured: Measured) -> JudgedNumber:
     radii = measured.spectral_radii
     stable = bool(radii) and all(radius < EIGENVALUES.value for radius in radii.values())
     text = prose("evidence.eigenvalue", radii)
-    verdict, evidence = weigh(stable, Verdict.REFUTED, measured.departures.rigid, text)
-    return JudgedNumber(EIGENVALUES, radii.get("as-printed"), radii.get("corrected"), None, verdict, evidence)
+    return judged(EIGENVALUES, radii, None, weigh(stable, Verdict.REFUTED, measured.departures.rigid, text))
 
 
 def unitless_row(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
     """Stiffness or damping, which are printed without a unit."""
     text = prose("evidence.unitless", measured.contact)
-    verdict, evidence = weigh(False, Verdict.EXPLAINED, measured.departures.contact, text)
-    return JudgedNumber(entry, None, None, value, verdict, evidence)
+    return judged(entry, {}, value, weigh(False, Verdict.EXPLAINED, measured.departures.contact, text))
 
 
 def lost_balance_row(measured: Measured) -> JudgedNumber:
@@ -99,8 +95,7 @@ def lost_balance_row(measured: Measured) -> JudgedNumber:
     short = None if right is None else 100.0 * (1.0 - X_P[3].value / right.state[3])
     text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
     agrees = outcome != "walked" and steps == LOST_BALANCE.value
-    verdict, evidence = weigh(agrees, Verdict.REFUTED, measured.departures.contact, text)
-    return JudgedNumber(LOST_BALANCE, None, None, float(steps), verdict, evidence)
+    return judged(LOST_BALANCE, {}, float(steps), weigh(agrees, Verdict.REFUTED, measured.departures.contact, text))
 
 
 def raised_percent(measured: Measured, coordinate: int) -> float | None:
@@ -123,7 +118,7 @@ def raised_row(entry: Printed, table_row: StartRow, measured: Measured) -> Judge
     verdict = Verdict.REPRODUCED if agrees else Verdict.REFUTED
     text = prose("evidence.raised", measured.contact, velocities_raised(measured))
     text = regardless(measured.departures.contact, text)
-    return JudgedNumber(entry, None, None, raised_percent(measured, TABLE_2.index(table_row)), verdict, text)
+    return judged(entry, {}, raised_percent(measured, TABLE_2.index(table_row)), (verdict, text))
 
 
 def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> JudgedNumber:
@@ -133,7 +128,7 @@ def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> Jud
     otherwise = Verdict.EXPLAINED if agreement(entry, percent.of_adams) else Verdict.REFUTED
     verdict = Verdict.REPRODUCED if agrees else otherwise
     text = regardless(measured.departures.contact, prose("evidence.percent", percent, verdict))
-    return JudgedNumber(entry, None, None, raised_percent(measured, coordinate), verdict, text)
+    return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
 
 
 def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
@@ -144,4 +139,4 @@ def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: 
     text = prose("evidence.adams_start", study, is_angle, measured.contact, velocities_raised(measured))
     otherwise = Verdict.EXPLAINED if is_angle or study.adams.starts_a_gait else Verdict.REFUTED
     verdict = Verdict.REPRODUCED if agreement(entry, value) else otherwise
-    return JudgedNumber(entry, None, None, value, verdict, regardless(measured.departures.contact, text))
+    return judged(entry, {}, value, (verdict, regardless(measured.departures.contact, text)))

@@ -143,6 +143,14 @@ def row(columns: Sequence[Column], record: Any) -> tuple[Cell, ...]:
     return tuple(column.cell(record, place) for place, column in enumerate(columns))
 
 
+def grouped(records: Iterable[Mapping[str, Any]], key: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Records by what they have under a key, in the order in which that comes first."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for record in records:
+        found.setdefault(str(record[key]), []).append(record)
+    return found
+
+
 def side_by_side(
     caption: str,
     lines: Sequence[Column],

@@ -81,7 +81,7 @@ def write_pages(
 
 
 def absent(config: Config, left_out: Sequence[LeftOut]) -> tuple[Absent, ...]:
-    """What there is no result of; what was tried itself, and not given up for want of another, has failed."""
+    """Stages without a result; what was tried itself, and not given up for want of another, has failed."""
     names = {entry.what for entry in left_out}
     return tuple(Absent(one.what, one.why, has_failed(config, one.what, names), one.saves) for one in left_out)
 

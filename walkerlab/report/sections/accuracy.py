@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any
 
 from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.report.numbers import NONE, listed, number, power_of_ten, whole
+from walkerlab.report.numbers import listed, number, power_of_ten, whole
 from walkerlab.report.results import Results
-from walkerlab.report.tables import Cell, Column, Table, table
+from walkerlab.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.report.words import words
 
 STAGE = "accuracy"
@@ -63,7 +63,7 @@ def costs(summary: Row) -> Table:
         Column("method", method_of),
         *least,
         Column("smallest error", smallest_error, numeric=True),
-        Column("its right-hand sides", lambda method: most_exact(method).get("rhs_evaluations"), whole_or_none, True),
+        Column("its right-hand sides", lambda method: most_exact(method).get("rhs_evaluations"), whole, True),
         Column("ended otherwise", failures, wide=True),
     )
     methods = {scene: methods_of(summary, scene) for scene in summary["reference"]}
@@ -74,10 +74,7 @@ def costs(summary: Row) -> Table:
 def methods_of(summary: Row, scene: str) -> list[Row]:
     """The methods of a scene, each with its runs and with how well the reference is known."""
     best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
-    runs: dict[str, list[Row]] = {}
-    for row in summary["rows"]:
-        if row["scene"] == scene:
-            runs.setdefault(row["method"], []).append(row)
+    runs = grouped((row for row in summary["rows"] if row["scene"] == scene), "method")
     return [{"method": name, "best": name in best, "runs": mine, "known": known} for name, mine in runs.items()]
 
 
@@ -110,11 +107,6 @@ def smallest_error(method: Row) -> str:
     """The smallest error reached; what the reference is known to bounds what can be told of it."""
     error = most_exact(method).get("error")
     return number(error, 2) if error is None or error > method["known"] else f"≤ {number(method['known'], 2)}"
-
-
-def whole_or_none(value: int | None) -> str:
-    """A count; a dash for none."""
-    return NONE if value is None else whole(value)
 
 
 def failures(method: Row) -> str:

@@ -74,12 +74,12 @@ def slipping(summary: Mapping[str, Any]) -> list[Row]:
             ["slip, step by step", span(slips, "mm", 3), "of the stance foot's material, from its touch to its lift"]
         )
     if summary.get("rolling_per_step_m"):
-        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the round foot, which is no slip"])
+        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the round foot: rolling, not slip"])
     return rows
 
 
 def energies(summary: Mapping[str, Any]) -> list[Row]:
-    """Where the energy went, and whether the books balance."""
+    """Where the energy went, and whether it balances."""
     residual = summary["energy_balance_residual_J"]
     rows: list[Row] = [
         ["energy balance residual", f"{residual_in_words(residual)} J", "largest, of mechanical and dissipated energy"]

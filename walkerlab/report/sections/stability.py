@@ -10,7 +10,7 @@ from typing import Any
 from walkerlab.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section
 from walkerlab.report.numbers import count, number, whole
 from walkerlab.report.results import Results
-from walkerlab.report.tables import Cell, Column, Table, Tone, table
+from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, table
 from walkerlab.report.words import words
 from walkerlab.verification.verdict import BUDGET_USED
 
@@ -77,13 +77,10 @@ CASE_COLUMNS = (
 
 def case_table(cases: Rows) -> Table:
     """Every case, by family."""
-    families: dict[str, list[Row]] = {}
-    for row in cases:
-        families.setdefault(str(row["family"]), []).append(row)
     unanswered = [(str(row["second_tried"]), row) for row in cases if row["second_tried"]]
     missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
     note = words("stability.cases", by_reason(unanswered), by_reason(missed))
-    return table("Extreme cases", CASE_COLUMNS, families, wordy=True, note=note)
+    return table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note)
 
 
 def by_reason(reasons: Sequence[tuple[str, Row]]) -> str:
@@ -117,12 +114,10 @@ def known_table(known: Rows) -> Table:
 
 def ordinary_table(summary: Row) -> Table:
     """What ordinary methods do with the cases: one row a case, one column a method."""
-    cases: dict[str, dict[str, Row]] = {}
-    for row in summary["ordinary"]:
-        cases.setdefault(str(row["case"]), {})[str(row["method"])] = row
-    methods = dict.fromkeys(method for tried in cases.values() for method in tried)
+    methods = grouped(summary["ordinary"], "method")
     columns = [Column("case", "case"), *(Column(shortened(method), method, ordinary_cell) for method in methods)]
-    records = [{"case": case, **tried} for case, tried in cases.items()]
+    tried = grouped(summary["ordinary"], "case").items()
+    records = [{"case": case, **{row["method"]: row for row in rows}} for case, rows in tried]
     note = words("stability.ordinary", summary)
     return table("What an ordinary choice of method does", columns, records, note=note)
 

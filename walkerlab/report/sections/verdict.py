@@ -11,9 +11,8 @@ from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, State
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Absent, Results
-from walkerlab.report.sections.errata import errata
 from walkerlab.report.sections.models import departure
-from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
+from walkerlab.report.sections.paper import TONES, errata, paper_numbers
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.words import words
 
