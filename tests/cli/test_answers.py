@@ -89,6 +89,7 @@ def test_a_long_walk_is_a_few_short_lines(stage):
     assert lines[0].endswith("walks all 20000 steps; the last takes 0.7000 s and is 0.3700 m long.")
     assert max(map(len, lines)) <= 120
     assert len(lines) < 12
+    assert row(lines, "period (s)") == [*["0.7000"] * 6, "…", *["0.7000"] * 2]
 
 
 def test_a_fall_is_told_with_its_advice():

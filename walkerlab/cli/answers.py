@@ -16,7 +16,7 @@ from walkerlab.report.sections import adjustment, basin, families, gaits, stabil
 from walkerlab.report.sections.models import CHANNELS
 from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.symbols import in_signs
-from walkerlab.report.tables import Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
@@ -115,9 +115,9 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 def each_step(summary: Summary) -> dict[str, Summary]:
     """What is known of each step that is shown, by its number; an ellipsis stands for the others."""
-    every = {column.of: summary.get(column.of) or [] for column in OF_EACH_STEP if isinstance(column.of, str)}
+    every = {str(column.of): found for column in OF_EACH_STEP if (found := summary.get(str(column.of)))}
     return {
-        str(place): {} if place == "…" else {key: values[place - 1] for key, values in every.items() if values}
+        str(place): {key: Cell("…") if place == "…" else values[place - 1] for key, values in every.items()}
         for place in elided(range(1, summary["steps"] + 1))
     }
 

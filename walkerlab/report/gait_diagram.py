@@ -23,7 +23,7 @@ GAP = 3.0
 """Time between samples, in those of the walk itself: a gait is looked at, not measured."""
 
 
-class Axis(NamedTuple):
+class DiagramAxis(NamedTuple):
     """From numbers to places on an axis."""
 
     least: float
@@ -44,11 +44,11 @@ class Axis(NamedTuple):
         return tuple((self.place(number * step), f"{number * step:.6g}") for number in numbers)
 
 
-def scale_of(values: NDArray[np.float64], start: float, end: float) -> Axis:
+def scale_of(values: NDArray[np.float64], start: float, end: float) -> DiagramAxis:
     """An axis for some numbers, with a little room at its ends."""
     least, most = float(values.min()), float(values.max())
     room = 0.04 * (most - least) or 1.0
-    return Axis(least - room, most + room, start, end)
+    return DiagramAxis(least - room, most + room, start, end)
 
 
 def gait_diagram(results: Results) -> Diagram | None:
@@ -96,7 +96,9 @@ def branches_of(results: Results) -> Iterator[tuple[str, Group]]:
         number += 1
 
 
-def curves(branch: Group, across: Axis, up: Axis) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
+def curves(
+    branch: Group, across: DiagramAxis, up: DiagramAxis
+) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
     """A line for each step of a branch's gaits and each stretch of one stability."""
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
@@ -107,7 +109,7 @@ def curves(branch: Group, across: Axis, up: Axis) -> Iterator[tuple[tuple[tuple[
             yield tuple((across.place(float(x)), up.place(float(y))) for x, y in points), bool(stable[begin])
 
 
-def gaits(results: Results, across: Axis, up: Axis) -> Iterator[GaitMark]:
+def gaits(results: Results, across: DiagramAxis, up: DiagramAxis) -> Iterator[GaitMark]:
     """The gaits whose motion was stored, branch by branch."""
     unit = str((results.summary("continuation") or {})["unit"])
     for path, branch in branches_of(results):

@@ -40,11 +40,11 @@ class Cell:
         return self.text in ("", NONE)
 
 
-def plainly(value: Any) -> str | Cell:
-    """A text or cell as it is, a truth value as yes or no, a dash for None."""
+def plainly(value: Any) -> str:
+    """A text as it is, a truth value as yes or no, a dash for None."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return value if isinstance(value, Cell) else NONE if value is None else str(value)
+    return NONE if value is None else str(value)
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Column:
 
     title    its head, with the unit
     of       key of a record's value, or a function of the record; without one a record is a row of cells
-    written  a value as text, or as a cell with a tone
+    written  a value as text, or as a cell with a tone; a cell in the place of a value stays as it is
     numeric  numbers, which stand under one another
     wide     sentences, for which a terminal has no room
     """
@@ -73,7 +73,7 @@ class Column:
     def cell(self, record: Any, place: int = 0) -> Cell:
         """A record's cell in the column at this place."""
         value = self.value(record, place)
-        written = self.written(value)
+        written = value if isinstance(value, Cell) else self.written(value)
         return written if isinstance(written, Cell) else Cell(written, value=value)
 
 

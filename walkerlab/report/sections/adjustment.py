@@ -166,12 +166,12 @@ def starts_table(results: Results, summary: Summary) -> Table:
     return table("Table 2 again: the start before and after the adjustment", (row, *beside), rows, note=note)
 
 
-def joules(value: float | str) -> str:
-    """An energy, or what stands in its place."""
-    return value if isinstance(value, str) else quantity(value, "J")
+def joules(value: float) -> str:
+    """An energy."""
+    return quantity(value, "J")
 
 
-def lost(channel: str, gait: Summary) -> float | str | None:
+def lost(channel: str, gait: Summary) -> float | Cell | None:
     """What a gait dissipates in a channel (J); None of knees that take nothing."""
     into = gait["lost_J"].get(channel)
     return into if into or channel in ("damping", "friction") else None
@@ -192,7 +192,7 @@ GAIT_LINES = (
     Column("largest multiplier", "spectral_radius", partial(number, digits=4)),
     Column("multipliers", "multipliers", factors),
     Column("stable", "stable"),
-    Column("slip a step", "slip_m", lambda value: value if isinstance(value, str) else length(value)),
+    Column("slip a step", "slip_m", length),
     *(
         Column(f"energy lost {said}", partial(lost, channel), joules)
         for channel, said in {
@@ -217,8 +217,8 @@ def gait_table(summary: Summary, rigid: Summary | None) -> Table:
     """The contact gait beside the rigid one."""
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {channel: said for channel, said in OF_RIGID.items() if lost(channel, gait) is not None}
-    beside = {**(rigid or {}), "slip_m": "none", "lost_J": losses, "height_lost_J": "the same as lost"}
+    losses = {channel: Cell(said) for channel, said in OF_RIGID.items() if lost(channel, gait) is not None}
+    beside = {**(rigid or {}), "slip_m": Cell("none"), "lost_J": losses, "height_lost_J": Cell("the same as lost")}
     gaits = {"contact model": gait, "rigid model": beside}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 
