@@ -234,6 +234,7 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
         ["start", "slow", "0.5"],
         ["ground", "slow", "0.5"],
     ]
+    assert as_csv(shown).decode().splitlines()[:2] == ["family,case,error,why", f"start,slow,0.5,{LONG}"]
 
 
 def test_records_side_by_side_have_a_row_for_what_one_of_them_has():

@@ -181,17 +181,27 @@ def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] 
     return table("", columns, cells)
 
 
-def in_lines(shown: Table) -> list[str]:
-    """A table on a terminal: no sentences, and the titles of groups as a column of their own."""
-    kept = [place for place, column in enumerate(shown.columns) if not column.wide]
-    grouped = any(body.title for body in shown.bodies)
-    heads = [*([shown.by] if grouped else []), *(shown.columns[place].title for place in kept)]
+def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+    """Heads and rows of a table, the titles of its groups as a column of their own.
+
+    wide  whether columns of sentences are among them
+    """
+    kept = [place for place, column in enumerate(shown.columns) if wide or not column.wide]
+    titled = any(body.title for body in shown.bodies)
+    heads = [*([shown.by] if titled else []), *(shown.columns[place].title for place in kept)]
     rows = [
-        [*([body.title] if grouped else []), *(row[place].text for place in kept)]
+        [*([Cell(body.title, value=body.title)] if titled else []), *(row[place] for place in kept)]
         for body in shown.bodies
         for row in body.rows
     ]
-    return aligned([heads, *rows] if any(heads) else rows) if rows else []
+    return heads, rows
+
+
+def in_lines(shown: Table) -> list[str]:
+    """A table on a terminal, without sentences."""
+    heads, rows = flat(shown)
+    texts = [[cell.text for cell in row] for row in rows]
+    return aligned([heads, *texts] if any(heads) else texts) if texts else []
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -210,8 +220,8 @@ def width(text: str) -> int:
 
 def as_csv(shown: Table) -> bytes:
     """A table's values as CSV."""
-    heads = [column.title for column in shown.columns]
-    return csv_text(heads, ([cell.value for cell in row] for body in shown.bodies for row in body.rows))
+    heads, rows = flat(shown, wide=True)
+    return csv_text(heads, ([cell.value for cell in row] for row in rows))
 
 
 def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
@@ -225,11 +235,10 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 def as_tex(shown: Table) -> bytes:
     """A table's values for LaTeX with the package booktabs; sentences are left out."""
-    kept = [place for place, column in enumerate(shown.columns) if not column.wide]
-    heads = [shown.columns[place].title.replace("_", " ") for place in kept]
-    rows = [[row[place].value for place in kept] for body in shown.bodies for row in body.rows]
-    head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in (heads, *rows)]
-    body = [rf"\begin{{tabular}}{{{'l' * len(kept)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
+    heads, rows = flat(shown)
+    values = [[name.replace("_", " ") for name in heads], *([cell.value for cell in row] for row in rows)]
+    head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in values]
+    body = [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
     return "\n".join([*body, r"\end{tabular}", ""]).encode()
 
 
