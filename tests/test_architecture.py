@@ -33,6 +33,7 @@ LAYERS = (
     "config",
     "kernels",
     "labels",
+    "prose",
     "errors",
 )
 SOURCES = sorted(PACKAGE.rglob("*.py"))

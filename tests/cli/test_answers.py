@@ -3,8 +3,11 @@
 import pytest
 
 from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
-from walkerlab.cli.text import COLUMNS, aligned, described_summary, width
+from walkerlab.cli.text import COLUMNS, described_summary
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.report.numbers import number
+from walkerlab.report.sections.gaits import gait_table
+from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
@@ -40,39 +43,39 @@ def cells(lines):
 
 def test_multipliers_are_written_as_complex_numbers():
     lines = answer("fixedpoint", GAIT)
-    assert row(lines, "multiplier 1") == ["0.3633", "+", "0.4596i"]
-    assert row(lines, "multiplier 2") == ["0.3633", "−", "0.4596i"]
-    assert row(lines, "multiplier 3") == ["0.2160"]
+    assert row(lines, "multipliers λ₁") == ["0.3633", "+", "0.4596i"]
+    assert row(lines, "λ₂") == ["0.3633", "−", "0.4596i"]
+    assert row(lines, "λ₃") == ["0.2160"]
 
 
 def test_what_is_right_is_named_only_beside_what_is_misprinted():
-    assert ["value", "unit"] in cells(answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}}))
+    assert ["quantity", "value"] in cells(answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}}))
     printed = {**GAIT, "equations": "as-printed"}
-    assert ["as", "printed", "unit"] in cells(answer("fixedpoint", printed))
+    assert ["quantity", "as", "printed"] in cells(answer("fixedpoint", printed))
 
 
 def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
     printed = {**GAIT, "equations": "as-printed", "state": [-0.2022, 0.1674, -0.6006, -0.8466]}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert lines[0].startswith("On a slope of 0.0174 rad (0.997°) there is a stable gait")
-    assert ["corrected", "as", "printed", "unit"] in cells(lines)
-    assert row(lines, "θ₁") == ["−0.204200", "−0.202200", "rad"]
+    assert ["quantity", "corrected", "as", "printed"] in cells(lines)
+    assert row(lines, "θ₁ (rad)") == ["−0.204200", "−0.202200"]
     assert "0.70360123456789" not in "\n".join(lines)
 
 
 def test_a_misprint_that_makes_no_difference_has_no_column():
     printed = {**GAIT, "equations": "as-printed", "energy_drift_J": 1e-15}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
-    assert ["value", "unit"] in cells(lines)
+    assert ["quantity", "value"] in cells(lines)
 
 
 def test_a_walker_with_more_angles_has_its_own_names():
     gait = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2]}
     names = ["theta_1", "theta_2", "theta_1_shank", "dtheta_1", "dtheta_2", "dtheta_1_shank"]
     lines = answer("fixedpoint", {**gait, "state_names": names, "equation_sets": {"corrected": gait}})
-    assert row(lines, "θ₁, shank") == ["0.300000", "rad"]
-    assert row(lines, "θ̇₁") == ["1.000000", "rad/s"]
-    assert row(lines, "θ̇₁, shank") == ["1.200000", "rad/s"]
+    assert row(lines, "θ₁, shank (rad)") == ["0.300000"]
+    assert row(lines, "θ̇₁ (rad/s)") == ["1.000000"]
+    assert row(lines, "θ̇₁, shank (rad/s)") == ["1.200000"]
 
 
 def test_without_a_gait_the_reason_is_the_answer():
@@ -86,6 +89,7 @@ def test_a_long_walk_is_a_few_short_lines(stage):
     assert lines[0].endswith("walks all 20000 steps; the last takes 0.7000 s and is 0.3700 m long.")
     assert max(map(len, lines)) <= 120
     assert len(lines) < 12
+    assert row(lines, "period (s)") == [*["0.7000"] * 6, "…", *["0.7000"] * 2]
 
 
 def test_a_fall_is_told_with_its_advice():
@@ -153,8 +157,8 @@ def test_how_far_a_start_may_change_is_told_in_signs():
     change = {"needed": False, "found": True, "margins": margins}
     cells = {"walks_share": 0.296, "cells": 3721}
     lines = answer("tune", {"adjustment": change, "gait": {"found": False, "reason": "none was sought"}, "map": cells})
-    assert " ".join(row(lines, "θ̇₁ down")) == "walks to a factor of 0, as far as searched"
-    assert " ".join(row(lines, "both up")) == "walks to a factor of 1.107; beyond: off-pad"
+    assert " ".join(row(lines, "θ̇₁ down")) == "0 nothing, as far as searched"
+    assert " ".join(row(lines, "both up")) == "1.1066 off-pad"
 
 
 def test_long_rows_keep_their_ends():
@@ -206,3 +210,44 @@ def test_whatever_stage_speaks_its_paragraphs_have_lines_of_one_length(stage):
     lines = answer(stage, SAYS_MUCH[stage])
     assert sum(line.count("word") for line in lines) == 60
     assert max(map(len, lines)) <= COLUMNS
+
+
+def test_a_gait_is_one_table_on_page_and_terminal():
+    gaits = {"as-printed": {**GAIT, "equations": "as-printed"}, "corrected": GAIT}
+    shown = gait_table(gaits, ["theta_1", "theta_2", "dtheta_1", "dtheta_2"])
+    lines = in_lines(shown)
+    for cells in (row for body in shown.bodies for row in body.rows):
+        assert " ".join(row(lines, cells[0].text)) == " ".join(cell.text for cell in cells[1:])
+    assert cells_of_head(lines) == " ".join(column.title for column in shown.columns)
+
+
+def cells_of_head(lines):
+    return " ".join(lines[0].split())
+
+
+def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_groups():
+    columns = [Column("case", "name"), Column("error", "error", number, numeric=True), Column("why", "why", wide=True)]
+    record = {"name": "slow", "error": 0.5, "why": LONG}
+    shown = table("Cases", columns, {"start": [record], "ground": [record]}, by="family")
+    assert [line.split() for line in in_lines(shown)] == [
+        ["family", "case", "error"],
+        ["start", "slow", "0.5"],
+        ["ground", "slow", "0.5"],
+    ]
+    assert as_csv(shown).decode().splitlines()[:2] == ["family,case,error,why", f"start,slow,0.5,{LONG}"]
+
+
+def test_records_side_by_side_have_a_row_for_what_one_of_them_has():
+    lines = [measured("period", "period_s"), measured("slip", "slip_m", prefix="m"), measured("torque", "torque_N")]
+    shown = side_by_side("", lines, {"rigid": {"period_s": 0.7}, "contact": {"period_s": 0.71, "slip_m": 5e-4}})
+    assert [[cell.text for cell in row] for row in shown.bodies[0].rows] == [
+        ["period (s)", "0.7", "0.71"],
+        ["slip (mm)", "", "0.5"],
+    ]
+
+
+def test_what_is_written_for_people_and_for_programs_comes_from_one_cell():
+    shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
+    assert in_lines(shown) == ["period (s)", "0.7"]
+    assert as_csv(shown) == b"period (s)\n0.7036\n"
+    assert rb"$0.7036$ \\" in as_tex(shown)

@@ -1,6 +1,7 @@
 """JSON values as text for people."""
 
-from walkerlab.cli.text import LONGEST_CELL, described_summary, table
+from walkerlab.cli.text import described_summary, table
+from walkerlab.report.tables import LONGEST_CELL
 
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 

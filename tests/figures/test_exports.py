@@ -11,11 +11,12 @@ from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
-from walkerlab.cli.exports import cell, export_from
+from walkerlab.cli.exports import export_from
 from walkerlab.cli.films import Film, write_film
 from walkerlab.cli.named import walk_in
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.report.tables import in_tex
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
@@ -72,9 +73,9 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
 def test_a_table_for_latex_guards_its_letters(run):
     text = export_from(run, "table-3", "tex", None, 2, "").read_text()
     assert r"t\_left & s & $0.7$ \\" in text
-    assert cell(1.5e-9) == r"$1.5 \times 10^{-9}$"
-    assert cell("50 %") == r"50 \%"
-    assert cell("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
+    assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
+    assert in_tex("50 %") == r"50 \%"
+    assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
 
 
 @pytest.mark.parametrize("name", ["7", "07", "figure-7", "fig 7"])

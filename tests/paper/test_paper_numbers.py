@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from walkerlab.config.schema import Contact
 from walkerlab.mechanics.standing import Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
+from walkerlab.paper.judged import Verdict, agreement, weigh
 from walkerlab.paper.measured import (
     Characteristics,
     ContactModel,
     Departures,
+    EnergyRecord,
     Errors,
     LegErrors,
     Measured,
@@ -39,7 +42,6 @@ from walkerlab.paper.printed import (
 from walkerlab.paper.result_rows import result_rows
 from walkerlab.paper.start_rows import start_rows
 from walkerlab.paper.study import study_the_paper
-from walkerlab.paper.verdict import Verdict, agreement, weigh
 from walkerlab.solvers.scipy_methods import right_hand_side
 
 
@@ -119,24 +121,16 @@ def study():
 
 
 def contact_model(**changed):
+    walk = {"outcome": "walked", "steps": 10, "static_penetration_m": 5.88e-5, "damping_ratio": 3.71}
     model = ContactModel(
-        outcome="walked",
-        steps=10,
+        law=Contact(),
+        foot_radius=0.001,
+        summary=walk | {name: changed.pop(name) for name in ("outcome", "steps") if name in changed},
         start=(-0.2042, 0.1694, -0.6058, -0.8610),
         table_3=Characteristics(0.7111, 0.7110, 1.4221, 0.5075, 150.03),
         step_length=0.3608,
-        energy_least=149.99,
-        energy_most=150.36,
-        stiffness=1e5,
-        damping=90.0,
-        units="adams",
-        static_friction=0.9,
-        dynamic_friction=0.7,
-        static_penetration=5.88e-5,
-        damping_ratio=3.71,
-        foot_radius=0.001,
-        x_p_steps=10,
-        x_p_outcome="walked",
+        energy=EnergyRecord(150.03, 149.99, 150.36),
+        from_x_p=(10, "walked"),
     )
     return replace(model, **changed)
 
@@ -198,7 +192,7 @@ def test_a_start_that_walks_does_not_explain_a_fall(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.contact) == (Verdict.REFUTED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence
-    assert rows(x_p_steps=1, x_p_outcome="fell")[LOST_BALANCE].verdict == Verdict.REPRODUCED
+    assert rows(from_x_p=(1, "fell"))[LOST_BALANCE].verdict == Verdict.REPRODUCED
 
 
 def test_the_adams_start_falls_when_another_integration_says_so(study):
@@ -252,7 +246,7 @@ def test_five_gait_cycles_are_refuted_by_a_fall_and_not_by_a_short_request(rows)
 def test_a_walk_that_fell_at_once_leaves_gaps(rows):
     nothing = Characteristics(None, None, None, None, None)
     gone = {"steps": 0, "outcome": "fell", "table_3": nothing, "step_length": None, "start": None}
-    found = rows(**gone, energy_least=None, energy_most=None)
+    found = rows(**gone, energy=None)
     assert all(found[row.adams].contact is None for row in TABLE_3)
     assert all("None" not in row.evidence for row in found.values())
 

@@ -3,9 +3,10 @@
 import pytest
 from synthetic_results import config, fixedpoint, stored
 
-from walkerlab.report.blocks import Findings, Table
+from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections.accuracy import introduction, section
+from walkerlab.report.tables import Table
 
 
 def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
@@ -89,7 +90,7 @@ def test_the_fastest_methods_are_marked(made):
 
 
 def test_conclusions_stand_beside_their_scenes(made):
-    findings = next(block for block in made.blocks if isinstance(block, Findings))
+    findings = next(block for block in made.blocks if isinstance(block, Statements))
     assert [(item.about, item.text) for item in findings.items] == [
         ("rigid", "At 1e-03, dop853 is fastest."),
         ("contact", "At 1e-03, radau5 is fastest."),

@@ -7,13 +7,17 @@ import re
 
 import pytest
 from html_page import Page
+from jinja2 import UndefinedError
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
-from walkerlab.report.blocks import MAIN, Cell, Column, Finding, Findings, Paragraph, Picture, Section, Shares, table
+from walkerlab.paper import prose
+from walkerlab.report import words
+from walkerlab.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
 from walkerlab.report.page import Page as Sheet
 from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.tables import Cell, Column, table
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"
@@ -152,7 +156,7 @@ def test_any_block_may_hold_any_text():
         NASTY,
         (
             Paragraph(NASTY, "bad"),
-            Findings((Finding(NASTY, NASTY, NASTY, "fair"),)),
+            Statements((Statement(NASTY, NASTY, NASTY, "fair"),)),
             Shares(NASTY, ((NASTY, 2, "good"), (NASTY, 1, "bad"))),
             table(NASTY, [Column(NASTY), Column(NASTY, numeric=True)], [[NASTY, NASTY]], wordy=True, note=NASTY),
         ),
@@ -185,3 +189,18 @@ def test_a_row_with_a_cell_too_few_is_refused():
 
 def test_the_script_is_small():
     assert len(source("page.js").encode()) + len(source("player.js").encode()) < 30_000
+
+
+@pytest.mark.parametrize("templates", [words.templates(), prose.templates()], ids=["page", "paper"])
+def test_sentences_name_only_what_there_is(templates):
+    names = templates.list_templates(extensions=["j2"])
+    assert names
+    for name in names:
+        templates.get_template(name)  # an unknown filter is refused here
+    with pytest.raises(UndefinedError):
+        templates.from_string("{{ numbr }}").render()
+
+
+def test_a_sentence_is_one_line_and_keeps_the_blanks_of_its_numbers():
+    assert words.words("models.locking", 0.3486, 0.3485).count("\u00a0s") == 2
+    assert "\n" not in words.words("stability.judgement")

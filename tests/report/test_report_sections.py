@@ -26,13 +26,14 @@ from synthetic_results import (
 )
 
 from walkerlab.config.loader import load
-from walkerlab.report.blocks import PAPER, Code, Findings, Paragraph, Player, Section, Shares, Table
+from walkerlab.report.blocks import PAPER, Code, Paragraph, Player, Section, Shares, Statements
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections import assumptions
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
+from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.store.content import Group, Variable
 
@@ -132,7 +133,7 @@ def test_nothing_missing_is_said_too():
 
 def test_a_walker_that_fell_says_so_before_one_that_walked():
     (walks, *_) = blocks(
-        sections(**{"contact-sim": contact_sim("fell", 3, hip=0.4999, damping_ratio=0.03)})["verdict"], Findings
+        sections(**{"contact-sim": contact_sim("fell", 3, hip=0.4999, damping_ratio=0.03)})["verdict"], Statements
     )
     fallen, walked, _gait = walks.items
     assert (fallen.about, fallen.badge, fallen.tone) == ("Contact model", "fell", "bad")
@@ -154,7 +155,7 @@ def test_a_walker_that_fell_says_so_before_one_that_walked():
 )
 def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
     walk = contact_sim(outcome, 2, **changed)
-    (walks, *_) = blocks(sections(["simulate"], **{"contact-sim": walk})["verdict"], Findings)
+    (walks, *_) = blocks(sections(["simulate"], **{"contact-sim": walk})["verdict"], Statements)
     assert said in plain(walks.items[0].text)
 
 
@@ -166,20 +167,20 @@ def test_the_papers_numbers_are_counted_by_verdict():
 
 
 def test_the_verdict_says_which_numbers_fared_how():
-    said = {finding.about: finding.text for finding in blocks(sections()["verdict"], Findings)[1].items}
+    said = {finding.about: finding.text for finding in blocks(sections()["verdict"], Statements)[1].items}
     assert list(said) == ["Reproduced:", "Explained:", "Refuted:"]
     assert said["Refuted:"] == "Table 3 (all 2)."
 
 
 def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
-    (error,) = blocks(sections()["verdict"], Findings)[-1].items
+    (error,) = blocks(sections()["verdict"], Statements)[-1].items
     assert "A.5 row 2" in error.about
     assert "energy drifts by 0.13 J" in error.text
 
 
 def test_every_headline_is_of_an_erratum_that_is_looked_for():
-    places = Path(find_spec("walkerlab.paper").submodule_search_locations[0]) / "errata.py"
-    assert [start for start in HEADLINES if f'"{start}' not in places.read_text()] == []
+    errata = Path(find_spec("walkerlab.paper.prose").submodule_search_locations[0]) / "errata.j2"
+    assert [start for start in HEADLINES if f"where: {start}" not in errata.read_text()] == []
 
 
 def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_on_a_page_of_its_own():

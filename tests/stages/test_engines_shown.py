@@ -10,9 +10,10 @@ from walkerlab.config.loader import load
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.engines import COLOURS, FIGURES, series_of
 from walkerlab.labels import labels_of
-from walkerlab.report.blocks import Findings, Table
+from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections.engines import section
+from walkerlab.report.tables import Table
 
 ERRORS, PERIODS = FIGURES[:2]
 
@@ -75,7 +76,7 @@ def test_a_scene_that_was_not_walked_has_no_figure(results):
 
 
 def test_conclusions_come_first_in_the_section(made):
-    assert isinstance(made.blocks[1], Findings)
+    assert isinstance(made.blocks[1], Statements)
     assert [item.about for item in made.blocks[1].items] == ["compass, same law", "compass, own contact"]
 
 

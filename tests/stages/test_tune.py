@@ -11,7 +11,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
 from walkerlab.orbits.rigid_limit import ALL, NORMAL, Distance, Extrapolation, Setting
-from walkerlab.report.blocks import Findings
+from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
 from walkerlab.stages import fixedpoint, tune
@@ -102,7 +102,7 @@ def test_that_no_start_walks_is_an_answer_in_words(sets):
 
 def test_the_page_says_that_no_start_walks():
     results = Results(None, {"tune": small("contact-si", cells=3)})
-    (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Findings)]
+    (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Statements)]
     (told,) = found.items
     assert (told.about, told.tone) == ("Parameter adjustment", "bad")
     assert "None of 9 starts walked" in told.text

@@ -8,10 +8,10 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
-from walkerlab.report.blocks import Table
 from walkerlab.report.results import Results
 from walkerlab.report.sections import verdict as verdict_section
 from walkerlab.report.sections.stability import section
+from walkerlab.report.tables import Table
 from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.cells import CaseCell, cells_of, run_cells

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.cli.text import aligned, described_summary, paragraph
-from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.cli.text import described_summary, paragraph
+from walkerlab.labels import unit_by_name
 from walkerlab.report.gait_diagram import parameter
-from walkerlab.report.numbers import NONE, count, fixed, length, listed, number, quantity, told_apart
-from walkerlab.report.outcomes import LOOKED_FORWARD_TO, MODELS, ends, walks
-from walkerlab.report.sections.basin import shares
-from walkerlab.report.sections.families import findings as families
-from walkerlab.report.sections.gaits import STATE, complex_number, heads_of, multiplier, symbol
+from walkerlab.report.numbers import count, fixed, length, listed, number, quantity
+from walkerlab.report.outcomes import MODELS, WALKED, ends, walks
+from walkerlab.report.sections import adjustment, basin, families, gaits, stability
 from walkerlab.report.sections.models import CHANNELS
+from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
 
 Summary = Mapping[str, Any]
-Rows = Sequence[Sequence[str]]
-Answer = Callable[[Summary], list[str | Rows]]
-"""Paragraphs, and rows of tables."""
+Answer = Callable[[Summary], Sequence[str | Table]]
+"""Paragraphs, and tables."""
 
 SHOWN = 6
 """So many of a long row of numbers are shown."""
@@ -38,20 +36,21 @@ def answer(stage: str, summary: Summary) -> list[str]:
     return laid_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(described_summary(summary, short=True))
 
 
-def laid_out(blocks: Iterable[str | Rows]) -> list[str]:
-    """Paragraphs in lines, and tables in columns with an empty line before and after them."""
+def laid_out(blocks: Iterable[str | Table]) -> list[str]:
+    """Paragraphs in lines, and tables with an empty line before and after them."""
     lines: list[str] = []
     after_table = False
     for block in blocks:
-        table = not isinstance(block, str)
-        if block:
-            lines += [""] if lines and (table or after_table) else []
-            lines += paragraph(block) if isinstance(block, str) else aligned(block)
-            after_table = table
+        is_table = isinstance(block, Table)
+        laid = in_lines(block) if isinstance(block, Table) else paragraph(block)
+        if laid:
+            lines += [""] if lines and (is_table or after_table) else []
+            lines += laid
+            after_table = is_table
     return lines
 
 
-def fixedpoint(summary: Summary) -> list[str | Rows]:
+def fixedpoint(summary: Summary) -> list[str | Table]:
     """The gait under both sets of equations, side by side."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
@@ -62,11 +61,8 @@ def fixedpoint(summary: Summary) -> list[str | Rows]:
         f"in {fixed(summary['period_s'], 4)} s; the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
     )
     others = {name: one for name, one in summary.get("equation_sets", {}).items() if another_gait(one, summary)}
-    names = summary.get("state_names", STATE)
-    heads = heads_of([summary["equations"], *others])
-    rows = [["", *heads, "unit"], *gait_rows(names, [summary, *others.values()])]
-    found = f"{count(summary['gaits_found'], 'gait')} of one step found."
-    return [head, rows, found]
+    found = gaits.gait_table({summary["equations"]: summary, **others}, summary.get("state_names", gaits.STATE))
+    return [head, found, f"{count(summary['gaits_found'], 'gait')} of one step found."]
 
 
 def another_gait(one: Summary, summary: Summary) -> bool:
@@ -76,86 +72,58 @@ def another_gait(one: Summary, summary: Summary) -> bool:
     return any(fixed(a, 6) != fixed(b, 6) for a, b in zip(one["state"], summary["state"], strict=True))
 
 
-def gait_rows(names: Sequence[str], gaits: Sequence[Summary]) -> list[list[str]]:
-    """State, multipliers and measures of gaits, one column each."""
-    rows = [
-        [symbol(name), *(fixed(gait["state"][place], 6) for gait in gaits), "rad/s" if name.startswith("d") else "rad"]
-        for place, name in enumerate(names)
-    ]
-    most = max(len(gait["multipliers"]) for gait in gaits)
-    rows += [[f"multiplier {place + 1}", *(multiplier(gait, place) for gait in gaits), ""] for place in range(most)]
-    rows += [
-        [words, *("" if gait.get(key) is None else written(gait[key]) for gait in gaits), unit_of(key)]
-        for key, words, written in (
-            ("period_s", "step period", partial(fixed, decimals=5)),
-            ("step_length_m", "step length", partial(fixed, decimals=5)),
-            ("energy_J", "mean energy", partial(fixed, decimals=3)),
-            ("energy_drift_J", "energy drift", partial(number, digits=2)),
-            ("min_normal_force_N", "least normal force", partial(fixed, decimals=1)),
-            ("max_friction_ratio", "largest friction ratio", partial(fixed, decimals=4)),
-            ("max_scuff_depth_m", "scuffing depth", depth),
-        )
-        if any(key in gait for gait in gaits)
-    ]
-    return rows
+def told(words: str, key: str, digits: int = 4) -> Column:
+    """A number of a walk as a whole, with its unit."""
+    return Column(words, key, lambda value: quantity(value, unit_by_name(key), digits))
 
 
-def depth(value_m: float) -> str:
-    """A depth in metres."""
-    return number(told_apart(value_m), 4)
+def energy_lost(summary: Summary) -> str | None:
+    """Where a walk dissipated its energy; None if nowhere."""
+    lost = (summary.get("dissipated_J") or {}).items()
+    return listed(f"{quantity(value, 'J', 3)} {CHANNELS.get(name, name)}" for name, value in lost if value) or None
 
 
-def unit_of(key: str) -> str:
-    """The unit that a key ends in, as a table shows it: nothing for a pure number."""
-    unit = unit_by_name(key)
-    return "" if unit == "1" else unit
+OF_EACH_STEP = (
+    measured("period", "step_periods_s", partial(fixed, decimals=4)),
+    measured("length", "step_lengths_m", partial(fixed, decimals=4)),
+    measured("slip", "slips_m", partial(fixed, decimals=2), prefix="m"),
+)
+OF_THE_WALK = (
+    told("mean energy", "mean_energy_J", 7),
+    told("energy drift", "energy_drift_J", 2),
+    told("energy balance off by", "energy_balance_residual_J", 2),
+    Column("energy lost", energy_lost),
+    told("least normal force", "min_normal_force_N"),
+    told("largest friction ratio", "max_friction_ratio"),
+    Column("largest penetration", "max_penetration_m", length),
+    Column("scuffing depth", "max_scuff_depth_m", length),
+    told("right-hand sides", "rhs_evaluations", 9),
+)
 
 
-def walk(model: str, summary: Summary) -> list[str | Rows]:
+def walk(model: str, summary: Summary) -> list[str | Table]:
     """How a model's walk went, step by step."""
     steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
     head = f"The {model} {walks(steps, summary['outcome'])}"
     if periods:
         head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
-    rows = [["step", *map(str, shown_places(steps)), ""]] if steps else []
-    for words, values, unit in (("period", periods, "s"), ("length", lengths, "m")):
-        if values:
-            rows.append([words, *elided([fixed(value, 4) for value in values]), unit])
-    if summary.get("slips_m"):
-        slips = [fixed(1e3 * value, 2) for value in summary["slips_m"]]
-        rows.append(["slip", *elided([*slips, *[NONE] * (steps - len(slips))]), "mm"])
-    own = [[words, said] for words, said in walk_measures(summary) if said]
-    advised = summary.get("advice") and summary["outcome"] != LOOKED_FORWARD_TO
-    return [f"{head}.", rows, own, f"advice: {summary['advice']}" if advised else ""]
+    taken = side_by_side("", OF_EACH_STEP, each_step(summary), head="step")
+    advised = summary.get("advice") and summary["outcome"] != WALKED
+    whole = side_by_side("", OF_THE_WALK, {"": summary}, head="")
+    return [f"{head}.", taken, whole, f"advice: {summary['advice']}" if advised else ""]
 
 
-def walk_measures(summary: Summary) -> list[tuple[str, str]]:
-    """What was measured over a walk as a whole."""
-    dissipated = summary.get("dissipated_J") or {}
-    lost = listed(
-        f"{quantity(value, 'J', 3)} {CHANNELS.get(name, name)}" for name, value in dissipated.items() if value
-    )
-    return [
-        ("mean energy", told(summary, "mean_energy_J", 7)),
-        ("energy drift", told(summary, "energy_drift_J", 2)),
-        ("energy balance off by", told(summary, "energy_balance_residual_J", 2)),
-        ("energy lost", lost),
-        ("least normal force", told(summary, "min_normal_force_N")),
-        ("largest friction ratio", told(summary, "max_friction_ratio")),
-        ("largest penetration", length(summary["max_penetration_m"]) if "max_penetration_m" in summary else ""),
-        ("scuffing depth", length(summary["max_scuff_depth_m"]) if "max_scuff_depth_m" in summary else ""),
-        ("right-hand sides", told(summary, "rhs_evaluations", 9)),
-    ]
-
-
-def told(summary: Summary, key: str, digits: int = 4) -> str:
-    """A number of a summary with its unit; nothing if it is not there."""
-    return "" if summary.get(key) is None else quantity(summary[key], unit_by_name(key), digits)
-
-
-def shown_places(total: int) -> list[Any]:
-    """The numbers of the steps that are shown of so many."""
-    return elided(list(range(1, total + 1)))
+def each_step(summary: Summary) -> dict[str, Summary]:
+    """What is known of each step that is shown, by its number; an ellipsis stands for the others."""
+    every = {str(column.of): found for column in OF_EACH_STEP if (found := summary.get(str(column.of)))}
+    return {
+        str(place): {
+            key: Cell("…") if place == "…" else values[place - 1]
+            for key, values in every.items()
+            if place == "…" or place <= len(values)
+        }
+        for place in elided(range(1, summary["steps"] + 1))
+    }
 
 
 def elided(values: Sequence[Any]) -> list[Any]:
@@ -165,7 +133,7 @@ def elided(values: Sequence[Any]) -> list[Any]:
     return [*values[:SHOWN], "…", *values[-2:]]
 
 
-def tune(summary: Summary) -> list[str | Rows]:
+def tune(summary: Summary) -> list[str | Table]:
     """Whether other initial velocities are needed, and what the contact model's own gait is."""
     change, gait, cells = summary["adjustment"], summary["gait"], summary["map"]
     if not change["needed"]:
@@ -175,24 +143,17 @@ def tune(summary: Summary) -> list[str | Rows]:
         head = f"The smallest change that walks: θ̇₁ by a factor of {swing}, θ̇₂ by {stance}."
     else:
         head = f"No start was found that walks: {change['reason']}."
-    rows = [["starts on the map that walk", f"{100 * cells['walks_share']:.1f} % of {cells['cells']}"]]
-    if gait["found"]:
-        rows += [
-            ["own gait", "stable" if gait["stable"] else "unstable"],
-            ["step period", quantity(gait["period_s"], "s")],
-            ["step length", quantity(gait["step_length_m"], "m")],
-            ["slip a step", length(gait["slip_m"])],
-            ["largest multiplier", multiplier(gait, 0)],
-        ]
-    else:
-        rows.append(["own gait", f"none: {gait['reason']}"])
-    for name, margin in change.get("margins", {}).items():
-        beyond = f"; beyond: {margin['beyond']}" if margin["beyond"] else ", as far as searched"
-        rows.append([in_signs(name), f"walks to a factor of {number(margin['factor'], 4)}{beyond}"])
-    return [head, rows]
+    share = f"Of the {cells['cells']} starts on the map, {100 * cells['walks_share']:.1f} % walk."
+    own = (
+        side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
+        if gait["found"]
+        else f"No own gait: {gait['reason']}."
+    )
+    margins = [adjustment.margins_table(summary)] if change.get("margins") else []
+    return [head, share, own, *margins]
 
 
-def compare(summary: Summary) -> list[str | Rows]:
+def compare(summary: Summary) -> list[str | Table]:
     """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
     if "verdicts" not in summary:
         return models_compared(summary)
@@ -201,52 +162,40 @@ def compare(summary: Summary) -> list[str | Rows]:
     head = f"Of {total} numbers that the paper prints, " + listed(
         f"{number} {'is' if number == 1 else 'are'} {name}" for name, number in verdicts.items()
     )
-    columns, about = ("as_printed", "corrected", "contact"), ("where", "quantity", "printed")
-    rows = [["where", "quantity", "paper", "as printed", "corrected", "contact", "unit", "verdict"]]
-    rows += [
-        [*(row[key] for key in about), *(number(row[key]) for key in columns), row["unit"], row["verdict"]]
-        for row in summary["paper_numbers"]
-    ]
-    return [f"{head}.", rows]
+    return [f"{head}.", numbers_table(summary["paper_numbers"])]
 
 
-def models_compared(summary: Summary) -> list[str | Rows]:
+LAST_STEP = (
+    Column("last step", "name"),
+    measured("period", "period_s"),
+    measured("length", "length_m"),
+    Column("outcome", "outcome", lambda outcome: outcome or ""),
+)
+
+
+def models_compared(summary: Summary) -> list[str | Table]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
-    steps, outcomes = summary["steps"], summary["outcomes"]
-    rows = [["last step", "period (s)", "length (m)", "outcome"]]
-    last_steps = [(name, step, outcomes.get(name, "")) for name, step in steps.items()]
-    releases = summary.get("releases", {}).items()
-    last_steps += [(f"knee released at {name}", walk, walk["outcome"]) for name, walk in releases]
-    rows += [[name, number(step["period_s"]), number(step["length_m"]), outcome] for name, step, outcome in last_steps]
+    outcomes = summary["outcomes"]
+    steps = [{"name": name, "outcome": outcomes.get(name), **step} for name, step in summary["steps"].items()]
+    steps += [{"name": f"knee released at {name}", **walk} for name, walk in summary.get("releases", {}).items()]
     rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
-    head = f"The rigid model {rigid}, " + (
-        "and so does the contact model" if contact == rigid else f"the contact model {contact}"
-    )
-    return [f"{head}.", rows]
+    rest = "and so does the contact model" if contact == rigid else f"the contact model {contact}"
+    return [f"The rigid model {rigid}, {rest}.", table("", LAST_STEP, steps)]
 
 
-def accuracy(summary: Summary) -> list[str | Rows]:
+def accuracy(summary: Summary) -> list[str | Table]:
     """Which method is fastest at which error, a line a scene."""
-    rows = [["scene", *(f"at {level}" for level in levels(summary["best"]))]]
-    rows += [
-        [scene, *(best.get(level, "no method") for level in levels(summary["best"]))]
-        for scene, best in summary["best"].items()
-    ]
+    levels = dict.fromkeys(level for scene in summary["best"].values() for level in scene)
+    columns = [Column(f"at {level}", level, lambda method: method or "no method") for level in levels]
+    scenes = [{"scene": scene, **best} for scene, best in summary["best"].items()]
     head = f"{len(summary['rows'])} runs measured; the fastest method by the error that is asked for:"
-    return [head, rows, *summary["conclusions"].values()]
+    return [head, table("", [Column("scene", "scene"), *columns], scenes), *summary["conclusions"].values()]
 
 
-def levels(best: Mapping[str, Mapping[str, str]]) -> list[str]:
-    """Every level of error at which some method was best."""
-    return list(dict.fromkeys(level for scene in best.values() for level in scene))
-
-
-def stability(summary: Summary) -> list[str | Rows]:
+def extreme_cases(summary: Summary) -> list[str | Table]:
     """How many cases ended as they should, and those that did not."""
     total = summary["passed"] + summary["failed"]
     head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
-    outcomes = Counter((case["family"], case["outcome"]) for case in summary["cases"])
-    rows = [["family", "outcome", "cases"], *([family, end, str(n)] for (family, end), n in outcomes.items())]
     failed = [case for case in summary["cases"] if not case["ok"]]
     said = [f"not as expected: {case['name']} ended {case['outcome']}: {case['note']}" for case in failed]
     said += [
@@ -254,32 +203,22 @@ def stability(summary: Summary) -> list[str | Rows]:
         for known in summary["known"]
         if not known["ok"]
     ]
-    return [head, rows, *said]
+    return [head, stability.family_table(summary["cases"]), *said]
 
 
-def continuation(summary: Summary) -> list[str | Rows]:
+def continuation(summary: Summary) -> list[str | Table]:
     """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
-    over = parameter(summary)
-    found = f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {over}."
-    rows = [["bifurcation", "model", "steps", with_unit(over, summary["unit"]), "multiplier"]]
-    rows += [
-        [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), complex_number(*one["multiplier"])]
-        for one in summary["bifurcations"]
-    ]
-    return [found, *families(summary), rows if len(rows) > 1 else []]
+    branches = count(len(summary["branches"]), "branch", "branches")
+    head = f"{branches} of gaits over {parameter(summary)}."
+    return [head, *families.findings(summary), families.bifurcations(summary)]
 
 
-def basin(summary: Summary) -> list[str | Rows]:
+def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
-    rows = [["attractor", "cells", "steps to reach it"]]
-    rows += [
-        [count(row["period"], "step"), str(row["cells"]), number(row.get("median_steps_to_settle"), 3)]
-        for row in summary["attractors"]
-    ]
-    return [in_signs(shares(summary).text), rows if len(rows) > 1 else []]
+    return [in_signs(basin.shares(summary).text), basin.attractors(summary)]
 
 
-def engines(summary: Summary) -> list[str | Rows]:
+def engines(summary: Summary) -> list[str | Table]:
     """What was concluded of each scene; every run is in `show`."""
     told = [
         f"{scene}, {experiment}: {text}"
@@ -291,13 +230,13 @@ def engines(summary: Summary) -> list[str | Rows]:
     return [f"{count(len(summary['rows']), 'run')} in {ran}.", *told]
 
 
-def plot(summary: Summary) -> list[str | Rows]:
+def plot(summary: Summary) -> list[str | Table]:
     """The figures."""
     figures = summary["figures"]
-    return [f"{count(len(figures), 'figure')} drawn.", [[one["svg"], one["title"]] for one in figures]]
+    return [f"{count(len(figures), 'figure')} drawn.", table("", [Column("", "svg"), Column("", "title")], figures)]
 
 
-def report(summary: Summary) -> list[str | Rows]:
+def report(summary: Summary) -> list[str | Table]:
     """What is on the page."""
     return [f"The page has {count(len(summary['figures']), 'figure')} and {count(len(summary['tables']), 'table')}."]
 
@@ -308,9 +247,9 @@ ANSWERS: dict[str, Answer] = {
     "tune": tune,
     "compare": compare,
     "accuracy": accuracy,
-    "stability": stability,
+    "stability": extreme_cases,
     "continuation": continuation,
-    "basin": basin,
+    "basin": starts,
     "engines": engines,
     "plot": plot,
     "report": report,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -14,6 +12,7 @@ from walkerlab.config.problems import nearest
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
 from walkerlab.report.numbers import listed
+from walkerlab.report.tables import as_csv, as_tex, csv_text, of_records
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.runs import makes, read_all, result_in, results_in
 from walkerlab.store.artifact import Stored
@@ -29,10 +28,7 @@ TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "t
 TRAJECTORY = "trajectory"
 STORED_WITH = "outputs: [states, energies, forces] has it."
 """What a walk without a trajectory lacks in its config."""
-RAISED = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in a text whose letters are guarded already."""
 NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
-TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
 def export_from(folder: RunFolder, what: str, kind: str, output: Path | None, columns: int, model: str) -> Path:
@@ -120,36 +116,8 @@ def table(rows: Any, kind: str) -> bytes:
     """A table of a summary: rows of objects, or objects by row."""
     if isinstance(rows, Mapping):
         rows = [{"quantity": name, **row} for name, row in rows.items()]
-    names = list(dict.fromkeys(key for row in rows for key in row))
-    return csv_of(names, [[row.get(key) for key in names] for row in rows]) if kind == "csv" else tex_of(names, rows)
-
-
-def csv_of(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> bytes:
-    """Rows as CSV with a head; nothing where a value is missing."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([["" if value is None else value for value in row] for row in rows])
-    return text.getvalue().encode()
-
-
-def tex_of(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """Rows as a LaTeX table for the package booktabs; sentences are left out."""
-    kept = [name for name in names if name not in ("evidence", "why")]
-    lines = [" & ".join(cell(row.get(name)) for name in kept) + r" \\" for row in rows]
-    head = " & ".join(cell(name.replace("_", " ")) for name in kept) + r" \\"
-    body = [rf"\begin{{tabular}}{{{'l' * len(kept)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
-    return "\n".join([*body, r"\end{tabular}", ""]).encode()
-
-
-def cell(value: Any) -> str:
-    """A value in a LaTeX table: numbers in maths, text with its powers raised and its special letters guarded."""
-    if value is None:
-        return "--"
-    if isinstance(value, float):
-        mantissa, _, exponent = f"{value:.5g}".partition("e")
-        return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
-    return RAISED.sub(r"$^{\1}$", str(value).translate(TEX))
+    found = of_records(rows)
+    return as_tex(found) if kind == "tex" else as_csv(found)
 
 
 def trajectory(stored: Stored, kind: str) -> bytes:
@@ -164,7 +132,7 @@ def trajectory(stored: Stored, kind: str) -> bytes:
         about = {"title": f"walkerlab {stored.identity.stage}", "content_digest": stored.digest()}
         return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
     names, values = columns_of(group)
-    return csv_of(names, list(zip(*values, strict=True)))
+    return csv_text(names, zip(*values, strict=True))
 
 
 def columns_of(group: Group) -> tuple[list[str], list[list[Any]]]:

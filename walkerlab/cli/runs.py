@@ -83,7 +83,8 @@ def as_object(folders: tuple[Any, Any], found: Difference, figures: list[Path]) 
 
 def lines(folders: tuple[Any, Any], found: Difference, figures: list[Path], verbose: bool) -> list[str]:
     """A difference for people: what differs, and with `verbose` what does not."""
-    from walkerlab.cli.text import aligned, in_words
+    from walkerlab.cli.text import in_words
+    from walkerlab.report.tables import aligned
 
     names = [folder.name for folder in folders]
     result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]

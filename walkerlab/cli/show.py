@@ -7,8 +7,9 @@ from typing import Any
 
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
-from walkerlab.cli.text import aligned, described_summary
+from walkerlab.cli.text import described_summary
 from walkerlab.errors import StaleError
+from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import survey
 from walkerlab.store.artifact import NOT_THERE, Stored

@@ -12,7 +12,7 @@ from walkerlab.cli.answers import answer, verdict
 from walkerlab.cli.browser import open_file
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
-from walkerlab.cli.text import aligned
+from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import Graph, Stage
 from walkerlab.stages.runner import StageReport, execute, preview
 

@@ -10,9 +10,9 @@ import typer
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.cli.runs import rows_of_runs, run_object
-from walkerlab.cli.text import aligned
 from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError
+from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import UP_TO_DATE, Step, survey
 from walkerlab.stages.runs import RunSummary, config_of, run_named, runs_in

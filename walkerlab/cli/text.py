@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import textwrap
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
+
+from walkerlab.report.tables import in_lines, of_records
 
 INDENT = "  "
 COLUMNS = 100
 """Width of a paragraph, in characters."""
 LONGEST_ROW, ENDS = 12, 4
 """Of more values in a row, so many are shown of either end."""
-LONGEST_CELL = 100
-"""Letters; a column with longer cells, which are sentences, is left out of a table."""
 
 
 def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
@@ -48,31 +47,14 @@ def is_rows(value: Any) -> bool:
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Objects as rows of a table, their keys as its head; below it what has no room there."""
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    cells = {key: [in_words(row[key]) if key in row else "" for row in rows] for key in columns}
-    shown = [key for key in columns if max(map(len, cells[key])) <= LONGEST_CELL] or columns
-    long = [key for key in columns if key not in shown]
-    lines = aligned([shown, *([cells[key][row] for key in shown] for row in range(len(rows)))])
-    return [*lines, f"with --json also: {', '.join(long)}"] if long else lines
+    cells = of_records(rows, in_words)
+    long = [column.title for column in cells.columns if column.wide]
+    return [*in_lines(cells), f"with --json also: {', '.join(long)}"] if long else in_lines(cells)
 
 
 def paragraph(text: str) -> list[str]:
     """Prose in lines of equal length at most; no word is cut, however long."""
     return textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False)
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells in columns of equal width."""
-    widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
-    return [
-        "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def width(text: str) -> int:
-    """Columns that a text takes on a terminal: a dot above a letter takes none of its own."""
-    return sum(not unicodedata.combining(letter) for letter in text)
 
 
 def in_words(value: Any) -> str:

@@ -40,7 +40,7 @@ FAILED = 30.0  # where failures are drawn, in terms of the largest error
 
 
 @dataclass(frozen=True)
-class Series:
+class MethodSeries:
     """One method's runs on a scene, from loose to tight tolerance."""
 
     look: Look
@@ -52,14 +52,14 @@ class Series:
     tolerance: NDArray[np.float64]
 
 
-def series_of(scene: str, results: Results) -> Iterator[Series]:
+def series_of(scene: str, results: Results) -> Iterator[MethodSeries]:
     """The methods in the order in which they were measured."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = [str(method) for method in rows["method"]]
     for name in dict.fromkeys(methods):
         mine = np.array([method == name for method in methods])
         look = LOOKS.get(name, Look(name, OTHERS.colour, OTHERS.style, OTHERS.width, OTHERS.marker))
-        yield Series(
+        yield MethodSeries(
             look,
             np.asarray(rows["error"])[mine],
             np.asarray(rows["reached"])[mine] != 0,
@@ -82,7 +82,7 @@ def plot(scene: str, results: Results) -> Figure:
     failed = FAILED * max([floor, *(float(one.error[one.reached].max()) for one in every if one.reached.any())])
     figure = blank(HEIGHT)
     left, right = figure.subplots(1, 2, sharey=True)
-    panels: tuple[tuple[Axes, str, Callable[[Series], NDArray[Any]]], ...] = (
+    panels: tuple[tuple[Axes, str, Callable[[MethodSeries], NDArray[Any]]], ...] = (
         (left, "run time (s)", lambda one: one.wall_s),
         (right, "right-hand sides (1)", lambda one: one.rhs),
     )
@@ -103,7 +103,7 @@ def plot(scene: str, results: Results) -> Figure:
     return figure
 
 
-def draw(axes: Axes, one: Series, cost: NDArray[Any], floor: float, failed: float) -> None:
+def draw(axes: Axes, one: MethodSeries, cost: NDArray[Any], floor: float, failed: float) -> None:
     """The runs that reached the end as a line, the others as crosses above everything."""
     look, there = one.look, one.reached
     shown = np.maximum(one.error[there], floor)
@@ -130,7 +130,7 @@ def draw(axes: Axes, one: Series, cost: NDArray[Any], floor: float, failed: floa
     )
 
 
-def entries(every: list[Series], floor: float) -> list[Line2D]:
+def entries(every: list[MethodSeries], floor: float) -> list[Line2D]:
     """The legend: methods, failures, and what is below the reference's own uncertainty."""
     methods = [
         Line2D(

@@ -31,7 +31,7 @@ OTHER: Final = GREEN
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnBranch:
     """A branch with its model."""
 
     model: str
@@ -50,13 +50,13 @@ class Drawn:
         return MODELS[self.model] if period & (period - 1) == 0 else OTHER
 
 
-def branches_of(results: Results) -> Iterator[Drawn]:
+def branches_of(results: Results) -> Iterator[DrawnBranch]:
     """Every branch of a result."""
     groups = results[STAGE].groups
     for model in MODELS:
         number = 0
         while (group := groups.get(f"{model}/branch_{number}")) is not None:
-            yield Drawn(model, number, group)
+            yield DrawnBranch(model, number, group)
             number += 1
 
 
@@ -102,7 +102,7 @@ def curve_of(group: Group, name: str) -> Curve:
     return Curve(value, quantity, between, tuple(zip((int(place) for place in marked), kinds, strict=True)))
 
 
-def draw_branch(axes: Axes, branch: Drawn, name: str) -> set[str]:
+def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
     """A quantity of every step of a branch, solid where it is stable, with its bifurcations; their kinds."""
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0

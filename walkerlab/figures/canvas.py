@@ -52,7 +52,7 @@ class UprightLine(Line2D):
     """A line that stands upright in legends, as it does in the figure."""
 
 
-class Upright(HandlerBase):
+class UprightHandler(HandlerBase):
     """Draws upright lines in legends."""
 
     def create_artists(
@@ -83,7 +83,7 @@ def legend_above(figure: Figure, handles: Sequence[Artist]) -> None:
         handles=list(handles),
         loc="outside upper center",
         ncols=-(-len(labels) // rows),
-        handler_map={UprightLine: Upright()},
+        handler_map={UprightLine: UprightHandler()},
     )
 
 

@@ -39,7 +39,7 @@ DASHES: tuple[LineStyleType, ...] = (
 
 
 @dataclass(frozen=True)
-class Series:
+class EngineSeries:
     """The runs of one integrator, or contact, of one engine from the gait, from coarse to fine; gaps are NaN."""
 
     engine: str
@@ -73,7 +73,7 @@ class Series:
         )
 
 
-def series_of(scene: str, experiment: str, results: Results) -> Iterator[Series]:
+def series_of(scene: str, experiment: str, results: Results) -> Iterator[EngineSeries]:
     """The series in the order in which they were measured."""
     rows = results[STAGE].groups[GROUP]
     texts = {name: [str(value) for value in rows[name]] for name in ("scene", "engine", "experiment", "integrator")}
@@ -87,7 +87,7 @@ def series_of(scene: str, experiment: str, results: Results) -> Iterator[Series]
         step, error, wall, period = (
             np.asarray(rows[name], float)[mine] for name in ("step_s", "error", "wall_s", "period_s")
         )
-        yield Series(key[2], key[3], engines[:number].count(key[2]), step, error, wall, period, walked[mine])
+        yield EngineSeries(key[2], key[3], engines[:number].count(key[2]), step, error, wall, period, walked[mine])
 
 
 def plot_errors(scene: str, results: Results) -> Figure:
@@ -124,7 +124,7 @@ def few_ticks(axes: Axes) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
 
 
-def draw(axes: Axes, one: Series, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+def draw(axes: Axes, one: EngineSeries, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
     """A series without its gaps."""
     there = np.isfinite(x) & np.isfinite(y) & (y > 0.0)
     line = one.line

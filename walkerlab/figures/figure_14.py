@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from walkerlab.figures.bifurcation_diagram import MODELS, NEED, STAGE, Drawn, branches_of, label_of
+from walkerlab.figures.bifurcation_diagram import MODELS, NEED, STAGE, DrawnBranch, branches_of, label_of
 from walkerlab.figures.canvas import blank, legend_above
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Results
@@ -50,7 +50,7 @@ def plot(results: Results) -> Figure:
     return figure
 
 
-def in_the_plane(axes: Axes, branch: Drawn) -> None:
+def in_the_plane(axes: Axes, branch: DrawnBranch) -> None:
     """Every multiplier along the branch, its last place marked."""
     real, imag = branch.group["multiplier_real"], branch.group["multiplier_imag"]
     axes.plot(real.ravel(), imag.ravel(), linestyle="none", marker="o", markersize=1.6, color=branch.colour)
@@ -58,7 +58,7 @@ def in_the_plane(axes: Axes, branch: Drawn) -> None:
     axes.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
 
 
-def over_the_parameter(axes: Axes, branch: Drawn) -> None:
+def over_the_parameter(axes: Axes, branch: DrawnBranch) -> None:
     """Magnitudes, largest first, so that each is a line."""
     size = np.hypot(branch.group["multiplier_real"], branch.group["multiplier_imag"])
     axes.plot(branch.group["value"], size, color=branch.colour, linewidth=1.0, marker="o", markersize=1.6)

@@ -33,7 +33,7 @@ LOG_SPAN: Final = 50.0
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SweepFigure:
     """A figure's bytes and words."""
 
     svg: bytes
@@ -61,7 +61,9 @@ def varies(values: NDArray[Any]) -> bool:
     return there.size > 0 and bool(np.ptp(there.astype(float)) > 0.0)
 
 
-def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Drawn:
+def draw(
+    group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]
+) -> SweepFigure:
     """The figure of some numbers over the parameters.
 
     parameters  names of the coordinates
@@ -73,7 +75,7 @@ def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, .
         figure = maps(group, parameters, names) if len(dims) == 2 else panels(group, parameters, dims, names)
         settle(figure)
         svg, png = svg_of(figure, f"sweep-{stage}", title), png_of(figure, title)
-    return Drawn(svg, png, title, caption(group, dims, parameters, names))
+    return SweepFigure(svg, png, title, caption(group, dims, parameters, names))
 
 
 def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The start that the paper gives its ADAMS model (Table 2), run as it stands, and why it ends as it does."""
+"""The start that the paper gives its ADAMS model (Table 2), in both models, and why it ends as it does."""
 
 from __future__ import annotations
 
@@ -9,102 +9,139 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
-from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
+from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
-from walkerlab.paper.printed import E_AVG, TABLE_2
-from walkerlab.solvers.registry import method_named
+from walkerlab.paper.measured import tight_method
+from walkerlab.paper.printed import adams_start_as_printed
+from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
 
-METHOD, RTOL, ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
+FALLING = 4  # samples, between which a falling hip's height is a cubic
 
 
 @dataclass(frozen=True)
-class PaperStart:
+class AdamsStart:
+    """What the rigid model says of it.
+
+    state         rad and rad/s
+    slope         rad
+    energy        J, kinetic and potential, from the stance foot
+    weight        N
+    normal_force  N, of the ground at the start
+    pull_from     s, from when on the ground would have to pull; None if it never has to
+    heel_strikes  that come
+    end           how and when the walk ends, s
+    """
+
+    state: State
+    slope: float
+    energy: float
+    weight: float
+    normal_force: float
+    pull_from: float | None
+    heel_strikes: int
+    end: str
+    end_time: float
+
+    @property
+    def starts_a_gait(self) -> bool:
+        """Whether a foot that can only push carries the rigid model to a heel strike."""
+        return self.heel_strikes > 0 and self.pull_from is None
+
+    @property
+    def velocities_in_words(self) -> str:
+        """What becomes of it."""
+        return prose("adams_start.velocities", self)
+
+
+@dataclass(frozen=True)
+class AdamsWalk:
     """The walk of the contact model from there, and what explains it.
 
-    state           the start: the printed stance angle and velocities, both feet on the config's slope
-    energy          J, of the rigid model, from the stance foot
-    weight          N
-    rigid_normal    N, force of the ground on the rigid model's stance foot at the start
-    pull_from       s, from when on the rigid model's ground would have to pull; None if it never has to
-    airborne_from   s, from when on no foot of the contact model is carried; None if one always is
+    rigid           the same start in the rigid model, both feet on the config's slope
+    airborne_from   s, from when on no foot of the contact model is in contact; None if one always is
     carried_later   N, the most that the contact model's ground carries once the rigid one's would have to pull
-    time            (samples,) s
     normal          (samples, leg) N, normal forces of the contact model
     mechanical      (samples,) J, kinetic and potential energy of the contact model
     """
 
-    state: State
+    rigid: AdamsStart
     walk: ContactWalkResult
-    energy: float
-    weight: float
-    rigid_normal: float
-    pull_from: float | None
     airborne_from: float | None
     carried_later: float | None
-    time: NDArray[np.float64]
     normal: NDArray[np.float64]
     mechanical: NDArray[np.float64]
 
     @property
     def reason(self) -> str:
         """Why it ends as it does, in words with numbers."""
-        parts = [
-            f"it has {self.energy:.4g} J, the paper's own gait {E_AVG.adams.text} J (Table 3)",
-            f"the ground carries {self.rigid_normal:.3g} N of {self.weight:.4g} N at the start",
-        ]
-        if self.pull_from is not None:
-            parts.append(f"to keep the stance foot down it would have to pull from {self.pull_from:.3g} s on")
-        if self.carried_later is not None:
-            parts.append(f"as it cannot, it carries no more than {self.carried_later:.2g} N from then on")
-        if self.airborne_from is not None:
-            parts.append(f"so both feet are off the ground from {self.airborne_from:.3g} s on")
-        steps = int(self.walk.touch_time_s.size)
-        taken = f"after {steps} step{'' if steps == 1 else 's'}" if steps else "before its first step is done"
-        fate = f"the walk ends at {self.walk.end_time_s:.3g} s, {taken} ({self.walk.outcome.label})"
-        return "; ".join((*parts, fate))
+        return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
 
 
-def paper_start(walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> PaperStart:
-    """Run Table 2's ADAMS start.
+def adams_start(walker: Standing, state: State) -> AdamsStart:
+    """Walk a step of the rigid model from Table 2's ADAMS start."""
+    walk = take_walk(walker, tight_method(), state, 1, sampled=True)
+    assert walk.samples is not None
+    start = np.array([state])
+    return AdamsStart(
+        state=state,
+        slope=walker.slope,
+        energy=float(energies(walker, start).sum()),
+        weight=walker.tree.mass * walker.gravity,
+        normal_force=float(reactions(walker, start)[0, 1]),
+        pull_from=first_below_zero(walk.samples.time, reactions(walker, walk.samples.state)[:, 1]),
+        heel_strikes=walk.steps,
+        end=walk.outcome.label,
+        end_time=end_time(walker, walk),
+    )
+
+
+def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> AdamsWalk:
+    """Run Table 2's ADAMS start in the contact model: the printed stance angle and velocities on the walker's slope.
 
     walk  walks the contact model from a rigid start state, with samples
     """
-    _, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
-    state = (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2)
-    method = method_named(METHOD).new(len(state), RTOL, ATOL, ENDLESS)
-    rigid = take_walk(walker, method, state, 1, sampled=True)
-    start = np.array([state])
-    result = walk(state)
+    _, theta_2, omega_1, omega_2 = adams_start_as_printed()
+    rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
+    result = walk(rigid.state)
     time, normal, mechanical = forces_of(result, contact)
-    pull_from = None if rigid.samples is None else pulls_from(walker, rigid.samples.time, rigid.samples.state)
-    later = normal[time >= pull_from].sum(axis=1) if pull_from is not None else np.zeros(0)
-    return PaperStart(
-        state=state,
+    total = normal.sum(axis=1)
+    airborne = time[(total <= 0.0) & (time > 0.0)]
+    later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
+    return AdamsWalk(
+        rigid=rigid,
         walk=result,
-        energy=float(energies(walker, start).sum()),
-        weight=float(contact.tree.mass * np.hypot(contact.gravity_along, contact.gravity_down)),
-        rigid_normal=float(reactions(walker, start)[0, 1]),
-        pull_from=pull_from,
-        airborne_from=first(time, normal.sum(axis=1) <= 0.0),
+        airborne_from=float(airborne[0]) if airborne.size else None,
         carried_later=float(later.max()) if later.size else None,
-        time=time,
         normal=normal,
         mechanical=mechanical,
     )
 
 
-def pulls_from(walker: Standing, time: NDArray[np.float64], states: NDArray[np.float64]) -> float | None:
-    """When the normal force on the rigid model's stance foot first falls below zero (s)."""
-    return first(time, reactions(walker, states)[:, 1] < 0.0)
+def end_time(walker: Standing, walk: RecordedWalk) -> float:
+    """When a sampled walk ends (s): a fall lies behind the last sample, and is found by inverse interpolation."""
+    assert walk.samples is not None
+    time, hip = walk.samples.time, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
+    if walk.outcome is not Outcome.FELL:
+        return float(time[-1])
+    return float(np.polynomial.Polynomial.fit(hip[-FALLING:], time[-FALLING:], FALLING - 1)(0.0))
 
 
-def first(time: NDArray[np.float64], holds: NDArray[np.bool_]) -> float | None:
-    """The first sample, after the start, at which something holds; None if it never does."""
-    where = np.flatnonzero(holds & (time > 0.0))
-    return float(time[where[0]]) if where.size else None
+def first_below_zero(time: Array, values: Array) -> float | None:
+    """When sampled values first fall below zero, by interpolation; None if they do not."""
+    below = np.flatnonzero(values < 0.0)
+    if below.size == 0:
+        return None
+    after = int(below[0])
+    if after == 0:
+        return float(time[0])
+    fraction = values[after - 1] / (values[after - 1] - values[after])
+    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))
 
 
 def forces_of(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from walkerlab.config.schema import Contact
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies
@@ -127,33 +129,35 @@ def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
 
 @dataclass(frozen=True)
 class ContactModel:
-    """A walk of the contact model, and the numbers of its force laws as the config has them.
+    """A walk of the contact model beside the paper's ADAMS model.
 
-    start         rad and rad/s, the rigid state it was started from; None if states were not stored
-    step_length   m, mean over the last completed stride; None without one
-    energy_least  J, least and largest sample of the energy over the last five steps; None if energies were not stored
-    x_p_steps     that it takes from x_p with its printed digits, of ten, and how that walk ends
-    stiffness     and damping in the config's own units, named in `units`
-    foot_radius   m
+    law          the contact block of its config
+    foot_radius  m
+    summary      what was stored of the walk: outcome, steps, static penetration (m) and damping ratio are read here
+    start        rad and rad/s, the rigid state it was started from; None if states were not stored
+    step_length  m, mean over the last completed stride; None without one
+    energy       over the last five steps; None if energies were not stored
+    from_x_p     steps that it takes from x_p with its printed digits, of ten, and how that walk ends
     """
 
-    outcome: str
-    steps: int
+    law: Contact
+    foot_radius: float
+    summary: Mapping[str, Any]
     start: State | None
     table_3: Characteristics
     step_length: float | None
-    energy_least: float | None
-    energy_most: float | None
-    stiffness: float
-    damping: float
-    units: str
-    static_friction: float
-    dynamic_friction: float
-    static_penetration: float
-    damping_ratio: float
-    foot_radius: float
-    x_p_steps: int
-    x_p_outcome: str
+    energy: EnergyRecord | None
+    from_x_p: tuple[int, str]
+
+    @property
+    def steps(self) -> int:
+        """Steps that it walked."""
+        return int(self.summary["steps"])
+
+    @property
+    def outcome(self) -> str:
+        """How its walk ended."""
+        return str(self.summary["outcome"])
 
 
 @dataclass(frozen=True)

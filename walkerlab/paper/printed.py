@@ -67,6 +67,11 @@ class StartRow:
     adams: Printed
     percent: Printed
 
+    @property
+    def raised(self) -> float:
+        """The ADAMS value over the MATLAB one."""
+        return self.adams.value / self.matlab.value
+
 
 def start_row(name: str, unit: str, matlab: str, adams: str, percent: str) -> StartRow:
     """A row of Table 2 from its three texts."""

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walkerlab.hybrid.comparison import Array
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
-from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.hybrid.rigid_walk import FALLEN_HIP
+from walkerlab.paper.adams_start import AdamsStart, adams_start
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.paper.measured import (
     ENERGY_STEPS,
@@ -30,7 +27,6 @@ from walkerlab.paper.misprints import (
     inertia_at_impact,
 )
 from walkerlab.paper.printed import (
-    E_AVG,
     SIGNS,
     TABLE_2,
     X_P,
@@ -39,55 +35,11 @@ from walkerlab.paper.printed import (
     slope_of,
     walker_of_the_paper,
 )
+from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
 
-FALLING = 4  # samples, between which a falling hip's height is a cubic
 SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
 FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
-
-
-@dataclass(frozen=True)
-class AdamsStart:
-    """What the rigid model says of the start that Table 2 gives the ADAMS model.
-
-    slope         rad, on which both its feet stand, and how far the printed digits leave it open
-    energy        J, kinetic and potential
-    normal_force  N, of the ground at the start
-    pull_from     s, from when on the ground would have to pull; None if it never has to
-    heel_strikes  that come
-    end           how and when the walk ends, s
-    """
-
-    slope: float
-    slope_rounding: float
-    energy: float
-    weight: float
-    normal_force: float
-    pull_from: float | None
-    heel_strikes: int
-    end: str
-    end_time: float
-
-    @property
-    def starts_a_gait(self) -> bool:
-        """Whether a foot that can only push carries the rigid model to a heel strike."""
-        return self.heel_strikes > 0 and self.pull_from is None
-
-    @property
-    def angles_in_words(self) -> str:
-        """On which slope its feet stand."""
-        degrees = math.degrees(self.slope)
-        return f"feet on a slope of {self.slope:.5f} +- {self.slope_rounding:.5f} rad ({degrees:.4f} degrees)"
-
-    @property
-    def velocities_in_words(self) -> str:
-        """What becomes of it."""
-        pull = "never has to pull" if self.pull_from is None else f"would have to pull from {self.pull_from:.3f} s on"
-        strikes = "before any heel strike" if self.heel_strikes == 0 else "after a heel strike"
-        return (
-            f"{self.energy:.1f} J against {E_AVG.adams.text} J in Table 3; the ground carries {self.normal_force:.1f} "
-            f"of {self.weight:.1f} N at once and {pull}; the walk ends ({self.end}) at {self.end_time:.3f} s, {strikes}"
-        )
 
 
 @dataclass(frozen=True)
@@ -136,6 +88,11 @@ class PaperStudy:
     ordering: Ordering
     adams: AdamsStart
 
+    @property
+    def angles_in_words(self) -> str:
+        """On which slopes the feet of the ADAMS start and of x_p stand."""
+        return prose("adams_start.angles", self, slope_of(TABLE_2[0].adams, TABLE_2[1].adams)[1])
+
 
 def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
@@ -156,7 +113,9 @@ def study_the_paper() -> PaperStudy:
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
         impact=misprinted_impact(printed, one_step),
         ordering=order_of_coordinates(right),
-        adams=adams_start(),
+        adams=adams_start(
+            assembled(right._replace(slope=slope_of(TABLE_2[0].adams, TABLE_2[1].adams)[0])), adams_start_as_printed()
+        ),
     )
 
 
@@ -205,45 +164,3 @@ def order_of_coordinates(walker: RigidWalker) -> Ordering:
         angles_first=float(0.5 * angles_first @ D @ angles_first),
         foot_first=float(0.5 * foot_first @ D @ foot_first),
     )
-
-
-def adams_start() -> AdamsStart:
-    """Walk the corrected rigid model from the ADAMS start, on the slope on which that stands."""
-    slope, rounding = slope_of(TABLE_2[0].adams, TABLE_2[1].adams)
-    walker = walker_of_the_paper(CORRECTED)._replace(slope=slope)
-    walk = take_walk(assembled(walker), tight_method(), adams_start_as_printed(), 1, sampled=True)
-    assert walk.samples is not None
-    normal = reactions(assembled(walker), walk.samples.state)[:, 1]
-    start = np.array([adams_start_as_printed()])
-    return AdamsStart(
-        slope=slope,
-        slope_rounding=rounding,
-        energy=float(energies(assembled(walker), start).sum()),
-        weight=(walker.hip_mass + 2.0 * walker.leg_mass) * walker.gravity,
-        normal_force=float(reactions(assembled(walker), start)[0, 1]),
-        pull_from=first_below_zero(walk.samples.time, normal),
-        heel_strikes=walk.steps,
-        end=walk.outcome.label,
-        end_time=end_time(walker, walk),
-    )
-
-
-def end_time(walker: RigidWalker, walk: RecordedWalk) -> float:
-    """When a sampled walk ends (s): a fall lies behind the last sample, and is found by inverse interpolation."""
-    assert walk.samples is not None
-    time, hip = walk.samples.time, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
-    if walk.outcome is not Outcome.FELL:
-        return float(time[-1])
-    return float(np.polynomial.Polynomial.fit(hip[-FALLING:], time[-FALLING:], FALLING - 1)(0.0))
-
-
-def first_below_zero(time: Array, signal: Array) -> float | None:
-    """When a sampled signal first falls below zero, by interpolation; None if it does not."""
-    below = np.flatnonzero(signal < 0.0)
-    if below.size == 0:
-        return None
-    after = int(below[0])
-    if after == 0:
-        return float(time[0])
-    fraction = signal[after - 1] / (signal[after - 1] - signal[after])
-    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Protocol
 
 from markupsafe import Markup
 
-from walkerlab.report.numbers import NONE
-
-Tone = Literal["plain", "good", "fair", "bad"]
+from walkerlab.report.tables import Tone
 
 MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
 """The pages: the report itself, and what is one link away."""
 
 
-class Block:
+class PageBlock(Protocol):
     """A part of a section; `template` is its file in templates/blocks."""
 
     template: ClassVar[str]
 
 
 @dataclass(frozen=True)
-class Paragraph(Block):
+class Paragraph:
     """Running text; a tone sets it off as a statement."""
 
     template: ClassVar[str] = "paragraph"
@@ -33,16 +30,16 @@ class Paragraph(Block):
 
 
 @dataclass(frozen=True)
-class Findings(Block):
+class Statements:
     """Statements one after another, each with what it is about and how it came out."""
 
-    template: ClassVar[str] = "findings"
-    items: tuple[Finding, ...]
+    template: ClassVar[str] = "statements"
+    items: tuple[Statement, ...]
     layout: Literal["list", "cards", "lines", "columns"] = "list"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Statement:
     """One statement.
 
     about  a few words, set bold
@@ -57,7 +54,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Shares(Block):
+class Shares:
     """Counts that make up a whole, as a bar with its key."""
 
     template: ClassVar[str] = "shares"
@@ -68,58 +65,6 @@ class Shares(Block):
     def total(self) -> int:
         """The whole."""
         return sum(count for _, count, _ in self.parts)
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A table's cell; with a tone, its text is set as a badge."""
-
-    text: str
-    tone: Tone | None = None
-
-    @property
-    def empty(self) -> bool:
-        """Whether there is nothing to say."""
-        return self.text in ("", NONE)
-
-
-@dataclass(frozen=True)
-class Column:
-    """A table's column: its head, and whether it holds numbers."""
-
-    title: str
-    numeric: bool = False
-    wide: bool = False
-
-
-@dataclass(frozen=True)
-class Body:
-    """Rows under a common head of their own, which may be empty."""
-
-    title: str
-    rows: tuple[tuple[Cell, ...], ...]
-
-
-@dataclass(frozen=True)
-class Table(Block):
-    """A table; the first cell of a row is its head.
-
-    wordy  it has cells with sentences in them: on a narrow screen each row becomes a card of its own
-    note   what to know when reading it, below it
-    """
-
-    template: ClassVar[str] = "table"
-    caption: str
-    columns: tuple[Column, ...]
-    bodies: tuple[Body, ...]
-    wordy: bool = False
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        """Raise ValueError if a row has not one cell for each column."""
-        for body in self.bodies:
-            if any(len(row) != len(self.columns) for row in body.rows):
-                raise ValueError(f"{self.caption!r}: a row has not {len(self.columns)} cells")
 
 
 @dataclass(frozen=True)
@@ -149,7 +94,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Gallery(Block):
+class Gallery:
     """Figures side by side, small until they are asked for."""
 
     template: ClassVar[str] = "gallery"
@@ -157,7 +102,7 @@ class Gallery(Block):
 
 
 @dataclass(frozen=True)
-class Cards(Block):
+class Cards:
     """Pages that are one link away: file, title, and what is found there in a sentence."""
 
     template: ClassVar[str] = "cards"
@@ -165,7 +110,7 @@ class Cards(Block):
 
 
 @dataclass(frozen=True)
-class Terms(Block):
+class Terms:
     """Words and what they mean."""
 
     template: ClassVar[str] = "terms"
@@ -173,7 +118,7 @@ class Terms(Block):
 
 
 @dataclass(frozen=True)
-class Waiting(Block):
+class Waiting:
     """That a result is still being computed."""
 
     template: ClassVar[str] = "waiting"
@@ -181,7 +126,7 @@ class Waiting(Block):
 
 
 @dataclass(frozen=True)
-class Code(Block):
+class Code:
     """Text to be copied."""
 
     template: ClassVar[str] = "code"
@@ -220,7 +165,7 @@ class Walker:
 
 
 @dataclass(frozen=True)
-class Player(Block):
+class Player:
     """The walk, moving: stills on paper and without scripts.
 
     alt               what is seen
@@ -256,7 +201,7 @@ class Player(Block):
 
 
 @dataclass(frozen=True)
-class Gait:
+class GaitMark:
     """A point of a diagram whose gait a player can show.
 
     x, y    where its mark is, in the diagram's own units
@@ -278,7 +223,7 @@ class Gait:
 
 
 @dataclass(frozen=True)
-class Diagram(Block):
+class Diagram:
     """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player.
 
     curves  points of a line, and whether the gaits on it are stable
@@ -297,7 +242,7 @@ class Diagram(Block):
     titles: tuple[str, str]
     curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
     ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
-    gaits: tuple[Gait, ...]
+    gaits: tuple[GaitMark, ...]
 
 
 @dataclass(frozen=True)
@@ -311,23 +256,6 @@ class Section:
 
     anchor: str
     title: str
-    blocks: tuple[Block, ...] = field(default=())
+    blocks: tuple[PageBlock, ...] = field(default=())
     finding: str = ""
     page: str = MAIN
-
-
-def table(
-    caption: str,
-    columns: Sequence[Column],
-    rows: Sequence[Sequence[str | Cell]],
-    *,
-    wordy: bool = False,
-    note: str = "",
-) -> Table:
-    """A table whose rows are all under one head."""
-    return Table(caption, tuple(columns), (body(rows),), wordy, note)
-
-
-def body(rows: Sequence[Sequence[str | Cell]], title: str = "") -> Body:
-    """Rows, with plain texts made into cells."""
-    return Body(title, tuple(tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row) for row in rows))

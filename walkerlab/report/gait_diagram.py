@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.report.blocks import Diagram, Gait, Walker
+from walkerlab.report.blocks import Diagram, GaitMark, Walker
 from walkerlab.report.numbers import count, quantity
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import sampling_gap, track_in
@@ -23,7 +23,7 @@ GAP = 3.0
 """Time between samples, in those of the walk itself: a gait is looked at, not measured."""
 
 
-class Scale(NamedTuple):
+class DiagramAxis(NamedTuple):
     """From numbers to places on an axis."""
 
     least: float
@@ -44,11 +44,11 @@ class Scale(NamedTuple):
         return tuple((self.place(number * step), f"{number * step:.6g}") for number in numbers)
 
 
-def scale_of(values: NDArray[np.float64], start: float, end: float) -> Scale:
+def scale_of(values: NDArray[np.float64], start: float, end: float) -> DiagramAxis:
     """An axis for some numbers, with a little room at its ends."""
     least, most = float(values.min()), float(values.max())
     room = 0.04 * (most - least) or 1.0
-    return Scale(least - room, most + room, start, end)
+    return DiagramAxis(least - room, most + room, start, end)
 
 
 def gait_diagram(results: Results) -> Diagram | None:
@@ -78,7 +78,7 @@ def parameter(summary: Mapping[str, Any]) -> str:
     return str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
 
 
-def apart(marks: Sequence[Gait]) -> tuple[Gait, ...]:
+def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
     """The marks of which none covers another, so that each can be pointed at; stable gaits go before others."""
     kept: list[int] = []
     for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
@@ -96,7 +96,9 @@ def branches_of(results: Results) -> Iterator[tuple[str, Group]]:
         number += 1
 
 
-def curves(branch: Group, across: Scale, up: Scale) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
+def curves(
+    branch: Group, across: DiagramAxis, up: DiagramAxis
+) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
     """A line for each step of a branch's gaits and each stretch of one stability."""
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
@@ -107,7 +109,7 @@ def curves(branch: Group, across: Scale, up: Scale) -> Iterator[tuple[tuple[tupl
             yield tuple((across.place(float(x)), up.place(float(y))) for x, y in points), bool(stable[begin])
 
 
-def gaits(results: Results, across: Scale, up: Scale) -> Iterator[Gait]:
+def gaits(results: Results, across: DiagramAxis, up: DiagramAxis) -> Iterator[GaitMark]:
     """The gaits whose motion was stored, branch by branch."""
     unit = str((results.summary("continuation") or {})["unit"])
     for path, branch in branches_of(results):
@@ -129,4 +131,4 @@ def gaits(results: Results, across: Scale, up: Scale) -> Iterator[Gait]:
                 stills=(),
             )
             y = up.place(float(branch["step_period"][place][0]))
-            yield Gait(across.place(value), y, walker.name, stable, walker, float(moving.attrs["slope_rad"]))
+            yield GaitMark(across.place(value), y, walker.name, stable, walker, float(moving.attrs["slope_rad"]))

@@ -7,14 +7,14 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-MOST_BYTES = 1_400_000
+MAX_BYTES = 1_400_000
 """Of all images together; the largest drawings are embedded as pixels until they fit."""
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
-def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MOST_BYTES) -> list[Path]:
+def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
     """For each (SVG, PNG) the file to embed: the SVG, unless they take too much room together.
 
     Raises FileNotFoundError if one is not there.

@@ -67,9 +67,9 @@ def length(value_m: float | None, digits: int = 4) -> str:
     return quantity(1e6 * value_m, "µm", digits)
 
 
-def whole(value: int) -> str:
-    """An integer with its thousands set apart, as in 27 087."""
-    return f"{value:,}".replace(",", "\u202f")
+def whole(value: int | None) -> str:
+    """An integer with its thousands set apart, as in 27 087; a dash for none."""
+    return NONE if value is None else f"{value:,}".replace(",", "\u202f")
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:

@@ -29,7 +29,7 @@ class Results:
     config    what was asked for
     stored    results by stage: those that are there and current
     pictures  the figures that `plot` drew, embedded
-    absent    what there is no result of
+    absent    what has no result
     pending   the stages whose results are still being computed
     """
 

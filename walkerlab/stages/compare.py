@@ -18,6 +18,7 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
+from walkerlab.paper.judged import JudgedNumber, Verdict
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -33,7 +34,6 @@ from walkerlab.paper.result_rows import result_rows
 from walkerlab.paper.start_rows import start_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
-from walkerlab.paper.verdict import Row, Verdict
 from walkerlab.scene.contact import GAIT_ATOL, GAIT_METHOD, GAIT_RTOL, contact_scene, start_state
 from walkerlab.scene.rigid import compass
 from walkerlab.solvers.registry import method_named
@@ -121,7 +121,7 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     return {**step, "knee_strike_s": strikes[-1] - sum(periods[:-1]) if strikes[-1] >= 0.0 else None}
 
 
-def row_summary(row: Row) -> dict[str, Any]:
+def row_summary(row: JudgedNumber) -> dict[str, Any]:
     """A row of `paper_numbers` as the command prints it."""
     return {
         "where": row.printed.where,
@@ -136,7 +136,7 @@ def row_summary(row: Row) -> dict[str, Any]:
     }
 
 
-def verdicts(rows: tuple[Row, ...]) -> dict[str, int]:
+def verdicts(rows: tuple[JudgedNumber, ...]) -> dict[str, int]:
     """How many numbers fared how."""
     count = Counter(row.verdict for row in rows)
     return {verdict.value: count[verdict] for verdict in Verdict}
@@ -206,23 +206,14 @@ def contact_model(config: ContactConfig, walk: Content) -> ContactModel:
     energy = energy_of(walk)
     from_x_p = walk_from_x_p(config, float(summary["pitch_m"]))
     return ContactModel(
-        outcome=str(summary["outcome"]),
-        steps=int(summary["steps"]),
+        law=contact,
+        foot_radius=config.walker.foot_radius_m,
+        summary=summary,
         start=start_of(walk),
         table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
         step_length=float(lengths[stride - STEPS_OF_A_STRIDE : stride].mean()) if stride else None,
-        energy_least=None if energy is None else energy.least,
-        energy_most=None if energy is None else energy.most,
-        stiffness=contact.stiffness,
-        damping=contact.damping,
-        units=contact.units,
-        static_friction=contact.static_friction,
-        dynamic_friction=contact.dynamic_friction,
-        static_penetration=float(summary["static_penetration_m"]),
-        damping_ratio=float(summary["damping_ratio"]),
-        foot_radius=config.walker.foot_radius_m,
-        x_p_steps=int(from_x_p.touch_time_s.size),
-        x_p_outcome=from_x_p.outcome.label,
+        energy=energy,
+        from_x_p=(int(from_x_p.touch_time_s.size), from_x_p.outcome.label),
     )
 
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.config.schema import Config
-from walkerlab.report.blocks import MAIN, Section, Table
+from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Absent, Results
 from walkerlab.report.sections.further import TITLES
+from walkerlab.report.tables import Table
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, why_unsuited
 from walkerlab.stages.progress import Progress
@@ -80,7 +81,7 @@ def write_pages(
 
 
 def absent(config: Config, left_out: Sequence[LeftOut]) -> tuple[Absent, ...]:
-    """What there is no result of; what was tried itself, and not given up for want of another, has failed."""
+    """Stages without a result; what was tried itself, and not given up for want of another, has failed."""
     names = {entry.what for entry in left_out}
     return tuple(Absent(one.what, one.why, has_failed(config, one.what, names), one.saves) for one in left_out)
 

@@ -30,7 +30,7 @@ from walkerlab.orbits.scaled_starts import (
     smallest_change,
 )
 from walkerlab.orbits.start_map import StartMap, as_map, contact_row, rigid_map
-from walkerlab.paper.adams_start import PaperStart, forces_of, paper_start
+from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
 from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
@@ -81,7 +81,7 @@ class Findings:
     margins: list[Margin]
     contact_map: StartMap
     rigid_map: StartMap
-    paper: PaperStart | None  # None for another walker than the paper's compass
+    paper: AdamsWalk | None  # None for another walker than the paper's compass
     steps: int  # asked for
     names: tuple[str, ...]  # of the rigid start's numbers
     adjusted_state: State | None
@@ -173,7 +173,7 @@ class Stage:
             found,
             walked,
             rigid_cells,
-            paper_start(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
+            adams_walk(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
             self.steps,
             coordinates(self.config),
             state,

@@ -16,7 +16,7 @@ from walkerlab.orbits.contact_section import ContactGait, angled_bodies, turning
 from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import Adjustment, Margin
 from walkerlab.orbits.start_map import StartMap
-from walkerlab.paper.adams_start import PaperStart
+from walkerlab.paper.adams_start import AdamsWalk
 from walkerlab.paper.printed import TABLE_2, StartRow
 from walkerlab.scene.contact import ContactScene
 from walkerlab.stages.simulate import leg_variables
@@ -50,17 +50,17 @@ def summary(found: Findings) -> dict[str, Any]:
     }
 
 
-def papers_start(start: PaperStart) -> dict[str, Any]:
+def papers_start(start: AdamsWalk) -> dict[str, Any]:
     """What becomes of the paper's own start."""
     return {
         "outcome": start.walk.outcome.label,
         "reason": start.reason,
         "steps": int(start.walk.touch_time_s.size),
-        "state": list(start.state),
-        "energy_J": start.energy,
-        "weight_N": start.weight,
-        "normal_force_N": start.rigid_normal,
-        "pull_from_s": start.pull_from,
+        "state": list(start.rigid.state),
+        "energy_J": start.rigid.energy,
+        "weight_N": start.rigid.weight,
+        "normal_force_N": start.rigid.normal_force,
+        "pull_from_s": start.rigid.pull_from,
         "airborne_from_s": start.airborne_from,
         "end_time_s": start.walk.end_time_s,
     }
@@ -299,7 +299,7 @@ def legs_in_time(samples: ContactSamples, walker: ContactWalker) -> dict[str, Va
     return {**legs(), **over_time(time=samples.time_s, angle=angle, velocity=velocity)}
 
 
-def paper_group(paper: PaperStart, walker: ContactWalker) -> Group:
+def paper_group(paper: AdamsWalk, walker: ContactWalker) -> Group:
     """The paper's ADAMS start in the contact model."""
     samples = paper.walk.samples
     return Group(

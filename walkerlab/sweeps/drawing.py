@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.errors import ConfigError
-from walkerlab.figures.sweep import Drawn, choose, is_number
+from walkerlab.figures.sweep import SweepFigure, choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.sweep_page import SweepPage, render
 from walkerlab.store.content import Group
@@ -61,7 +61,7 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) ->
             raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
 
 
-def page_of(swept: Swept, group: Group, figure: Drawn | None, shown: Sequence[str]) -> SweepPage:
+def page_of(swept: Swept, group: Group, figure: SweepFigure | None, shown: Sequence[str]) -> SweepPage:
     """What the page says."""
     summary, question = swept.summary, swept.question
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())

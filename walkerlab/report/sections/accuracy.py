@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import (
-    COSTS,
-    Body,
-    Cell,
-    Column,
-    Finding,
-    Findings,
-    Gallery,
-    Paragraph,
-    Section,
-    Table,
-    body,
-    table,
-)
-from walkerlab.report.numbers import count, listed, number, power_of_ten, whole
+from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.report.numbers import listed, number, power_of_ten, whole
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Cell, Column, Table, grouped, table
+from walkerlab.report.words import words
 
 STAGE = "accuracy"
 
@@ -33,17 +23,19 @@ def section(results: Results) -> Section | None:
     if summary is None or not summary.get("reference"):
         return None
     scenes = list(summary["reference"])
-    findings = [Finding(scene, spoken(summary["conclusions"][scene], scene)) for scene in scenes]
-    levels = levels_of(summary)
-    bodies = tuple(methods_of(summary, scene, levels) for scene in scenes)
-    costs = Table("Least run time for an error, method by method", columns(levels), bodies, note=note(summary))
-    blocks = (Paragraph(introduction(summary)), Findings(tuple(findings)), costs, references(summary))
-    drawn = [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")]
-    tables = (*blocks, *drawn, *not_run(summary))
-    return Section("accuracy", "Error against run time", tables, fastest(summary), COSTS)
+    concluded = tuple(Statement(scene, spoken(summary["conclusions"][scene], scene)) for scene in scenes)
+    blocks: tuple[PageBlock, ...] = (
+        Paragraph(introduction(summary)),
+        Statements(concluded),
+        costs(summary),
+        references(summary),
+        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
+        *not_run(summary),
+    )
+    return Section("accuracy", "Error against run time", blocks, fastest(summary), COSTS)
 
 
-def fastest(summary: Mapping[str, Any]) -> str:
+def fastest(summary: Row) -> str:
     """The fastest methods of each scene, in one sentence."""
     scenes: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
@@ -52,41 +44,9 @@ def fastest(summary: Mapping[str, Any]) -> str:
     return f"Fastest: {said}." if said else ""
 
 
-def levels_of(summary: Mapping[str, Any]) -> list[float]:
-    """The errors that some method reached on some scene, largest first."""
-    return sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
-
-
-def columns(levels: Sequence[float]) -> tuple[Column, ...]:
-    """The heads of the table of costs."""
-    return (
-        Column("method"),
-        *(Column(f"ms for {power_of_ten(level, 1)}", numeric=True) for level in levels),
-        Column("smallest error", numeric=True),
-        Column("its right-hand sides", numeric=True),
-        Column("ended otherwise", wide=True),
-    )
-
-
-def introduction(summary: Mapping[str, Any]) -> str:
+def introduction(summary: Row) -> str:
     """What was measured."""
-    return (
-        "Each method walked each scene over a ladder of tolerances. The error is the largest difference of the end "
-        "state from a reference of another kind, in SI units; the time is the median of up to "
-        f"{summary['repeats']} warm runs. {slowed(summary)}"
-        "Names without a prefix are compiled as a whole; scipy methods call the same "
-        "compiled right-hand side, but for the one ending in numpy, which is as a user would script it."
-    )
-
-
-def slowed(summary: Mapping[str, Any]) -> str:
-    """That the rigid scene does not start on its gait."""
-    if "rigid_velocity_factor" not in summary:
-        return ""
-    return (
-        f"The rigid scene starts with {summary['rigid_velocity_factor']:g} of the start’s angular velocities, so that "
-        "no step repeats the one before. "
-    )
+    return words("accuracy.introduction", summary)
 
 
 def spoken(conclusion: str, scene: str) -> str:
@@ -95,74 +55,98 @@ def spoken(conclusion: str, scene: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def methods_of(summary: Mapping[str, Any], scene: str, levels: Sequence[float]) -> Body:
-    """A row for each method of a scene."""
-    rows: list[Row] = [row for row in summary["rows"] if row["scene"] == scene]
-    best = set(summary["best"].get(scene, {}).values())
-    known = float(summary["reference"][scene]["agreement"])
-    lines: list[list[str | Cell]] = []
-    for method in dict.fromkeys(row["method"] for row in rows):
-        mine = [row for row in rows if row["method"] == method]
-        head = Cell(method, "good") if method in best else Cell(method)
-        lines.append([head, *(milliseconds(mine, level) for level in levels), *smallest(mine, known), failures(mine)])
-    return body(lines, scene)
+def costs(summary: Row) -> Table:
+    """What each method costs for each error, by scene."""
+    levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
+    least = (Column(f"ms for {power_of_ten(level, 1)}", partial(least_time, level), in_ms, True) for level in levels)
+    columns = (
+        Column("method", method_of),
+        *least,
+        Column("smallest error", smallest_error, numeric=True),
+        Column("its right-hand sides", lambda method: most_exact(method).get("rhs_evaluations"), whole, True),
+        Column("ended otherwise", failures, wide=True),
+    )
+    methods = {scene: methods_of(summary, scene) for scene in summary["reference"]}
+    note = words("accuracy.costs", summary["environment"])
+    return table("Least run time for an error, method by method", columns, methods, note=note)
 
 
-def milliseconds(rows: Sequence[Row], level: float) -> str:
-    """Least time of the runs that are exact enough; a dash if none is."""
-    good = [row["wall_s"] for row in rows if row["error"] is not None and row["error"] <= level]
-    return number(1e3 * min(good) if good else None, 3)
+def methods_of(summary: Row, scene: str) -> list[Row]:
+    """The methods of a scene, each with its runs and with how well the reference is known."""
+    best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
+    runs = grouped((row for row in summary["rows"] if row["scene"] == scene), "method")
+    return [{"method": name, "best": name in best, "runs": mine, "known": known} for name, mine in runs.items()]
 
 
-def smallest(rows: Sequence[Row], known: float) -> tuple[str, str]:
-    """The smallest error reached, and what it cost; what the reference is known to bounds what can be told of it."""
-    reached = [row for row in rows if row["error"] is not None]
-    if not reached:
-        return number(None), number(None)
-    least = min(reached, key=lambda row: float(row["error"]))
-    error = number(least["error"], 2) if least["error"] > known else f"≤ {number(known, 2)}"
-    return error, whole(least["rhs_evaluations"])
+def method_of(method: Row) -> Cell:
+    """A method's name, marked if it is fastest somewhere."""
+    return Cell(method["method"], "good" if method["best"] else None)
 
 
-def failures(rows: Sequence[Row]) -> str:
+def reached(method: Row) -> list[Row]:
+    """The runs that came to an end state."""
+    return [run for run in method["runs"] if run["error"] is not None]
+
+
+def least_time(level: float, method: Row) -> float | None:
+    """Least time (s) of the runs that are exact enough; None if none is."""
+    return min((run["wall_s"] for run in reached(method) if run["error"] <= level), default=None)
+
+
+def in_ms(time_s: float | None) -> str:
+    """A time in ms."""
+    return number(None if time_s is None else 1e3 * time_s, 3)
+
+
+def most_exact(method: Row) -> Row:
+    """The run with the smallest error; nothing if none has one."""
+    return min(reached(method), key=lambda run: float(run["error"]), default={})
+
+
+def smallest_error(method: Row) -> str:
+    """The smallest error reached; what the reference is known to bounds what can be told of it."""
+    error = most_exact(method).get("error")
+    return number(error, 2) if error is None or error > method["known"] else f"≤ {number(method['known'], 2)}"
+
+
+def failures(method: Row) -> str:
     """How the runs ended that have no end state."""
-    return listed(f"{row['outcome']} at {power_of_ten(row['tolerance'], 1)}" for row in rows if row["error"] is None)
-
-
-def note(summary: Mapping[str, Any]) -> str:
-    """How to read the table, and on what it was measured."""
-    machine = summary["environment"]
-    return (
-        "Marked: fastest at one of the levels. Measured on "
-        f"{machine['processor']} with {count(machine['cores'], 'core')}, Python {machine['python']}; "
-        "times differ from run to run, errors and counts do not."
+    return listed(
+        f"{run['outcome']} at {tolerance(run['tolerance'])}" for run in method["runs"] if run["error"] is None
     )
 
 
-def references(summary: Mapping[str, Any]) -> Table:
+def tolerance(value: float) -> str:
+    """A tolerance as a power of ten."""
+    return power_of_ten(value, 1)
+
+
+REFERENCE_COLUMNS = (
+    Column("scene", "scene"),
+    Column("reference", "method"),
+    Column("second method", "second_method"),
+    Column("they differ by", "agreement", partial(number, digits=2), numeric=True),
+)
+
+
+def references(summary: Row) -> Table:
     """Where the truth comes from and how well it is known."""
-    heads = [Column("scene"), Column("reference"), Column("second method"), Column("they differ by", numeric=True)]
-    rows = [
-        [scene, entry["method"], entry["second_method"], number(entry["agreement"], 2)]
-        for scene, entry in summary["reference"].items()
-    ]
-    note = (
-        "The second method's end is what the reference's own method is measured by, where that is measured too. "
-        "An error below their difference says nothing more than that."
-    )
-    return table("References", heads, rows, note=note)
+    rows = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
+    return table("References", REFERENCE_COLUMNS, rows, note=words("accuracy.references"))
 
 
-def not_run(summary: Mapping[str, Any]) -> tuple[Table, ...]:
+NOT_RUN_COLUMNS = (
+    Column("scene", "scene"),
+    Column("method", "method"),
+    Column("tolerances", "tolerances", lambda values: listed(map(tolerance, values))),
+    Column("why", "why", wide=True),
+)
+
+
+def not_run(summary: Row) -> tuple[Table, ...]:
     """The tolerances that were not tried, a row for each reason."""
-    found: dict[tuple[str, str, str], list[float]] = {}
+    found: dict[tuple[str, ...], dict[str, Any]] = {}
     for entry in summary.get("not_run", []):
-        found.setdefault((entry["scene"], entry["method"], entry["why"]), []).append(float(entry["tolerance"]))
-    if not found:
-        return ()
-    heads = [Column("scene"), Column("method"), Column("tolerances"), Column("why", wide=True)]
-    rows = [
-        [scene, method, listed(power_of_ten(value, 1) for value in tolerances), why]
-        for (scene, method, why), tolerances in found.items()
-    ]
-    return (table("Not run", heads, rows, wordy=True),)
+        key = (entry["scene"], entry["method"], entry["why"])
+        found.setdefault(key, {**entry, "tolerances": []})["tolerances"].append(float(entry["tolerance"]))
+    return (table("Not run", NOT_RUN_COLUMNS, list(found.values()), wordy=True),) if found else ()

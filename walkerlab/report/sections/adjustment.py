@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from walkerlab.labels import unit_by_name, with_unit
-from walkerlab.report.blocks import COSTS, Block, Cell, Column, Paragraph, Section, Table, table
+from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import tone, walks
+from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.gaits import symbol
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.tables import Cell, Column, Table, measured, side_by_side, table
+from walkerlab.report.words import words
 
 STAGE = "tune"
 CAUSES = {
@@ -42,7 +44,7 @@ def section(results: Results) -> Section | None:
     if summary is None or "adjustment" not in summary:
         return None
     changed = results.of_the_paper or summary["adjustment"]["needed"]
-    blocks: list[Block] = [Paragraph(verdict(results, summary))]
+    blocks: list[PageBlock] = [Paragraph(verdict(results, summary))]
     if changed:
         blocks.append(starts_table(results, summary))
     if summary["gait"]["found"]:
@@ -60,7 +62,7 @@ def limit(results: Results) -> Section | None:
     if summary is None or not (summary.get("reaches") or summary.get("orders")):
         return None
     reaches = summary.get("reaches") or {}
-    blocks: list[Block] = [limit_table(name, found) for name, found in reaches.items() if found["settings"]]
+    blocks: list[PageBlock] = [limit_table(name, found) for name, found in reaches.items() if found["settings"]]
     if summary.get("orders"):
         blocks.append(orders_table(summary["orders"]))
     return Section("limit", "Towards the rigid limit", tuple(blocks), reached(summary), COSTS)
@@ -79,20 +81,9 @@ def needed(summary: Summary) -> str:
     if not found["found"]:
         return f"No adjustment of the two initial velocities helps: {found['reason']}."
     if found["needed"]:
-        released = summary["procedure"]["released"]
-        return (
-            "This contact needs an adjustment: from the rigid start the walker "
-            f"{walks(released['steps'], released['outcome'])}. "
-            f"The smallest change that walks {found['walked_steps']} steps scales the velocities of "
-            f"{swing} and {stance} by {number(found['scale_dtheta1'], 4)} and "
-            f"{number(found['scale_dtheta2'], 4)}."
-        )
-    down, up = (number(abs(found["margins"][f"dtheta_2 {way}"]["percent"]), 3) for way in ("down", "up"))
-    return (
-        f"No adjustment is needed: from the rigid start as it stands the contact model walks all "
-        f"{found['walked_steps']} steps and settles on its own gait. It still does so if {stance} starts {down} % "
-        f"slower or {up} % faster."
-    )
+        return words("adjustment.needed", found, summary["procedure"]["released"], swing, stance)
+    down, up = (abs(found["margins"][f"dtheta_2 {way}"]["percent"]) for way in ("down", "up"))
+    return words("adjustment.not_needed", found, stance, down, up)
 
 
 def explained(summary: Summary) -> str:
@@ -100,16 +91,12 @@ def explained(summary: Summary) -> str:
     gait = summary["gait"]
     if not gait["found"]:
         return f"The contact model has no gait of its own: {gait['reason']}."
-    lost, slip = gait["lost_J"], length(gait["slip_m"])
-    goes = (
-        f"{quantity(lost[key], 'J', digits)} into {name}" for key, (name, digits) in CHANNELS.items() if lost.get(key)
-    )
-    into = listed(goes).replace(" into ", " go into ", 1)
-    size = f"{quantity(gait['period_s'], 's')} and {quantity(gait['step_length_m'], 'm')}"
-    return (
-        f"That gait takes {size} a step, its foot slips by {slip}; of the "
-        f"{quantity(gait['height_lost_J'], 'J', 4)} that a step descends, {into}."
-    )
+    goes = [
+        f"{quantity(gait['lost_J'][key], 'J', digits)} into {name}"
+        for key, (name, digits) in CHANNELS.items()
+        if gait["lost_J"].get(key)
+    ]
+    return words("adjustment.explained", gait, listed(goes).replace(" into ", " go into ", 1))
 
 
 def caused(summary: Summary) -> str:
@@ -122,8 +109,7 @@ def caused(summary: Summary) -> str:
     sizes = [f"{milliseconds(part)} ({number(100.0 * part / total, 3)} %)" for part in made.values()]
     first, *others = [f"from {CAUSES[key]}" for key in made]
     parts = listed([f"{sizes[0]} come {first}", *(" ".join(pair) for pair in zip(sizes[1:], others, strict=True))])
-    differs = f"Its period differs from the rigid gait's by {milliseconds(total)}"
-    return f"{differs}. With each cause switched off alone, {parts}."
+    return words("adjustment.caused", milliseconds(total), parts)
 
 
 def reached(summary: Summary) -> str:
@@ -132,25 +118,11 @@ def reached(summary: Summary) -> str:
     found = reaches.get(POINT_FEET, reaches.get("all"))
     if not found or not found["settings"]:
         return ""
-    first, last = found["settings"][0], found["settings"][-1]
-    claim, differ = number(found["claim_rad"]), quantity(first["angle_error_rad"], "rad", 2)
-    within = found["first_within_claim"]
-    chosen = last if within is None else within
-    stiffness, damping, stiction = (
-        number(chosen[f"{name}_factor"], 3) for name in ("stiffness", "damping", "stiction_velocity")
+    settings, within = found["settings"], found["first_within_claim"]
+    chosen = settings[-1] if within is None else within
+    return words(
+        "adjustment.reached", found["claim_rad"], settings[0], chosen, within is not None, POINT_FEET in reaches
     )
-    contact = (
-        f"{stiffness} times the config's stiffness, {damping} times its damping and {stiction} times its stiction "
-        "velocity"
-    )
-    if POINT_FEET in reaches:
-        contact = f"point feet, {contact}"
-    if within is not None:
-        return (
-            f"To differ from the rigid walk by no more than {claim} rad in phase instead of {differ} takes {contact}."
-        )
-    left = quantity(last["angle_error_rad"], "rad", 3)
-    return f"With {contact}, the angles still differ by {left} in phase instead of {differ}: {claim} is not reached."
 
 
 def milliseconds(value_s: float) -> str:
@@ -164,88 +136,112 @@ def papers_start(summary: Summary) -> str:
     return f"The start that the paper arrived at is not a gait's: {start['reason']}."
 
 
+BESIDE_TABLE_2 = {
+    "paper_matlab": "paper, MATLAB",
+    "paper_adams": "paper, ADAMS",
+    "paper_percent_of_matlab": "% of MATLAB",
+    "paper_percent_of_adams": "% of ADAMS",
+    "ours_rigid": "rigid gait",
+    "ours_adjusted": "adjusted",
+    "ours_percent_of_rigid": "change, % of rigid",
+    "ours_percent_of_adjusted": "change, % of adjusted",
+}
+"""Columns beside the coordinates of the paper's Table 2."""
+
+
 def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
+    rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     if not results.of_the_paper:
-        rows = [
-            [
-                f"{symbol(name)} ({row['unit']})",
-                *(number(row[key], 6) for key in ("ours_rigid", "ours_adjusted")),
-            ]
-            for name, row in summary["table2"].items()
-        ]
-        heads = [Column("coordinate"), Column("rigid gait", numeric=True), Column("adjusted", numeric=True)]
-        return table("The start before and after the adjustment", heads, rows)
-    shown = {
-        "paper_matlab": "paper, MATLAB",
-        "paper_adams": "paper, ADAMS",
-        "paper_percent_of_matlab": "% of MATLAB",
-        "paper_percent_of_adams": "% of ADAMS",
-        "ours_rigid": "rigid gait",
-        "ours_adjusted": "adjusted",
-        "ours_percent_of_rigid": "change, % of rigid",
-        "ours_percent_of_adjusted": "change, % of adjusted",
-    }
-    columns = [Column("row"), *(Column(head, numeric=True) for head in shown.values())]
-    rows = [
-        [in_signs(f"{name} ({row['unit']})"), *(number(row[key], 3 if "percent" in key else 6) for key in shown)]
-        for name, row in summary["table2"].items()
-    ]
+        coordinate = Column("coordinate", lambda row: f"{symbol(row['name'])} ({row['unit']})")
+        starts = {"ours_rigid": "rigid gait", "ours_adjusted": "adjusted"}
+        start = (Column(head, key, partial(number, digits=6), numeric=True) for key, head in starts.items())
+        return table("The start before and after the adjustment", (coordinate, *start), rows)
+    beside = (
+        Column(head, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
+        for key, head in BESIDE_TABLE_2.items()
+    )
+    row = Column("row", lambda row: in_signs(f"{row['name']} ({row['unit']})"))
     note = "The paper's percentages are those of the ADAMS value, without saying so."
-    return table("Table 2 again: the start before and after the adjustment", columns, rows, note=note)
+    return table("Table 2 again: the start before and after the adjustment", (row, *beside), rows, note=note)
+
+
+def joules(value: float) -> str:
+    """An energy."""
+    return quantity(value, "J")
+
+
+def lost(channel: str, gait: Summary) -> float | Cell | None:
+    """What a gait dissipates in a channel (J); None of knees that take nothing."""
+    into = gait["lost_J"].get(channel)
+    return into if into or channel in ("damping", "friction") else None
+
+
+def factors(multipliers: Sequence[tuple[float, float]]) -> str:
+    """Multipliers, largest first; a complex one stands for itself and its conjugate."""
+    return listed(
+        fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > NOTHING else "")
+        for real, imag in multipliers
+        if imag >= 0.0
+    )
+
+
+GAIT_LINES = (
+    Column("period", "period_s", lambda value: quantity(value, "s", 7)),
+    Column("step length", "step_length_m", lambda value: quantity(value, "m", 7)),
+    Column("largest multiplier", "spectral_radius", partial(number, digits=4)),
+    Column("multipliers", "multipliers", factors),
+    Column("stable", "stable"),
+    Column("slip a step", "slip_m", length),
+    *(
+        Column(f"energy lost {said}", partial(lost, channel), joules)
+        for channel, said in {
+            "damping": "to damping",
+            "friction": "to friction",
+            "knee_strikes": f"in {CHANNELS['knee_strikes'][0]}",
+            "knee_stop": f"in {CHANNELS['knee_stop'][0]}",
+        }.items()
+    ),
+    Column("height lost", "height_lost_J", joules),
+)
+OF_RIGID = {
+    "damping": "in the impact, all",
+    "friction": "none",
+    "knee_strikes": "in the strike",
+    "knee_stop": "none",
+}
+"""What the rigid model has instead of a contact gait's losses."""
 
 
 def gait_table(summary: Summary, rigid: Summary | None) -> Table:
     """The contact gait beside the rigid one."""
     gait = summary["gait"]
-    factors = listed(factor(real, imag) for real, imag in gait["multipliers"] if imag >= 0.0)
-    rows = [
-        ["period", quantity(gait["period_s"], "s", 7), other(rigid, "period_s", "s")],
-        ["step length", quantity(gait["step_length_m"], "m", 7), other(rigid, "step_length_m", "m")],
-        ["largest multiplier", number(gait["spectral_radius"], 4), other(rigid, "spectral_radius", "")],
-        ["slip a step", length(gait["slip_m"]), "none"],
-        ["energy lost to damping", quantity(gait["lost_J"]["damping"], "J"), "in the impact, all"],
-        ["energy lost to friction", quantity(gait["lost_J"]["friction"], "J"), "none"],
-        *(
-            [f"energy lost in {CHANNELS[key][0]}", quantity(gait["lost_J"][key], "J"), instead]
-            for key, instead in (("knee_strikes", "in the strike"), ("knee_stop", "none"))
-            if gait["lost_J"].get(key)
-        ),
-        ["height lost", quantity(gait["height_lost_J"], "J"), "the same as lost"],
-    ]
-    columns = [Column("quantity"), Column("contact model", numeric=True), Column("rigid model", numeric=True)]
-    note = f"Multipliers of the contact gait: {factors}. Section: {gait['section']}."
-    return table("The contact model's own gait", columns, rows, note=note)
+    note = f"Section of the contact gait: {gait['section']}."
+    losses = {channel: Cell(said) for channel, said in OF_RIGID.items() if lost(channel, gait) is not None}
+    beside = {**(rigid or {}), "slip_m": Cell("none"), "lost_J": losses, "height_lost_J": Cell("the same as lost")}
+    gaits = {"contact model": gait, "rigid model": beside}
+    return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 
 
-def factor(real: float, imag: float) -> str:
-    """A multiplier; a complex one stands for itself and its conjugate."""
-    return fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if abs(imag) > NOTHING else "")
-
-
-def other(rigid: Summary | None, key: str, unit: str) -> str:
-    """The rigid gait's value."""
-    return "" if rigid is None or key not in rigid else quantity(rigid[key], unit, 7 if unit else 4)
+MARGIN_COLUMNS = (
+    Column("scaled", "name", in_signs),
+    Column("last factor that walks", "factor", number, numeric=True),
+    Column("beyond", "beyond", lambda outcome: outcome or "nothing, as far as searched"),
+    Column("steps there", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
+)
 
 
 def margins_table(summary: Summary) -> Table:
     """How far the start may be scaled."""
-    rows = [
-        [
-            in_signs(name),
-            number(margin["factor"], 5),
-            "nothing, as far as searched" if margin["beyond"] is None else margin["beyond"],
-            "" if margin["steps_beyond"] is None else str(margin["steps_beyond"]),
-        ]
-        for name, margin in summary["adjustment"]["margins"].items()
-    ]
-    columns = [
-        Column("scaled"),
-        Column("last factor that walks", numeric=True),
-        Column("beyond"),
-        Column("steps there", numeric=True),
-    ]
-    return table("How far the start's velocities may change", columns, rows)
+    rows = [{"name": name, **margin} for name, margin in summary["adjustment"]["margins"].items()]
+    return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
+
+
+WALK_COLUMNS = (
+    Column("walk", "walk"),
+    Column("outcome", "outcome", lambda outcome: Cell(outcome, tone(outcome))),
+    Column("steps", "steps", numeric=True),
+)
 
 
 def walks_table(results: Results, summary: Summary) -> Table:
@@ -255,23 +251,15 @@ def walks_table(results: Results, summary: Summary) -> Table:
         "released": f"{'without the joint, ' if 'hinged' in summary['procedure'] else ''}from the rigid state",
         "adjusted": "from the adjusted start",
     }
-    rows: list[list[str | Cell]] = [
-        [names[name], Cell(walk["outcome"], tone(walk["outcome"])), str(walk["steps"])]
-        for name, walk in summary["procedure"].items()
-        if walk is not None
-    ]
+    walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
     if results.of_the_paper:
-        start = summary["paper_start"]
-        ended = Cell(start["outcome"], tone(start["outcome"]))
-        rows.append(["from the paper's ADAMS start", ended, str(start["steps"])])
-    return table(
-        "The procedure, walk by walk", [Column("walk"), Column("outcome"), Column("steps", numeric=True)], rows
-    )
+        walks.append({"walk": "from the paper's ADAMS start", **summary["paper_start"]})
+    return table("The procedure, walk by walk", WALK_COLUMNS, walks)
 
 
-def limit_table(name: str, found: Summary) -> Table:
-    """One way towards the rigid limit."""
-    shown = {
+LIMIT_COLUMNS = tuple(
+    measured(said, key, partial(number, digits=3))
+    for key, said in {
         "stiffness_factor": "stiffness",
         "damping_factor": "damping",
         "stiction_velocity_factor": "stiction velocity",
@@ -281,11 +269,14 @@ def limit_table(name: str, found: Summary) -> Table:
         "raw_angle_error_rad": "angle, same time",
         "numerical_time_s": "numerical error",
         "run_wall_s": "run time",
-    }
-    columns = [Column(with_unit(words, unit_by_name(key)), numeric=True) for key, words in shown.items()]
-    rows = [[number(row[key], 3) for key in shown] for row in found["settings"]]
+    }.items()
+)
+
+
+def limit_table(name: str, found: Summary) -> Table:
+    """One way towards the rigid limit."""
     note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
-    return table(f"Towards the rigid limit: {name}", columns, rows, note=note)
+    return table(f"Towards the rigid limit: {name}", LIMIT_COLUMNS, found["settings"], note=note)
 
 
 def orders_table(orders: Mapping[str, Any]) -> Table:

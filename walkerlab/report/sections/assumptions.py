@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.report.blocks import Cell, Column, Section, table
+from walkerlab.report.blocks import Section
 from walkerlab.report.numbers import length, number, power_of_ten, quantity
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Cell, Column, table
 
 HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
 ROUNDING = 1e-6

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.report.blocks import Cell, Column, Paragraph, Section, table
-from walkerlab.report.numbers import count, length, number, power_of_ten, quantity, span, whole
+from walkerlab.report.blocks import Paragraph, Section
+from walkerlab.report.numbers import count, length, number, power_of_ten, span, whole
 from walkerlab.report.outcomes import CONTACT, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import CHANNELS
+from walkerlab.report.tables import Cell, Column, table
+from walkerlab.report.words import words
 
 Row = list[str | Cell]
 
@@ -45,17 +47,7 @@ def ground_in_words(results: Results, summary: Mapping[str, Any]) -> str:
     contact = results.config.contact
     if contact is None:
         return ""
-    si = contact.in_si()
-    pitch = f", {length(summary.get('pitch_m'))} apart" if summary.get("pitch_m") else ""
-    terrain = {
-        "checkerboard": f"a checkerboard of pads{pitch}",
-        "after-mid-swing": "a plane that a swing foot touches only once it has passed the stance foot",
-    }.get(contact.terrain, "a plane")
-    return (
-        f"The normal force is k dᵉ + c(d) ḋ with k = {quantity(si.stiffness_N_per_m_e, 'N/mᵉ')}, "
-        f"e = {number(si.exponent)} and c rising to {quantity(si.damping_N_s_m, 'N s/m')} at "
-        f"{length(si.full_damping_penetration_m)}; there is {summary['friction']}. The walker walks on {terrain}."
-    )
+    return words("contact_walk.ground", contact, contact.in_si(), summary)
 
 
 def standing(summary: Mapping[str, Any]) -> list[Row]:
@@ -80,12 +72,12 @@ def slipping(summary: Mapping[str, Any]) -> list[Row]:
             ["slip, step by step", span(slips, "mm", 3), "of the stance foot's material, from its touch to its lift"]
         )
     if summary.get("rolling_per_step_m"):
-        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the round foot, which is no slip"])
+        rows.append(["rolling a step", length(summary["rolling_per_step_m"]), "of the round foot: rolling, not slip"])
     return rows
 
 
 def energies(summary: Mapping[str, Any]) -> list[Row]:
-    """Where the energy went, and whether the books balance."""
+    """Where the energy went, and whether it balances."""
     residual = summary["energy_balance_residual_J"]
     rows: list[Row] = [
         ["energy balance residual", f"{residual_in_words(residual)} J", "largest, of mechanical and dissipated energy"]

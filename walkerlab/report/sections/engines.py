@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from operator import itemgetter
 from typing import Any
 
 from walkerlab.benchmarks.engines import rows as engines
 from walkerlab.benchmarks.engines.rows import OWN_LAW, SAME_LAW
-from walkerlab.report.blocks import Body, Column, Finding, Findings, Paragraph, Section, Table, body, table
-from walkerlab.report.numbers import NONE, fixed, listed, number, power_of_ten
+from walkerlab.report.blocks import PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.report.numbers import NONE, fixed, number, power_of_ten
 from walkerlab.report.results import Results
-from walkerlab.report.shown import Row, Shown, head_of, heads, lines, shown
+from walkerlab.report.tables import Column, Table, measured, table
+from walkerlab.report.words import words
 
 STAGE = "engines"
 ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
+Row = Mapping[str, Any]
 
 
 def section(results: Results) -> Section | None:
@@ -23,15 +24,17 @@ def section(results: Results) -> Section | None:
     summary = results.summary(STAGE)
     if summary is None or not summary.get("rows"):
         return None
-    findings = [
-        Finding(f"{scene}, {ABOUT[experiment]}", text)
+    concluded = [
+        Statement(f"{scene}, {ABOUT[experiment]}", text)
         for scene, told in summary["conclusions"].items()
         for experiment, text in told.items()
         if text
     ]
-    blocks = (
-        Paragraph(introduction(summary)),
-        Findings(tuple(findings)),
+    blocks: tuple[PageBlock, ...] = (
+        Paragraph(
+            words("engines.introduction", [f"{name} {version}" for name, version in summary["versions"].items()])
+        ),
+        Statements(tuple(concluded)),
         same_law(summary),
         own_law(summary),
         *tuning(summary),
@@ -41,126 +44,109 @@ def section(results: Results) -> Section | None:
     return Section("engines", "In other engines", blocks)
 
 
-def introduction(summary: Mapping[str, Any]) -> str:
-    """What was measured, and with what."""
-    versions = listed(f"{name} {version}" for name, version in summary["versions"].items())
-    return (
-        f"The walker went over from its parts into {versions}, with tilted gravity for the slope. On the same law, "
-        "this project's compiled contact force acts as an external force, and what is compared is the integrator. With "
-        "its own contact each engine was first tuned to the same static penetration, damping ratio and friction, and "
-        "what is compared is the model. Run times contain each engine's steps and the rules of the walk."
-    )
+def engine_and_integrator(row: Row) -> str:
+    """Which engine, and by what it integrates or touches."""
+    return f"{row['engine']} {row['integrator']}"
 
 
+RUN = partial(measured, labels=engines.Row)
 SAME_LAW_COLUMNS = (
-    Shown(Column("integrator"), lambda row: f"{row['engine']} {row['integrator']}"),
-    shown(engines.Row, "step_s", "step", partial(number, digits=3), "µ"),
-    shown(engines.Row, "tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
-    shown(engines.Row, "error", "error", partial(number, digits=2)),
-    shown(engines.Row, "touch_error_s", "of touch times", partial(number, digits=2)),
-    shown(engines.Row, "wall_s", "run time", partial(number, digits=3), "m"),
-    Shown(Column("outcome"), itemgetter("outcome")),
+    Column("integrator", engine_and_integrator),
+    RUN("step", "step_s", partial(number, digits=3), prefix="µ"),
+    RUN("tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
+    RUN("error", "error", partial(number, digits=2)),
+    RUN("of touch times", "touch_error_s", partial(number, digits=2)),
+    RUN("run time", "wall_s", partial(number, digits=3), prefix="m"),
+    Column("outcome", "outcome"),
 )
 
 
-def same_law(summary: Mapping[str, Any]) -> Table:
+def same_law(summary: Row) -> Table:
     """Each integrator's runs from coarse to fine."""
-    bodies = tuple(
-        body(lines(SAME_LAW_COLUMNS, rows_of(summary, scene, SAME_LAW)), scene) for scene in summary["reference"]
-    )
-    note = (
-        "The error is the largest difference of the end state from the reference, SI; "
-        "adapted steps are given by their mean."
-    )
-    return Table("ADAMS's law in each engine's integrators", heads(SAME_LAW_COLUMNS), bodies, note=note)
+    runs = {scene: rows_of(summary, scene, SAME_LAW) for scene in summary["reference"]}
+    return table("ADAMS's law in each engine's integrators", SAME_LAW_COLUMNS, runs, note=words("engines.same_law"))
 
 
-def rows_of(summary: Mapping[str, Any], scene: str, experiment: str) -> list[Row]:
+def rows_of(summary: Row, scene: str, experiment: str) -> list[Row]:
     """The rows of one scene and experiment."""
     return [row for row in summary["rows"] if row["scene"] == scene and row["experiment"] == experiment]
 
 
 OWN_LAW_COLUMNS = (
-    Shown(Column("contact"), lambda row: f"{row['engine']} {row['integrator']}"),
-    shown(engines.Row, "start", "start", partial(number, digits=3)),
-    shown(engines.Row, "step_s", "step", partial(number, digits=3), "µ"),
-    shown(engines.Row, "period_s", "period", partial(fixed, decimals=5)),
-    shown(engines.Row, "step_length_m", "length", partial(fixed, decimals=4)),
-    shown(engines.Row, "slip_m", "slip", partial(fixed, decimals=2), "m"),
-    shown(engines.Row, "steps", "steps", number),
-    shown(engines.Row, "wall_s", "run time", partial(number, digits=2)),
-    Shown(Column("outcome"), itemgetter("outcome")),
+    Column("contact", engine_and_integrator),
+    RUN("start", "start", partial(number, digits=3)),
+    RUN("step", "step_s", partial(number, digits=3), prefix="µ"),
+    RUN("period", "period_s", partial(fixed, decimals=5)),
+    RUN("length", "step_length_m", partial(fixed, decimals=4)),
+    RUN("slip", "slip_m", partial(fixed, decimals=2), prefix="m"),
+    RUN("steps", "steps", number),
+    RUN("run time", "wall_s", partial(number, digits=2)),
+    Column("outcome", "outcome"),
 )
 
 
-def own_law(summary: Mapping[str, Any]) -> Table:
+def own_law(summary: Row) -> Table:
     """The walks with each engine's own contact, ADAMS's law among them."""
-    bodies: list[Body] = []
-    for scene, reference in summary["reference"].items():
-        found = lines(OWN_LAW_COLUMNS, rows_of(summary, scene, OWN_LAW))
-        if "rigid_period_s" in reference:
-            period, length = fixed(reference["rigid_period_s"], 5), fixed(reference["rigid_step_length_m"], 4)
-            found.insert(0, ["rigid gait", "1", NONE, period, length, "0", NONE, NONE, NONE])
-        bodies.append(body(found, scene))
-    note = (
-        "Period, length and slip are those of the last step that was walked, of at most ten; the start is the gait's "
-        "velocities times the number given. walkerlab impact is ADAMS's law."
-    )
-    return Table("The walk on each engine's own contact", heads(OWN_LAW_COLUMNS), tuple(bodies), note=note)
+    walks = {
+        scene: [*rigid_gait(reference), *rows_of(summary, scene, OWN_LAW)]
+        for scene, reference in summary["reference"].items()
+    }
+    return table("The walk on each engine's own contact", OWN_LAW_COLUMNS, walks, note=words("engines.own_law"))
+
+
+def rigid_gait(reference: Row) -> list[Row]:
+    """The rigid model's gait as a row, if it is known."""
+    if "rigid_period_s" not in reference:
+        return []
+    gait = {"period_s": reference["rigid_period_s"], "step_length_m": reference["rigid_step_length_m"]}
+    return [{"engine": "rigid", "integrator": "gait", "start": 1.0, "slip_m": 0.0, **gait}]
 
 
 TUNING_COLUMNS = (
-    Shown(Column("contact"), lambda row: f"{row['engine']} {row['contact']}, {row['scene']}"),
-    Shown(Column("quantity"), lambda row: f"{row['quantity']} ({row['unit']})"),
-    shown(engines.TuningRow, "target", "ADAMS's law", partial(number, digits=4)),
-    shown(engines.TuningRow, "reached", "measured", partial(number, digits=4)),
-    Shown(Column("residual", numeric=True), lambda row: f"{100.0 * row['residual']:+.2g} %"),
+    Column("contact", lambda row: f"{row['engine']} {row['contact']}, {row['scene']}"),
+    Column("quantity", lambda row: f"{row['quantity']} ({row['unit']})"),
+    measured("ADAMS's law", "target", partial(number, digits=4), labels=engines.TuningRow),
+    measured("measured", "reached", partial(number, digits=4), labels=engines.TuningRow),
+    Column("residual", "residual", lambda value: f"{100.0 * value:+.2g} %", numeric=True),
 )
 
 
-def tuning(summary: Mapping[str, Any]) -> tuple[Table, ...]:
+def tuning(summary: Row) -> tuple[Table, ...]:
     """What a ball and a block do on each contact, against what it was tuned to."""
-    rows: Sequence[Row] = summary["tuning"]
+    rows = summary["tuning"]
     if not rows:
         return ()
-    note = "Measured on a ball of the walker's mass dropped on the ground, and a block of that mass slid on it."
-    tuned = lines(TUNING_COLUMNS, rows)
-    return (table("Tuning of the engines' own contact", heads(TUNING_COLUMNS), tuned, note=note),)
+    return (table("Tuning of the engines' own contact", TUNING_COLUMNS, rows, note=words("engines.tuning")),)
 
 
-def swings(summary: Mapping[str, Any]) -> Table:
-    """The hinged walker's swing, from coarse to fine."""
-    columns = [
-        Column("integrator"),
-        head_of(engines.SwingRow, "promised_order", "order promised"),
-        Column("orders observed"),
-        head_of(engines.SwingRow, "error", "smallest error"),
-        head_of(engines.SwingRow, "energy_drift_j", "energy drift there"),
+SWING = partial(measured, labels=engines.SwingRow)
+SWING_COLUMNS = (
+    Column("integrator", lambda swing: f"{engine_and_integrator(swing)}, {swing['scene']}"),
+    SWING("order promised", "promised_order", str),
+    Column("orders observed", "orders"),
+    SWING("smallest error", "error", partial(number, digits=2)),
+    SWING("energy drift there", "energy_drift_j", partial(number, digits=2)),
+)
+
+
+def swings(summary: Row) -> Table:
+    """The hinged walker's swing: of each integrator the finest run, with the orders observed on the way to it."""
+    found: dict[tuple[str, ...], list[Row]] = {}
+    for row in summary["swings"]:
+        found.setdefault((row["scene"], row["engine"], row["integrator"]), []).append(row)
+    rows = [
+        {**min(runs, key=lambda run: float(run["error"])), "orders": ", ".join(orders_of(runs)) or "adapted"}
+        for runs in found.values()
     ]
-    swung = []
-    keys = dict.fromkeys((row["scene"], row["engine"], row["integrator"]) for row in summary["swings"])
-    for scene, engine, integrator in keys:
-        mine = [
-            row
-            for row in summary["swings"]
-            if (row["scene"], row["engine"], row["integrator"]) == (scene, engine, integrator)
-        ]
-        best = min(mine, key=lambda row: float(row["error"]))
-        orders = [number(row["order"], 3) for row in mine if row["order"] is not None]
-        swung.append(
-            [
-                f"{engine} {integrator}, {scene}",
-                str(best["promised_order"]),
-                ", ".join(orders) if orders else "adapted",
-                number(best["error"], 2),
-                number(best["energy_drift_j"], 2),
-            ]
-        )
-    note = "The walker hinged at its stance foot, without ground, against this project's equations and SciPy's DOP853."
-    return table("Without contact: a swing in each integrator", columns, swung, note=note)
+    return table("Without contact: a swing in each integrator", SWING_COLUMNS, rows, note=words("engines.swings"))
 
 
-def limits(summary: Mapping[str, Any]) -> Table:
+def orders_of(runs: list[Row]) -> list[str]:
+    """The orders observed from run to run."""
+    return [number(run["order"], 3) for run in runs if run["order"] is not None]
+
+
+def limits(summary: Row) -> Table:
     """What each engine cannot express."""
     columns = [Column("engine"), Column("cannot express", wide=True)]
     rows = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.labels import with_unit
-from walkerlab.report.blocks import Block, Column, Paragraph, Section, table
+from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.gait_diagram import gait_diagram, parameter
-from walkerlab.report.numbers import count, listed, number, quantity
-from walkerlab.report.outcomes import ends
+from walkerlab.report.numbers import count, number
 from walkerlab.report.results import Results
+from walkerlab.report.sections.gaits import complex_number
+from walkerlab.report.tables import Column, Table, table
+from walkerlab.report.words import words
 
 MODELS = ("rigid", "contact")
 
@@ -21,7 +23,7 @@ def section(results: Results) -> Section | None:
     if summary is None or not summary.get("branches"):
         return None
     first, *others = findings(summary) or [f"{count(len(summary['branches']), 'branch', 'branches')} followed."]
-    blocks: list[Block] = [Paragraph(" ".join(others))] if others else []
+    blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
     diagram = gait_diagram(results)
     if diagram is not None:
         blocks.append(diagram)
@@ -38,51 +40,30 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
         stable = [one for one in summary["branches"] if one["model"] == model and one["period"] == 1]
         ranges = [pair for one in stable for pair in one["stable_ranges"]]
         if ranges:
-            widest = max(ranges, key=lambda pair: pair[1] - pair[0])
-            said.append(
-                f"The {model} model's gait of one step is stable from {quantity(widest[0], unit, 4)} to "
-                f"{quantity(widest[1], unit, 6)}."
-            )
+            said.append(words("families.stable", model, *max(ranges, key=lambda pair: pair[1] - pair[0]), unit))
     doubling = summary["first_doubling"]
     if doubling.keys() >= set(MODELS):
-        shift = doubling["contact"] - doubling["rigid"]
-        said.append(f"Compliance and creep of the ground move its first flip by {quantity(shift, unit, 3)}.")
-    said += [
-        f"From the gait of {count(cascade['period'], 'step')} at {quantity(cascade['flips'][0], unit, 6)} on, the "
-        f"{cascade['model']} model's period doubles {len(cascade['flips'])} times, the distances between doublings "
-        f"shrinking by factors of {listed(number(ratio, 4) for ratio in cascade['ratios'])} (Feigenbaum: 4.669); "
-        f"doublings accumulate at {quantity(cascade['accumulates_at'], unit, 6)}."
-        for cascade in summary["cascades"]
-        if "accumulates_at" in cascade
-    ]
+        said.append(words("families.shift", doubling["contact"] - doubling["rigid"], unit))
+    cascades = [one for one in summary["cascades"] if "accumulates_at" in one]
+    said += [words("families.cascade", one, len(one["flips"]), unit) for one in cascades]
     for one in summary["attractors"]:
         if one["aperiodic_from"] is not None:
-            said.append(f"Walks first settle on nothing periodic at {quantity(one['aperiodic_from'], unit, 4)}.")
+            said.append(words("families.aperiodic", one["aperiodic_from"], unit))
         if one["lost_at"] is not None:
-            said.append(
-                f"At {quantity(one['lost_at'], unit, 4)} the {one['model']} model leaves its attractor and "
-                f"{ends(one['ended'])}."
-            )
+            said.append(words("families.lost", one, unit))
     wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
     if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
-        said.append(
-            f"The largest Lyapunov exponent found is {number(wild['exponent'], 3)} a step "
-            f"(standard error {number(wild['uncertainty'], 1)}), at {quantity(wild['value'], unit, 4)}."
-        )
+        said.append(words("families.chaos", wild, unit))
     return said
 
 
-def bifurcations(summary: Mapping[str, Any]) -> Block:
+def bifurcations(summary: Mapping[str, Any]) -> Table:
     """Every bifurcation that was located."""
-    rows = [
-        [one["kind"], one["model"], str(one["period"]), number(one["value"], 9), number(one["multiplier"][0], 6)]
-        for one in summary["bifurcations"]
-    ]
-    columns = [
-        Column("kind"),
-        Column("model"),
-        Column("steps of the gait", numeric=True),
-        Column(with_unit(parameter(summary), summary["unit"]), numeric=True),
-        Column("critical multiplier", numeric=True),
-    ]
-    return table("Bifurcations, as zeros of their test functions", columns, rows)
+    columns = (
+        Column("kind", "kind"),
+        Column("model", "model"),
+        Column("steps of the gait", "period", numeric=True),
+        Column(with_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
+        Column("critical multiplier", "multiplier", lambda parts: complex_number(*parts), numeric=True),
+    )
+    return table("Bifurcations, as zeros of their test functions", columns, summary["bifurcations"])

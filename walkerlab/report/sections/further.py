@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from walkerlab.report.blocks import CASES, COSTS, MAIN, PAPER, Block, Cards, Section, Waiting
+from walkerlab.report.blocks import CASES, COSTS, MAIN, PAPER, Cards, PageBlock, Section, Waiting
 from walkerlab.report.results import Results
 
 TITLES = {
@@ -36,7 +36,7 @@ def section(results: Results, elsewhere: Sequence[Section]) -> Section | None:
         for file, title in TITLES.items()
         if any(one.page == file for one in elsewhere)
     )
-    blocks: list[Block] = [Cards(items)] if items else []
+    blocks: list[PageBlock] = [Cards(items)] if items else []
     blocks += [Waiting(f"Still being computed: {WAITED_FOR.get(name, name)}.") for name in results.pending]
     title = "Further pages" if items else "Still to come"
     return Section("further", title, tuple(blocks)) if blocks else None

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import Block, Column, Paragraph, Section, Table, body, table
-from walkerlab.report.numbers import MINUS, NONE, fixed, number, power_of_ten, quantity
+from walkerlab.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.report.numbers import MINUS, NONE, fixed, number, power_of_ten, quantity, told_apart
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import DOT, SUBSCRIPTS, in_signs
+from walkerlab.report.tables import Column, Table, measured, plainly, side_by_side, table
 from walkerlab.store.content import Group
 
 COORDINATE = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
@@ -27,7 +29,7 @@ def section(results: Results) -> Section | None:
     names = summary.get("state_names", STATE)
     shown = SETS if results.of_the_paper else (summary["equations"],)
     sets = {name: found for name in shown if (found := set_of(summary, name)) is not None}
-    blocks: list[Block] = [Paragraph(in_words(summary))]
+    blocks: list[PageBlock] = [Paragraph(in_words(summary))]
     if sets:
         blocks.append(gait_table(sets, names))
     every = found_gaits(results, shown, names)
@@ -59,29 +61,61 @@ def in_words(summary: Mapping[str, Any]) -> str:
     )
 
 
+MEASURES = (
+    measured("step period T", "period_s", partial(fixed, decimals=6)),
+    measured("step length S", "step_length_m", partial(fixed, decimals=6)),
+)
+"""The size of a gait's steps."""
+CHECKS = (
+    Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
+    Column("stable", "stable"),
+    measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
+    measured("energy drift", "energy_drift_J", partial(number, digits=2)),
+    measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
+    Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
+    measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(told_apart(depth), 4)),
+    Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
+)
+"""What else a gait is known by."""
+
+
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Table:
-    """Fixed point and multipliers, the sets side by side."""
-    rows = [[coordinate(name), *(fixed(gait["state"][i], 6) for gait in sets.values())] for i, name in enumerate(names)]
-    for key, label, digits in (("period_s", "step period T (s)", 6), ("step_length_m", "step length S (m)", 6)):
-        rows.append([label, *(fixed(gait[key], digits) for gait in sets.values())])
-    for i in range(max(len(gait["multipliers"]) for gait in sets.values())):
-        label = in_signs(f"{'multipliers ' if i == 0 else ''}lambda_{i + 1}")
-        rows.append([label, *(multiplier(gait, i) for gait in sets.values())])
-    rows.append(["spectral radius", *(fixed(gait["spectral_radius"], 5) for gait in sets.values())])
-    rows.append(["stable", *("yes" if gait["stable"] else "no" for gait in sets.values())])
-    rows.append(["energy from the stance foot (J)", *(fixed(gait["energy_J"], 3) for gait in sets.values())])
-    rows.append(["residual of the step map", *(power_of_ten(gait["residual"], 2) for gait in sets.values())])
-    columns = [Column("quantity"), *(Column(head, numeric=True) for head in heads_of(list(sets)))]
-    if len(sets) < 2:
-        return table("Fixed point of the step map and its multipliers", columns, rows)
+    """Fixed point and multipliers, the sets of equations side by side.
+
+    names  of the coordinates of a state
+    """
+    multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
+    lines = [
+        *(
+            Column(coordinate(name), partial(state_at, place), partial(fixed, decimals=6))
+            for place, name in enumerate(names)
+        ),
+        *MEASURES,
+        *(Column(factor_name(place), partial(multiplier, place=place)) for place in multipliers),
+        *CHECKS,
+    ]
     note = "As printed: Appendix A with its misprint in eq. A.5, as the paper's own code; corrected: without it."
-    return table(
-        "Fixed point of the step map and its multipliers, under both sets of equations", columns, rows, note=note
+    beside = ", under both sets of equations" if len(sets) > 1 else ""
+    return side_by_side(
+        f"Fixed point of the step map and its multipliers{beside}",
+        lines,
+        dict(zip(heads_of(list(sets)), sets.values(), strict=True)),
+        note=note if len(sets) > 1 else "",
     )
 
 
+def state_at(place: int, gait: Mapping[str, Any]) -> float:
+    """A coordinate of a gait's fixed point."""
+    return float(gait["state"][place])
+
+
+def factor_name(place: int) -> str:
+    """What a multiplier is called."""
+    return in_signs(f"{'multipliers ' if place == 0 else ''}lambda_{place + 1}")
+
+
 def heads_of(sets: Sequence[str]) -> list[str]:
-    """The heads of columns of gaits: what is right needs no name while nothing misprinted stands beside it."""
+    """The heads of columns of gaits: the corrected set is labelled only beside the printed one."""
     return ["value"] if sets == ["corrected"] else [SETS[name] for name in sets]
 
 
@@ -100,10 +134,10 @@ def symbol(name: str) -> str:
     return f"θ{dot}{(found['index'] or '').translate(SUBSCRIPTS)}{body}"
 
 
-def multiplier(gait: Mapping[str, Any], index: int) -> str:
+def multiplier(gait: Mapping[str, Any], place: int) -> str:
     """A multiplier of a gait; a dash if it has fewer."""
     found = gait["multipliers"]
-    return complex_number(*found[index]) if index < len(found) else NONE
+    return complex_number(*found[place]) if place < len(found) else NONE
 
 
 def complex_number(real: float, imaginary: float) -> str:
@@ -116,36 +150,35 @@ def complex_number(real: float, imaginary: float) -> str:
 def found_gaits(results: Results, sets: Iterable[str], names: Sequence[str]) -> Table | None:
     """All gaits that the search found, if it was more than one of a set."""
     found = {name: results.group("fixedpoint", f"{name}/gaits") for name in sets}
-    groups = {name: group for name, group in found.items() if group is not None}
-    named = list(groups) != ["corrected"]  # what is right needs no name while nothing misprinted stands beside it
-    bodies = [body(gait_rows(group), SETS[name] if named else "") for name, group in groups.items()]
-    if all(len(one.rows) < 2 for one in bodies):
+    groups = {name: gaits_in(group) for name, group in found.items() if group is not None}
+    if all(len(gaits) < 2 for gaits in groups.values()):
         return None
-    heads = ("gait", "T (s)", "S (m)", *map(symbol, names), "spectral radius")
-    columns = (*(Column(head, numeric=True) for head in heads), Column("stable"), Column("remark"))
-    return Table("Every gait of one step that was found", columns, tuple(bodies))
+    columns = (
+        Column("gait", "gait", numeric=True),
+        Column("T (s)", "period_s", partial(fixed, decimals=5), numeric=True),
+        Column("S (m)", "step_length_m", partial(fixed, decimals=5), numeric=True),
+        *(
+            Column(symbol(name), partial(state_at, place), partial(fixed, decimals=4), numeric=True)
+            for place, name in enumerate(names)
+        ),
+        Column("spectral radius", "spectral_radius", partial(fixed, decimals=4), numeric=True),
+        Column("stable", "stable", lambda stable: plainly(bool(stable))),
+        Column("remark", "remark"),
+    )
+    titles = [""] if list(groups) == ["corrected"] else [SETS[name] for name in groups]
+    gaits = dict(zip(titles, groups.values(), strict=True))
+    return table("Every gait of one step that was found", columns, gaits)
 
 
-def objection(group: Group, index: int) -> str:
-    """Why a gait cannot be walked; empty if it can."""
-    return str(group["objections"][index]) if "objections" in group.variables else ""
-
-
-def gait_rows(group: Group) -> list[list[str]]:
-    """One row a gait."""
-    chosen = group.attrs.get("chosen")
-    rows = []
-    for index in range(group["period_s"].size):
-        state = [fixed(value, 4) for value in group["state"][index]]
-        rows.append(
-            [
-                str(index + 1),
-                fixed(group["period_s"][index], 5),
-                fixed(group["step_length_m"][index], 5),
-                *state,
-                fixed(group["spectral_radius"][index], 4),
-                "yes" if group["stable"][index] else "no",
-                "chosen" if index == chosen else objection(group, index),
-            ]
-        )
-    return rows
+def gaits_in(group: Group) -> list[dict[str, Any]]:
+    """The gaits of one set of equations, numbered, each with why it is chosen or cannot be walked."""
+    count = group["period_s"].size
+    objections = group["objections"].tolist() if "objections" in group.variables else [""] * count
+    stored = {
+        name: group[name].tolist() for name in ("period_s", "step_length_m", "state", "spectral_radius", "stable")
+    }
+    return [
+        {name: values[place] for name, values in stored.items()}
+        | {"gait": place + 1, "remark": "chosen" if place == group.attrs.get("chosen") else objections[place]}
+        for place in range(count)
+    ]

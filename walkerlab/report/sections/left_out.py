@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from walkerlab.report.blocks import Column, Paragraph, Section, table
+from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Absent, Results
+from walkerlab.report.tables import Column, table
 
 
 def section(results: Results) -> Section:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.report.blocks import Block, Column, Section, Table, table
-from walkerlab.report.numbers import NONE, length, listed, number, quantity
-from walkerlab.report.outcomes import ends, walks
+from walkerlab.report.blocks import PageBlock, Section
+from walkerlab.report.numbers import number, quantity
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Column, Table, measured, table
+from walkerlab.report.words import words
 
 MEASURES = {
     "raw": "at the same time",
@@ -27,26 +28,29 @@ def section(results: Results) -> Section | None:
     angle, velocity = summary.get(ANGLE), summary.get(VELOCITY)
     if not angle or not velocity:
         return None
-    rows = [[words, printed(angle, key), printed(velocity, key)] for key, words in MEASURES.items() if key in angle]
-    columns = [Column("contact model less rigid model"), Column("angle (rad)", True), Column("velocity (rad/s)", True)]
+    rows = [(said, angle[key], velocity.get(key)) for key, said in MEASURES.items() if key in angle]
+    columns = (
+        Column("contact model less rigid model"),
+        Column("angle (rad)", written=printed, numeric=True),
+        Column("velocity (rad/s)", written=printed, numeric=True),
+    )
     note = "The larger of both legs. A clock that runs slow makes the difference at the same time grow without bound."
     orbit = summary.get(ORBIT)
     if orbit is not None:
         note += f" Their limit cycles lie at most {quantity(100 * orbit, '%', 2)} of the rigid one’s size apart."
     differences = table("Largest differences of the legs’ motions", columns, rows, note=note)
-    found = f"Their legs’ angles differ by at most {printed(angle, 'raw')} rad at the same time"
+    found = f"Their legs’ angles differ by at most {printed(angle.get('raw'))} rad at the same time"
     if "aligned" in angle:
-        found += f", and by {printed(angle, 'aligned')} rad at the same phase of each step"
-    blocks: tuple[Block, ...] = (differences,)
+        found += f", and by {printed(angle['aligned'])} rad at the same phase of each step"
+    blocks: tuple[PageBlock, ...] = (differences,)
     if summary.get("releases"):
         blocks += (releases_table(summary),)
     return Section("models", "The models compared", blocks, f"{found}.")
 
 
-def printed(differences: Mapping[str, Any], key: str) -> str:
+def printed(difference: float | None) -> str:
     """A largest difference."""
-    value = differences.get(key)
-    return NONE if value is None else number(float(value), 3)
+    return number(difference, 3)
 
 
 RELEASED = {
@@ -66,26 +70,27 @@ CHANNELS = {
 """Where a contact walk dissipates energy, by the names under which it is stored."""
 
 
+def lost_in_strikes(walk: Mapping[str, Any]) -> float | None:
+    """What knee strikes dissipate in a step (J); None if that is unknown."""
+    return (walk.get("dissipated_J_per_step") or {}).get("knee_strikes")
+
+
+RELEASE_COLUMNS = (
+    Column("trailing knee released", "released"),
+    Column("steps", lambda walk: f"{walk['steps']} of {walk['of']}, {walk['outcome']}" if "steps" in walk else None),
+    measured("period", "period_s"),
+    measured("length", "length_m", lambda length: number(length, 4)),
+    measured("knee locks after", "knee_strike_s", lambda time: number(time, 4)),
+    Column("knee strikes (J a step)", lost_in_strikes, lambda lost: number(lost, 3), numeric=True),
+    Column("rigid period (s)", lambda walk: (walk.get("rigid") or {}).get("period_s"), number, numeric=True),
+)
+
+
 def releases_table(summary: Mapping[str, Any]) -> Table:
     """Walks from the rigid gait with either instant of release, beside that gait."""
-    heads = ("period (s)", "length (m)", "knee locks after (s)", "knee strikes (J a step)", "rigid period (s)")
-    columns = [Column("trailing knee released"), Column("steps"), *(Column(head, True) for head in heads)]
-    rows = [["rigid gait", NONE, *last_step(summary["steps"]["gait"]), NONE, NONE]]
-    for name, walk in summary["releases"].items():
-        lost = (walk["dissipated_J_per_step"] or {}).get("knee_strikes")
-        steps = f"{walk['steps']} of {walk['of']}, {walk['outcome']}"
-        rigid = (walk.get("rigid") or {}).get("period_s")
-        rows.append([RELEASED[name], steps, *last_step(walk), number(lost, 3), number(rigid)])
-    note = (
-        "Each walk starts at the rigid gait; the numbers are those of its last step. The last column is the last step "
-        "of the rigid model when its trailing knee is as rigid or as free in the impact."
-    )
-    return table("What the instant of release decides", columns, rows, note=note)
-
-
-def last_step(step: Mapping[str, Any]) -> list[str]:
-    """Period, length and when the knee locked."""
-    return [number(step["period_s"]), number(step["length_m"], 4), number(step.get("knee_strike_s"), 4)]
+    walks = [{**walk, "released": RELEASED[name]} for name, walk in summary["releases"].items()]
+    rows = [{**summary["steps"]["gait"], "released": "rigid gait"}, *walks]
+    return table("What the instant of release decides", RELEASE_COLUMNS, rows, note=words("models.releases"))
 
 
 def departure(results: Results) -> str:
@@ -97,22 +102,10 @@ def departure(results: Results) -> str:
     steps = summary.get("steps")
     if steps is None or steps["contact"]["period_s"] is None:
         return ""
-    told = [last_step_in_words(steps), losses_in_words(summary["dissipated_J"])]
+    told = [words("models.last_step", steps["contact"], steps["gait"]), losses_in_words(summary["dissipated_J"])]
     if summary.get("releases"):
         told += [locking_in_words(steps), *releases_in_words(summary["releases"], float(steps["gait"]["period_s"]))]
     return " ".join(sentence for sentence in told if sentence)
-
-
-def last_step_in_words(steps: Mapping[str, Mapping[str, Any]]) -> str:
-    """The contact model's last step against the gait's, and its slip."""
-    walk, gait = steps["contact"], steps["gait"]
-    slips = "" if walk["slip_m"] is None else f"; its stance foot slips {length(walk['slip_m'])} a step on average"
-    return (
-        f"The contact model's last step takes {quantity(walk['period_s'], 's')} and is "
-        f"{quantity(walk['length_m'], 'm')} long, {percent(walk['period_s'], gait['period_s'])} and "
-        f"{percent(walk['length_m'], gait['length_m'])} against the rigid gait's {quantity(gait['period_s'], 's')} and "
-        f"{quantity(gait['length_m'], 'm')}{slips}."
-    )
 
 
 def losses_in_words(dissipated: Mapping[str, float]) -> str:
@@ -121,32 +114,21 @@ def losses_in_words(dissipated: Mapping[str, float]) -> str:
     if total <= 0.0:
         return ""
     ranked = sorted(dissipated.items(), key=lambda one: -one[1])
-    parts = listed(
-        f"{quantity(100 * lost / total, '%', 3)} {CHANNELS.get(name, name)}" for name, lost in ranked if lost
-    )
-    return f"It dissipates {quantity(total, 'J', 4)} on the way, {parts}."
+    parts = [f"{quantity(100 * lost / total, '%', 3)} {CHANNELS.get(name, name)}" for name, lost in ranked if lost]
+    return words("models.losses", total, parts)
 
 
 def locking_in_words(steps: Mapping[str, Mapping[str, Any]]) -> str:
     """When the knee locks in either model."""
     walk, gait = steps["contact"].get("knee_strike_s"), steps["gait"].get("knee_strike_s")
-    if walk is None or gait is None:
-        return ""
-    in_gait = f"in the gait after {quantity(gait, 's')}"
-    return f"In that step the swing knee locks {quantity(walk, 's')} after the touch; {in_gait}."
+    return "" if walk is None or gait is None else words("models.locking", walk, gait)
 
 
 def releases_in_words(releases: Mapping[str, Mapping[str, Any]], gait_period: float) -> list[str]:
     """What becomes of the walk with either instant of release, and whether that instant decides it."""
-    told = [release_in_words(name, walk, gait_period) for name, walk in releases.items()]
-    ends = {end_of(walk, gait_period) for walk in releases.values()}
-    decides = len(ends) > 1
-    verdict = (
-        "The instant of release decides which gait is walked."
-        if decides
-        else "The instant of release does not decide the gait here."
-    )
-    return [*told, verdict]
+    ends = {name: end_of(walk, gait_period) for name, walk in releases.items()}
+    told = [words("models.release", RELEASED[name], walk, ends[name], gait_period) for name, walk in releases.items()]
+    return [*told, words("models.decides", len(set(ends.values())) > 1)]
 
 
 def end_of(walk: Mapping[str, Any], gait_period: float) -> str:
@@ -155,34 +137,3 @@ def end_of(walk: Mapping[str, Any], gait_period: float) -> str:
         return "ended"
     off = abs(walk["period_s"] / gait_period - 1.0)
     return "another gait" if off > ANOTHER_GAIT else "this gait"
-
-
-def release_in_words(name: str, walk: Mapping[str, Any], gait_period: float) -> str:
-    """How far a walk with one instant of release gets, and how its last step differs from the gait's."""
-    released = f"With the trailing knee released {RELEASED[name]},"
-    if walk["period_s"] is None:
-        return f"{released} the walker takes no step ({walk['outcome']})."
-    last = f"the last in {quantity(walk['period_s'], 's')} ({percent(walk['period_s'], gait_period)})"
-    end = end_of(walk, gait_period)
-    if end == "ended":
-        return (
-            f"{released} the walker takes {walk['steps']} of {walk['of']} steps, {last}, and {ends(walk['outcome'])}."
-        )
-    came = "keeps to the rigid gait" if end == "this gait" else "goes over to another gait"
-    return f"{released} the walker {came}: {walk['steps']} steps, {last}{as_rigid(walk)}."
-
-
-def as_rigid(walk: Mapping[str, Any]) -> str:
-    """What the rigid model does whose trailing knee is as rigid or as free in the impact."""
-    rigid = walk.get("rigid")
-    if not rigid:
-        return ""
-    if rigid["outcome"] != "walked":
-        return f"; the rigid model by that rule {walks(rigid['steps'], rigid['outcome'])}"
-    return f"; the rigid model by that rule walks steps of {quantity(rigid['period_s'], 's')}"
-
-
-def percent(value: float, reference: float) -> str:
-    """How much larger a value is than its reference, in percent with its sign."""
-    share = 100.0 * (value / reference - 1.0)
-    return f"{'+' if share > 0.0 else ''}{quantity(share, '%', 2)}"

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.report.blocks import Block, Pad, Player, Section, Walker
-from walkerlab.report.outcomes import CONTACT, LOOKED_FORWARD_TO, MODELS, RIGID, ends
+from walkerlab.report.blocks import Pad, PageBlock, Player, Section, Walker
+from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
 
-MOST_STEPS = 10
+MAX_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
 DEEPEST_IN_VIEW = 5.0
 """Height of the close-up in largest penetrations that are not an impact's."""
@@ -35,7 +35,7 @@ def section(results: Results) -> Section | None:
     return Section("motion", "The walk", (player(results, tracks),))
 
 
-def player(results: Results, tracks: dict[str, Track]) -> Block:
+def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
     """The walkers on their ground."""
     config, gap = results.config, sampling_gap(results.config)
     length = config.walker.leg_length_m
@@ -61,8 +61,8 @@ def first_steps(results: Results) -> float:
     times = []
     for stage in MODELS:
         periods = (results.summary(stage) or {}).get("step_periods_s", [])
-        if len(periods) >= MOST_STEPS:
-            times.append(sum(periods[:MOST_STEPS]))
+        if len(periods) >= MAX_STEPS:
+            times.append(sum(periods[:MAX_STEPS]))
     return max(times) if times else math.inf
 
 
@@ -71,7 +71,7 @@ def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
     summary = results.stored[stage].summary
     thin = track.thinned(gap)
     strikes = [float(time) for time in np.cumsum(summary["step_periods_s"]) if time <= track.end + 1e-9]
-    ended = "" if summary["outcome"] == LOOKED_FORWARD_TO else ends(summary["outcome"])
+    ended = "" if summary["outcome"] == WALKED else ends(summary["outcome"])
     return Walker(
         name=MODELS[stage],
         style=STYLES[stage],
@@ -144,7 +144,7 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 def caption(results: Results, stages: tuple[str, ...]) -> str:
     """What one looks at."""
     steps = max(len(results.stored[stage].summary["step_periods_s"]) for stage in stages)
-    shown = f"The first {MOST_STEPS} steps" if steps > MOST_STEPS else "The whole walk"
+    shown = f"The first {MAX_STEPS} steps" if steps > MAX_STEPS else "The whole walk"
     return (
         f"{shown}, to scale, downhill to the right. The leg that swings first is drawn full, the other hollow; arrows "
         "are the ground's forces. In the close-up the slope is drawn level, and a foot slips from the mark where it "

@@ -5,17 +5,21 @@ from __future__ import annotations
 import datetime
 
 from walkerlab.config.writer import to_yaml
-from walkerlab.report.blocks import Block, Code, Column, Section, Table, table
+from walkerlab.report.blocks import Code, PageBlock, Section
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Column, Table, side_by_side, table
 from walkerlab.store.artifact import Stored
 
 
 def section(results: Results) -> Section:
     """Config, and provenance of each result."""
-    blocks: list[Block] = [Code("The config of this run, defaults included", to_yaml(results.config).strip())]
+    blocks: list[PageBlock] = [Code("The config of this run, defaults included", to_yaml(results.config).strip())]
     if results.stored:
-        blocks += [results_table(results), software_table(results), digests_table(results)]
+        made = list(results.stored.values())
+        note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
+        digests = table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note)
+        blocks += [table("When each result was made", RESULT_COLUMNS, made), software_table(results), digests]
         blocks.append(Code("Command lines", "\n".join(command_lines(results))))
     return Section("provenance", "Where this comes from", tuple(blocks), finding(results))
 
@@ -31,26 +35,20 @@ def finding(results: Results) -> str:
     return f"{count(len(results.stored), 'result')} of walkerlab {versions}{at}; config, machine, keys and digests."
 
 
-def results_table(results: Results) -> Table:
-    """When and by what each result was made."""
-    columns = [
-        Column("result"),
-        Column("begun (UTC)", numeric=True),
-        Column("took (s)", numeric=True),
-        Column("seed", numeric=True),
-        Column("complete"),
-    ]
-    rows = [
-        [
-            name,
-            result.provenance.started_utc.partition(".")[0].replace("T", " "),
-            f"{took_s(result):.2f}",
-            str(result.provenance.seed),
-            "yes" if result.complete else "no",
-        ]
-        for name, result in results.stored.items()
-    ]
-    return table("When each result was made", columns, rows)
+RESULT_COLUMNS = (
+    Column("result", lambda result: result.identity.stage),
+    Column(
+        "begun (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
+    ),
+    Column("took (s)", lambda result: f"{took_s(result):.2f}", numeric=True),
+    Column("seed", lambda result: result.provenance.seed, numeric=True),
+    Column("complete", lambda result: result.complete),
+)
+DIGEST_COLUMNS = (
+    Column("result", lambda result: f"{result.identity.stage}.h5"),
+    Column("stage key (sha256)", lambda result: result.identity.key, wide=True),
+    Column("digest of its content", lambda result: result.digest(), wide=True),
+)
 
 
 def took_s(result: Stored) -> float:
@@ -66,11 +64,9 @@ def software_table(results: Results) -> Table:
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for name, result in results.stored.items():
         used.setdefault(software(result), []).append(name)
-    names = list(dict.fromkeys(name for versions in used for name, _ in versions))
-    heads = [", ".join(stages) for stages in used.values()] if len(used) > 1 else ["version"]
-    columns = [Column("software"), *(Column(head) for head in heads)]
-    rows = [[name, *(dict(versions).get(name, "") for versions in used)] for name in names]
-    return table("Software and machine", columns, rows)
+    made = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
+    lines = [Column(name, name) for name in dict.fromkeys(name for versions in made.values() for name in versions)]
+    return side_by_side("Software and machine", lines, made, head="software", numeric=False)
 
 
 def software(result: Stored) -> tuple[tuple[str, str], ...]:
@@ -79,18 +75,6 @@ def software(result: Stored) -> tuple[tuple[str, str], ...]:
     libraries = sorted(made.library_versions.items())
     commit = made.git_commit or "unknown"
     return (("walkerlab", made.package_version), ("commit", commit), *libraries, ("platform", made.platform))
-
-
-def digests_table(results: Results) -> Table:
-    """Key and digest of each result."""
-    columns = [Column("result"), Column("stage key (sha256)", wide=True), Column("digest of its content", wide=True)]
-    rows = [[f"{name}.h5", result.identity.key, result.digest()] for name, result in results.stored.items()]
-    return table(
-        "What determines each result, and what it holds",
-        columns,
-        rows,
-        note="A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither.",
-    )
 
 
 def command_lines(results: Results) -> list[str]:

@@ -2,52 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from functools import partial
+from itertools import zip_longest
 
-from walkerlab.report.blocks import Column, Section, table
-from walkerlab.report.numbers import NONE, fixed, listed, span
+from walkerlab.report.blocks import Section
+from walkerlab.report.numbers import fixed, listed, span
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID
 from walkerlab.report.results import Results
+from walkerlab.report.tables import Column, table
 
 FIRST, LAST = 20, 4
 """Of a longer walk so many steps are listed from its beginning and its end."""
 
 
-@dataclass(frozen=True)
-class Series:
-    """A number of each step: its head, where it is, and how it is printed."""
-
-    head: str
-    stage: str
-    key: str
-    printed: Callable[[float], str]
+def in_mm(length_m: float | None) -> str:
+    """A length in mm; a dash beyond the last step."""
+    return fixed(None if length_m is None else 1e3 * length_m, 3)
 
 
-SERIES = (
-    Series("rigid T (s)", RIGID, "step_periods_s", lambda value: fixed(value, 5)),
-    Series("contact T (s)", CONTACT, "step_periods_s", lambda value: fixed(value, 5)),
-    Series("rigid S (m)", RIGID, "step_lengths_m", lambda value: fixed(value, 5)),
-    Series("contact S (m)", CONTACT, "step_lengths_m", lambda value: fixed(value, 5)),
-    Series("slip of the stance foot (mm)", CONTACT, "slips_m", lambda value: fixed(1e3 * value, 3)),
-)
+SERIES = {
+    (RIGID, "step_periods_s"): Column("rigid T (s)", written=partial(fixed, decimals=5), numeric=True),
+    (CONTACT, "step_periods_s"): Column("contact T (s)", written=partial(fixed, decimals=5), numeric=True),
+    (RIGID, "step_lengths_m"): Column("rigid S (m)", written=partial(fixed, decimals=5), numeric=True),
+    (CONTACT, "step_lengths_m"): Column("contact S (m)", written=partial(fixed, decimals=5), numeric=True),
+    (CONTACT, "slips_m"): Column("slip of the stance foot (mm)", written=in_mm, numeric=True),
+}
+"""Numbers of each step: stage and key under which they are, and the column that shows them."""
 
 
 def section(results: Results) -> Section | None:
     """The steps that were taken; None if there are none."""
-    series = [one for one in SERIES if (results.summary(one.stage) or {}).get(one.key)]
+    series = {column: found for (stage, key), column in SERIES.items() if (found := numbers_of(results, stage, key))}
     if not series:
         return None
-    columns = [Column("step", numeric=True), *(Column(one.head, numeric=True) for one in series)]
-    values = [values_of(results.summary(one.stage) or {}, one.key) for one in series]
-    steps = max(len(one) for one in values)
-    shown = list(range(steps)) if steps <= FIRST + LAST else [*range(FIRST), *range(steps - LAST, steps)]
-    pairs = list(zip(values, series, strict=True))
-    rows = [[str(step + 1), *(at(found, step, one.printed) for found, one in pairs)] for step in shown]
-    left_away = "" if len(shown) == steps else f"Steps {FIRST + 1} to {steps - LAST} are in the artifacts. "
+    columns = [Column("step", numeric=True), *series]
+    steps = list(zip_longest(*series.values()))
+    numbered = [(number, *step) for number, step in enumerate(steps, 1)]
+    shown = numbered if len(steps) <= FIRST + LAST else [*numbered[:FIRST], *numbered[-LAST:]]
+    left_away = "" if len(shown) == len(steps) else f"Steps {FIRST + 1} to {len(steps) - LAST} are in the artifacts. "
     note = left_away + "T: from one heel strike or touch to the next; S: along the slope, from foothold to foothold."
-    steps_table = table("Periods and lengths of the steps", columns, rows, note=note)
+    steps_table = table("Periods and lengths of the steps", columns, shown, note=note)
     return Section("steps", "Step by step", (steps_table,), finding(results))
 
 
@@ -58,12 +53,7 @@ def finding(results: Results) -> str:
     return f"Steps take {listed(told)}."
 
 
-def values_of(summary: Mapping[str, Any], key: str) -> Sequence[float]:
-    """A number of each step."""
-    found: Sequence[float] = summary[key]
+def numbers_of(results: Results, stage: str, key: str) -> Sequence[float]:
+    """A number of each step of a walk; none without the walk."""
+    found: Sequence[float] = (results.summary(stage) or {}).get(key) or []
     return found
-
-
-def at(values: Sequence[float], step: int, printed: Callable[[float], str]) -> str:
-    """The number of a step, a dash beyond the last."""
-    return printed(values[step]) if step < len(values) else NONE

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.report.blocks import Block, Finding, Findings, Paragraph, Section, Shares
-from walkerlab.report.numbers import count, listed, number, quantity
-from walkerlab.report.outcomes import MODELS, finding
+from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
+from walkerlab.report.numbers import count, listed
+from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Absent, Results
-from walkerlab.report.sections.errata import errata
 from walkerlab.report.sections.models import departure
-from walkerlab.report.sections.paper_numbers import TONES, paper_numbers
+from walkerlab.report.sections.paper import TONES, errata, paper_numbers
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.words import words
 
 HEADLINES = {
     "A.5 row 2": "The equations of motion have a sign error",
@@ -31,11 +32,11 @@ Rows = Sequence[Mapping[str, Any]]
 
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
-    blocks: list[Block] = [Paragraph(failure, "bad") for failure in failures(results)]
-    told = (*(finding(results, stage) for stage in MODELS), gait(results), adjustment(results))
+    blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
+    told = (*(walk(results, stage) for stage in MODELS), gait(results), adjustment(results))
     fared = [found for found in told if found is not None]
     if fared:
-        blocks.append(Findings(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
+        blocks.append(Statements(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
     departs = departure(results)
     if departs:
         blocks.append(Paragraph(departs))
@@ -61,30 +62,48 @@ def failure(results: Results, absent: Absent) -> str:
     return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
 
 
-def gait(results: Results) -> Finding | None:
+def walk(results: Results, stage: str) -> Statement | None:
+    """How the walk of a stage ended: where and when, the numbers that judged it, and what to try; None without it."""
+    summary = results.summary(stage)
+    if summary is None:
+        return None
+    outcome, config = str(summary["outcome"]), results.config
+    tau = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
+    text = words("verdict.walk", summary, 2 * config.strides, tau, *end_of(results, stage))
+    return Statement(MODELS[stage], text, outcome, tone(outcome))
+
+
+def end_of(results: Results, stage: str) -> tuple[float | None, float | None]:
+    """When a walk ended (s), and how high the hip was then over the slope (m); None where that was not stored."""
+    summary, trajectory = results.stored[stage].summary, results.group(stage, "trajectory")
+    if trajectory is None or not trajectory["time"].size:
+        return summary.get("end_time_s"), None
+    height = float(trajectory["hip_height_m"][-1]) if "hip_height_m" in trajectory.variables else None
+    return summary.get("end_time_s", float(trajectory["time"][-1])), height
+
+
+def gait(results: Results) -> Statement | None:
     """The periodic gait in a sentence; None if there is none."""
     summary = results.summary("fixedpoint")
     if summary is None:
         return None
-    size = f"{quantity(summary['period_s'], 's')} and {quantity(summary['step_length_m'], 'm')}"
-    factor = number(summary["spectral_radius"], 3)
-    text = f"Its steps take {size}; a small disturbance is in the long run multiplied by {factor} a step."
+    text = words("verdict.gait", summary)
     if summary["stable"]:
-        return Finding("Periodic gait", text, "stable", "good")
-    return Finding("Periodic gait", text, "unstable", "fair")
+        return Statement("Periodic gait", text, "stable", "good")
+    return Statement("Periodic gait", text, "unstable", "fair")
 
 
-def adjustment(results: Results) -> Finding | None:
+def adjustment(results: Results) -> Statement | None:
     """That no start walks in the contact model; None if one does, or none was sought."""
     found = (results.summary("tune") or {}).get("adjustment")
     if found is None or found["found"]:
         return None
-    return Finding("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
+    return Statement("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
 
 
-def of_the_paper(results: Results, rows: Rows) -> list[Block]:
+def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:
     """How the paper's numbers fared, and its gravest errors."""
-    blocks: list[Block] = [shares(rows), Findings(by_verdict(rows), "lines")]
+    blocks: list[PageBlock] = [shares(rows), Statements(by_verdict(rows), "lines")]
     gravest = headlines(results)
     if gravest:
         blocks += [
@@ -92,7 +111,7 @@ def of_the_paper(results: Results, rows: Rows) -> list[Block]:
                 "The reasons; printed, corrected and measured values stand side by side on the page of the paper’s "
                 "numbers."
             ),
-            Findings(gravest, "columns"),
+            Statements(gravest, "columns"),
         ]
     return blocks
 
@@ -105,15 +124,15 @@ def shares(rows: Rows) -> Shares:
     return Shares(title, tuple(part for part in parts if part[1]))
 
 
-def by_verdict(rows: Rows) -> tuple[Finding, ...]:
+def by_verdict(rows: Rows) -> tuple[Statement, ...]:
     """Which numbers fared how, by where they stand."""
     all_there = Counter(str(row["where"]) for row in rows)
     found = []
-    for verdict, tone in TONES.items():
+    for verdict, shade in TONES.items():
         here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
         if here:
             said = "; ".join(share(where, here[where], all_there[where]) for where in here)
-            found.append(Finding(f"{verdict.capitalize()}:", f"{said}.", tone=tone))
+            found.append(Statement(f"{verdict.capitalize()}:", f"{said}.", tone=shade))
     return tuple(found)
 
 
@@ -124,18 +143,18 @@ def share(where: str, some: int, every: int) -> str:
     return f"{where} ({some} of {every})"
 
 
-def headlines(results: Results) -> tuple[Finding, ...]:
+def headlines(results: Results) -> tuple[Statement, ...]:
     """The gravest errata that were found, with what was measured for them."""
     found = errata(results)
     return tuple(
-        headline(words, erratum)
-        for start, words in HEADLINES.items()
+        headline(said, erratum)
+        for start, said in HEADLINES.items()
         for erratum in found
         if erratum["where"].startswith(start)
     )
 
 
-def headline(words: str, erratum: Mapping[str, str]) -> Finding:
+def headline(said: str, erratum: Mapping[str, str]) -> Statement:
     """An erratum in a line: what it comes to, and what was measured."""
     first, _, _ = erratum["measured"].partition("; ")
-    return Finding(in_signs(f"{words} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")
+    return Statement(in_signs(f"{said} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")

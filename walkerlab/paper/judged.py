@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from enum import StrEnum
@@ -18,7 +19,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Row:
+class JudgedNumber:
     """A printed number beside the measured ones, in the unit it is printed in; None where a model has none."""
 
     printed: Printed
@@ -27,6 +28,13 @@ class Row:
     contact: float | None
     verdict: Verdict
     evidence: str
+
+
+def judged(
+    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[Verdict, str]
+) -> JudgedNumber:
+    """A printed number beside those of the rigid model, by set of equations, and of the contact model."""
+    return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, *found)
 
 
 def agreement(printed: Printed, value: float | None) -> str:
@@ -46,7 +54,7 @@ def weigh(agrees: bool, otherwise: Verdict, departures: tuple[str, ...], evidenc
 
     agrees      the number came out
     otherwise   what is said if it did not, of the paper's own scene
-    departures  in what the scene is not the paper's: then a number that did not come out is refuted by nothing
+    departures  in what the scene is not the paper's: a mismatch refutes nothing then
     """
     if agrees:
         return Verdict.REPRODUCED, evidence

@@ -1,0 +1,252 @@
+"""One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final, Literal
+
+from walkerlab.labels import labels_of, unit_by_name, with_unit
+from walkerlab.report.numbers import NONE, number
+
+Tone = Literal["plain", "good", "fair", "bad"]
+PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
+LONGEST_CELL: Final = 100
+"""Letters; a column of records with longer cells holds sentences."""
+RAISED = re.compile(r"\\\^\{\}(-?\d+)")
+"""A power in a text whose letters are guarded already."""
+TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A table's cell.
+
+    tone   sets the text as a badge
+    value  what the text was written from; None for none
+    """
+
+    text: str
+    tone: Tone | None = None
+    value: Any = None
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to say."""
+        return self.text in ("", NONE)
+
+
+def plainly(value: Any) -> str:
+    """A text as it is, a truth value as yes or no, a dash for None."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return NONE if value is None else str(value)
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a table shows of each record: one of its columns or, where records stand side by side, one of its rows.
+
+    title    its head, with the unit
+    of       key of a record's value, or a function of the record; without one a record is a row of cells
+    written  a value as text, or as a cell with a tone; a cell in the place of a value stays as it is
+    numeric  numbers, which stand under one another
+    wide     sentences, for which a terminal has no room
+    """
+
+    title: str
+    of: str | Callable[[Any], Any] | None = None
+    written: Callable[[Any], str | Cell] = plainly
+    numeric: bool = False
+    wide: bool = False
+
+    def value(self, record: Any, place: int = 0) -> Any:
+        """What a record has here; None if nothing."""
+        if self.of is None:
+            return record[place]
+        return record.get(self.of) if isinstance(self.of, str) else self.of(record)
+
+    def cell(self, record: Any, place: int = 0) -> Cell:
+        """A record's cell in the column at this place."""
+        value = self.value(record, place)
+        written = value if isinstance(value, Cell) else self.written(value)
+        return written if isinstance(written, Cell) else Cell(written, value=value)
+
+
+def measured(
+    words: str,
+    key: str,
+    written: Callable[[Any], str | Cell] = number,
+    *,
+    labels: type | None = None,
+    prefix: str = "",
+) -> Column:
+    """A column of numbers in a multiple of their unit: that of the key's label in a class of rows, or of its ending."""
+    unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
+    factor = PREFIXES[prefix]
+    scaled = written if not prefix else lambda value: written(None if value is None else factor * value)
+    return Column(with_unit(words, f"{prefix}{unit}"), key, scaled, numeric=True)
+
+
+@dataclass(frozen=True)
+class RowGroup:
+    """Rows under a common head of their own, which may be empty."""
+
+    title: str
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; the first cell of a row is its head.
+
+    wordy  it has cells with sentences in them: on a narrow screen each row becomes a card of its own
+    note   what to know when reading it, below it
+    by     what the titles of its groups of rows are, where that is a column
+    """
+
+    template: ClassVar[str] = "table"
+    caption: str
+    columns: tuple[Column, ...]
+    bodies: tuple[RowGroup, ...]
+    wordy: bool = False
+    note: str = ""
+    by: str = ""
+
+
+def table(
+    caption: str,
+    columns: Sequence[Column],
+    records: Sequence[Any] | Mapping[str, Sequence[Any]],
+    *,
+    wordy: bool = False,
+    note: str = "",
+    by: str = "",
+) -> Table:
+    """A table with a row for each record.
+
+    records  all under one head, or by the title of the group in which they stand
+    """
+    groups = records if isinstance(records, Mapping) else {"": records}
+    bodies = [RowGroup(title, tuple(row(columns, one) for one in found)) for title, found in groups.items()]
+    return Table(caption, tuple(columns), tuple(bodies), wordy, note, by)
+
+
+def row(columns: Sequence[Column], record: Any) -> tuple[Cell, ...]:
+    """A record's cells; ValueError for a record that is a row of cells and has not one for each column."""
+    if isinstance(record, list | tuple) and len(record) != len(columns):
+        raise ValueError(f"{record!r} has not {len(columns)} cells")
+    return tuple(column.cell(record, place) for place, column in enumerate(columns))
+
+
+def grouped(records: Iterable[Mapping[str, Any]], key: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Records by what they have under a key, in the order in which that comes first."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for record in records:
+        found.setdefault(str(record[key]), []).append(record)
+    return found
+
+
+def side_by_side(
+    caption: str,
+    lines: Sequence[Column],
+    records: Mapping[str, Any],
+    *,
+    head: str = "quantity",
+    numeric: bool = True,
+    note: str = "",
+) -> Table:
+    """A table with a column for each record, and a row for each line that some record has a value for."""
+    found = [line for line in lines if any(line.value(record) is not None for record in records.values())]
+    rows = [[line.title, *(beside(line, record) for record in records.values())] for line in found]
+    return table(caption, [Column(head), *(Column(title, numeric=numeric) for title in records)], rows, note=note)
+
+
+def beside(line: Column, record: Any) -> Cell:
+    """A record's cell in a row; nothing if it has no such value."""
+    return Cell("") if line.value(record) is None else line.cell(record)
+
+
+def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
+    """A table of all that records have, their keys as its heads; nothing where a record lacks one."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    cells = [[Cell(written(row[name]) if name in row else "", value=row.get(name)) for name in names] for row in rows]
+    lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
+    room = any(length <= LONGEST_CELL for length in lengths)
+    columns = [Column(name, wide=room and length > LONGEST_CELL) for name, length in zip(names, lengths, strict=True)]
+    return table("", columns, cells)
+
+
+def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+    """Heads and rows of a table, the titles of its groups as a column of their own.
+
+    wide  whether columns of sentences are among them
+    """
+    kept = [place for place, column in enumerate(shown.columns) if wide or not column.wide]
+    titled = any(body.title for body in shown.bodies)
+    heads = [*([shown.by] if titled else []), *(shown.columns[place].title for place in kept)]
+    rows = [
+        [*([Cell(body.title, value=body.title)] if titled else []), *(row[place] for place in kept)]
+        for body in shown.bodies
+        for row in body.rows
+    ]
+    return heads, rows
+
+
+def in_lines(shown: Table) -> list[str]:
+    """A table on a terminal, without sentences."""
+    heads, rows = flat(shown)
+    texts = [[cell.text for cell in row] for row in rows]
+    return aligned([heads, *texts] if any(heads) else texts) if texts else []
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells in columns of equal width."""
+    widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
+    return [
+        "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def width(text: str) -> int:
+    """Columns that a text takes on a terminal: a dot above a letter takes none of its own."""
+    return sum(not unicodedata.combining(letter) for letter in text)
+
+
+def as_csv(shown: Table) -> bytes:
+    """A table's values as CSV."""
+    heads, rows = flat(shown, wide=True)
+    return csv_text(heads, ([cell.value for cell in row] for row in rows))
+
+
+def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
+    """Values as CSV under their heads; nothing where one is missing."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heads)
+    writer.writerows(["" if value is None else value for value in row] for row in rows)
+    return text.getvalue().encode()
+
+
+def as_tex(shown: Table) -> bytes:
+    """A table's values for LaTeX with the package booktabs; sentences are left out."""
+    heads, rows = flat(shown)
+    values = [[name.replace("_", " ") for name in heads], *([cell.value for cell in row] for row in rows)]
+    head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in values]
+    body = [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
+    return "\n".join([*body, r"\end{tabular}", ""]).encode()
+
+
+def in_tex(value: Any) -> str:
+    """A value in a LaTeX table: numbers in maths, text with its powers raised and its special letters guarded."""
+    if value is None:
+        return "--"
+    if isinstance(value, float):
+        mantissa, _, exponent = f"{value:.5g}".partition("e")
+        return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
+    return RAISED.sub(r"$^{\1}$", str(value).translate(TEX))
