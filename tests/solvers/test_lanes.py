@@ -9,16 +9,18 @@ from compass_parts import CompassParts, compass_assembly
 from walkerlab.ground.compliant import contact_walker, pinned_walker
 from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.fused import fused
-from walkerlab.mechanics.standing import Mode
+from walkerlab.mechanics.standing import STRAIGHT, Mode
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
+from walkerlab.solvers import system
+from walkerlab.solvers.fused import fused
+from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes
-from walkerlab.solvers.system import derivative
 
 MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))
-WALKER = Mode(MODEL, MODEL.bent)
+WALKER = two_legs(MODEL)
 PARTS = compass_assembly(CompassParts(1.0, 0.4, 5.0, 10.0, 0.1, 0.05))
 FREE = contact_walker(PARTS, NormalLaw(1e8, 2.2, 1e4, 1e-4), Frictionless(), 9.81, 0.05)
 HINGED = pinned_walker(PARTS, FREE, 1, 0.0)
@@ -99,3 +101,16 @@ def test_equations_of_motion_are_those_of_a_walker_alone(system):
 
     expected = np.transpose([alone(system, tuple(column)) for column in y.T.tolist()])
     np.testing.assert_allclose(out, expected, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_two_legs_written_out_move_as_the_bodies_of_the_rigid_model(radius):
+    model = MODEL.changed(radius=radius)
+    y = np.random.default_rng(3).uniform(-2.0, 2.0, (4, WIDTH))
+    out, expected = np.zeros((4, WIDTH)), np.zeros((4, WIDTH))
+    rates(two_legs(model), y, out)
+    for lane in range(WIDTH):
+        f = np.zeros(4)
+        system.derivative(Mode(model, STRAIGHT), 0.0, y[:, lane].copy(), f)
+        expected[:, lane] = f
+    np.testing.assert_allclose(out, expected, rtol=1e-12, atol=1e-12)
