@@ -17,14 +17,15 @@ from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.motion import OnGround, ground_wrench
 from walkerlab.ground.walker import ContactWalker, Foot, FootMotion, foot_force, foot_motion
 from walkerlab.kernels import inlined, kernel
-from walkerlab.mechanics.standing import Mode, Standing, swing_foot
+from walkerlab.mechanics.standing import BENT, Mode, Standing, swing_foot
 from walkerlab.mechanics.tree import mass_matrix, sines_cosines, with_centrifugal
 from walkerlab.mechanics.tuples import Vector, put, solve_symmetric
 from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
 from walkerlab.scene.contact import contact_scene, hinged_walker
 from walkerlab.scene.rigid import compass, rigid_walker
-from walkerlab.solvers.system import State, blank, derivative
-from walkerlab.solvers.vectors import load, store
+from walkerlab.solvers import system as in_arrays
+from walkerlab.solvers.in_tuples import blank, derivative
+from walkerlab.solvers.system import State
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
 CALLS, STATES = 200_000, 64  # calls of a right-hand side, and the states that they are at
@@ -174,7 +175,7 @@ def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
     """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
     for call in range(calls):
         place = call % states.shape[0]
-        store(derivative(system, 0.0, load(states, place, blank(system))), rates, place)
+        in_arrays.derivative(system, 0.0, states[place], rates[place])
 
 
 def systems() -> dict[str, tuple[Any, State]]:
@@ -186,8 +187,8 @@ def systems() -> dict[str, tuple[Any, State]]:
     both = (True, True)
     return {
         "Appendix A": (AppendixA(compass(ONE_DEGREE, "corrected")), ANGLES),
-        "rigid": (Mode(rigid, rigid.bent), ANGLES),
-        "rigid, inertia": (Mode(heavy, heavy.bent), ANGLES),
+        "rigid": (Mode(rigid, BENT), ANGLES),
+        "rigid, inertia": (Mode(heavy, BENT), ANGLES),
         "contact": (OnGround(walker, both), FREE),
         "contact, friction of zero": (OnGround(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
         "contact, frictionless": (OnGround(walker._replace(friction=Frictionless()), both), FREE),

@@ -29,8 +29,9 @@ from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.mechanics.tree import mass_matrix, sines_cosines
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.registry import method_named
-from walkerlab.solvers.system import State, derivative
+from walkerlab.solvers.system import State
 
 GROUNDS = (
     Ground(6.25, 1e-4),

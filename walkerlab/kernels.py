@@ -20,7 +20,10 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from llvmlite import binding as llvm
+from llvmlite import ir
+from numba.core import cgutils, types
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -30,7 +33,9 @@ from numba.core.caching import (
 )
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
-from numba.extending import overload, register_jitable
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, overload, register_jitable
+from numba.np.arrayobj import make_array, populate_array
 
 # the only packages in which compiled functions may stand (a test says so)
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
@@ -374,10 +379,14 @@ class ByType:
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
         self._woven: set[type] = set()
+        self._default: Callable[..., Any] | None = None
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
         """Run the body for the type of `chooser`."""
-        return self._bodies[type(chooser)](chooser, *rest)
+        body = self._bodies.get(type(chooser), self._default)
+        if body is None:
+            raise KeyError(f"{self.__name__} has no body for {type(chooser).__name__}")  # type: ignore[attr-defined]
+        return body(chooser, *rest)
 
     def case(self, chosen: type, woven: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
@@ -393,10 +402,15 @@ class ByType:
 
         return register
 
+    def default(self, body: F) -> F:
+        """Register the decorated function as the body for first arguments of all other types."""
+        self._default = body
+        return body
+
     def body(self, kind: Any, woven: bool) -> Callable[..., Any] | None:
         """The body for numba's type of a first argument, if it is woven or is not; else None."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._bodies.get(chosen) if (chosen in self._woven) == woven else None
+        return self._bodies.get(chosen, self._default) if (chosen in self._woven) == woven else None
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
@@ -415,3 +429,68 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     overload(chosen, strict=False, jit_options=PART_FLAGS)(called)
     overload(chosen, strict=False, jit_options=WOVEN_FLAGS)(woven)
     return chosen
+
+
+def vector(like: Any) -> Any:
+    """Scratch (n,) of the function that asks for it, gone when that returns; written before it is read.
+
+    like  of length n, which its type tells: a tuple, or an array inside a structured scalar
+
+    In Python it holds NaN, so that what is read unwritten shows.
+    """
+    return np.full(len(like), np.nan)
+
+
+def matrix(like: Any) -> Any:
+    """Scratch (n, n), as `vector`."""
+    return np.full((len(like), len(like)), np.nan)
+
+
+@intrinsic
+def zeros(context: Any, like: Any) -> Any:  # noqa: ARG001 - numba calls it so
+    """A tuple of as many zeros as `like` is long: compiled code without counted references returns no arrays."""
+
+    def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
+        return context.get_constant_generic(builder, called.return_type, (0.0,) * called.return_type.count)
+
+    return types.UniTuple(types.float64, like.shape[0])(like), generate
+
+
+def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
+    """Have a function of `like` give memory of its caller's frame in compiled code.
+
+    An intrinsic behind an overload would give memory of the overload's own frame.
+    """
+
+    class Template(AbstractTemplate):  # type: ignore[misc]
+        key = function
+
+        def generic(self, given: Any, named: Any) -> Any:  # noqa: ARG002 - numba calls it so
+            return signature(types.Array(types.float64, dimensions, "C"), *given)
+
+    infer_global(function)(Template)
+
+    def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
+        like = called.args[0]
+        length = like.count if isinstance(like, types.BaseTuple) else like.shape[0]
+
+        def number(value: int) -> Any:
+            return context.get_constant(types.intp, value)
+
+        memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), length**dimensions))
+        array = make_array(called.return_type)(context, builder)
+        populate_array(
+            array,
+            data=builder.bitcast(memory, array.data.type),
+            shape=[number(length)] * dimensions,
+            strides=[number(8 * length), number(8)][2 - dimensions :],
+            itemsize=number(8),
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    lower_builtin(function, types.Any)(generate)
+
+
+_on_the_stack(vector, 1)
+_on_the_stack(matrix, 2)

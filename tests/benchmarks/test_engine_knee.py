@@ -9,8 +9,9 @@ from walkerlab.benchmarks.engines.planar import HINGED, planar_model, skeleton
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.runs import SwingTask
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import STANCE, rates
+from walkerlab.mechanics.standing import BENT, STANCE, Mode
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
+from walkerlab.solvers.system import derivative
 
 KNEED = kneed_legs(Limb(0.5, 0.5, 0.325, 0.01, 0.004), Limb(0.5, 0.05, 0.125, -0.01, 0.0008), 0.5, Arc())
 GRAVITY, SLOPE = 9.81, 0.0504
@@ -29,10 +30,12 @@ def ours():
     """Where the swing ends, by our rates and a library's method."""
     model = standing(KNEED, GRAVITY, SLOPE)
 
-    def derivative(_, y):
-        return (*y[3:], *rates(model, model.bent, tuple(y)))
+    def rate(t, y):
+        f = np.zeros(6)
+        derivative(Mode(model, BENT), t, y, f)
+        return f
 
-    return body_by_body(solve_ivp(derivative, (0.0, SWING_S), START, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1])
+    return body_by_body(solve_ivp(rate, (0.0, SWING_S), START, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1])
 
 
 @pytest.mark.parametrize("name", ENGINES)

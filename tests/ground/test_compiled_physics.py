@@ -7,8 +7,8 @@ from compass_parts import compass_assembly
 
 from walkerlab.ground.compliant import pinned_walker
 from walkerlab.ground.motion import OnGround
+from walkerlab.solvers.in_tuples import derivative, jacobian
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
-from walkerlab.solvers.system import derivative, jacobian
 
 
 def states_on_ground(walker, count):

@@ -13,7 +13,7 @@ from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import foot_force, foot_motion
 from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.system import derivative, jacobian
+from walkerlab.solvers.in_tuples import derivative, jacobian
 
 BOTH = (True, True)
 angles = st.tuples(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7))

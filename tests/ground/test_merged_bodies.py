@@ -11,7 +11,7 @@ from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, 
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, with_torso
-from walkerlab.solvers.system import derivative
+from walkerlab.solvers.in_tuples import derivative
 
 LAW, FRICTION = NormalLaw(4e5, 1.8, 300.0, 1e-3), Coulomb(0.9, 0.7, 0.01, 0.1)
 LEGS = kneed_legs(Limb(0.5, 0.8, 0.3, 0.02, 0.01), Limb(0.5, 0.3, 0.2, -0.03, 0.004), 0.7, Arc(0.2, 0.05))

@@ -14,7 +14,7 @@ from walkerlab.ground.pinned import floating_state
 from walkerlab.ground.walker import foot_motion
 from walkerlab.mechanics.tree import sines_cosines
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, accelerations
-from walkerlab.solvers.system import blank, derivative, jacobian
+from walkerlab.solvers.in_tuples import blank, derivative, jacobian
 
 states = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
 radii = st.floats(0.0, 0.2)

@@ -35,8 +35,8 @@ from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.orbits.contact_gait import find_gait_from, section_points
 from walkerlab.orbits.contact_section import coordinates_of, state_on_section, step_from_section
 from walkerlab.scene.contact import start_state
+from walkerlab.solvers.in_tuples import derivative, jacobian
 from walkerlab.solvers.registry import method_named
-from walkerlab.solvers.system import derivative, jacobian
 
 KNEE_STRIKE = 0.348612  # s after heel strike, of the rigid gait
 BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)

@@ -15,7 +15,7 @@ from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.mechanics.assembly import Anchor
 from walkerlab.mechanics.equations import mass_matrix_and_bias
-from walkerlab.solvers.system import derivative
+from walkerlab.solvers.in_tuples import derivative
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
 STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)

@@ -16,7 +16,7 @@ from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
 from walkerlab.mechanics.equations import mass_matrix_and_bias
 from walkerlab.mechanics.parts import Assembly, Body, Revolute
-from walkerlab.solvers.system import derivative
+from walkerlab.solvers.in_tuples import derivative
 
 angles = st.tuples(*[st.floats(-3.0, 3.0)] * 4)
 rates = st.tuples(*[st.floats(-5.0, 5.0)] * 4)

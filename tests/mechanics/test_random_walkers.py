@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigid_physics import heel_strike, knee_strike, rates, state_linked, total_energy
 from scipy.integrate import solve_ivp
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
-from walkerlab.mechanics.impact import heel_strike, knee_strike
-from walkerlab.mechanics.links import spread
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import STANCE, ground_reaction, kinetic_energy, rates, swing_foot, total_energy
+from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, Mode, ground_reaction, kinetic_energy, swing_foot
 from walkerlab.scene.parts import assembly_of
 
 G = 9.81
@@ -77,17 +76,17 @@ def of_each_type(test):
     return for_type
 
 
-def state_of(model, links, free):
+def state_of(model, phase, free):
     """Angles and velocities of a swing, followers in their places."""
-    n = len(model.tree.arm_x)
+    n = len(model.arm_x)
     padded = (*free[:3], 0.0)
-    return (*spread(links, padded[:n]), *spread(links, (*(3.0 * x for x in free[3:]), 0.0)[:n]))
+    return state_linked(model, phase, (*padded[:n], *(*(3.0 * x for x in free[3:]), 0.0)[:n]))
 
 
 def both_feet_down(model, free):
     """A state at heel strike: straight legs, both feet on the slope."""
     swing = -2.0 * (model.slope + model.lean) - free[0]
-    return state_of(model, model.straight, (swing, free[0], swing, *free[3:]))
+    return state_of(model, STRAIGHT, (swing, free[0], swing, *free[3:]))
 
 
 def in_motion(assembly, model, y, centre):
@@ -142,19 +141,19 @@ def walkers_differ_by(one, other):
 @of_each_type
 def test_energy_is_constant_in_a_swing(assembly, slope, free):
     model = standing(assembly, G, slope)
-    y, n = state_of(model, model.bent, free), len(model.tree.arm_x)
+    y, n = state_of(model, BENT, free), len(model.arm_x)
     swing = solve_ivp(
-        lambda _, x: (*x[n:], *rates(model, model.bent, tuple(x))), (0.0, 0.1), y, "DOP853", rtol=1e-10, atol=1e-12
+        lambda _, x: (*x[n:], *rates(model, BENT, tuple(x))), (0.0, 0.1), y, "DOP853", rtol=1e-10, atol=1e-12
     )
     energies = [total_energy(model, tuple(x)) for x in swing.y.T]
-    scale = abs(kinetic_energy(model, y)) + model.tree.mass * G
+    scale = abs(kinetic_energy(model, y)) + model.mass * G
     assert max(energies) - min(energies) < 1e-8 * scale
 
 
 @of_each_type
 def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
     model = standing(assembly, G, slope)
-    y = state_of(model, model.bent, free)
+    y = state_of(model, BENT, free)
     points, spins, _ = in_motion(assembly, model, y, np.zeros(2))
     assert kinetic_energy(model, y) == pytest.approx(energy_of(points, spins), rel=1e-10, abs=1e-12)
 
@@ -180,7 +179,7 @@ def test_a_heel_strike_keeps_angular_momentum_about_the_new_foothold_and_gains_n
 def test_a_knee_strike_keeps_angular_momentum_about_the_foothold_and_gains_no_energy(walker, slope, free):
     assembly = assembly_of(walker, rigid=True)
     model = standing(assembly, G, slope)
-    y = state_of(model, model.bent, (*free[:2], free[0], *free[3:]))
+    y = state_of(model, BENT, (*free[:2], free[0], *free[3:]))
     parts = [in_motion(assembly, model, state, np.zeros(2)) for state in (y, knee_strike(model, y))]
     contact = np.array((0.0, -model.radius))
     before, after = (angular_momentum(points, spins, contact) for points, spins, _ in parts)
@@ -225,12 +224,12 @@ def mapped(assembly: Assembly, place, of_mass=lambda m: m, of_inertia=lambda i: 
 def test_the_mirror_image_moves_as_the_mirror_image(assembly, slope, free):
     model = standing(assembly, G, slope)
     mirror = standing(mapped(assembly, lambda _, at: (-at[0], at[1])), G, -slope)
-    y, struck = state_of(model, model.bent, free), both_feet_down(model, free)
+    y, struck = state_of(model, BENT, free), both_feet_down(model, free)
     image, image_struck = (tuple(-x for x in state) for state in (y, struck))
-    assert walkers_differ_by(rates(mirror, mirror.bent, image), -np.array(rates(model, model.bent, y))) < 1e-9
+    assert walkers_differ_by(rates(mirror, BENT, image), -np.array(rates(model, BENT, y))) < 1e-9
     assert walkers_differ_by(heel_strike(mirror, image_struck), -np.array(heel_strike(model, struck))) < 1e-9
-    along, normal = ground_reaction(model, model.bent, y)
-    assert ground_reaction(mirror, mirror.bent, image) == pytest.approx((-along, normal), rel=1e-8, abs=1e-7)
+    along, normal = ground_reaction(Mode(model, BENT), y)
+    assert ground_reaction(Mode(mirror, BENT), image) == pytest.approx((-along, normal), rel=1e-8, abs=1e-7)
     height, apart = swing_foot(model, y)
     assert swing_foot(mirror, image) == pytest.approx((height, -apart), abs=1e-12)
 
@@ -250,17 +249,17 @@ def test_a_twin_of_another_size_and_mass_moves_alike(assembly, slope, free):
         G,
         slope,
     )
-    n, slow = len(model.tree.arm_x), long**-0.5
+    n, slow = len(model.arm_x), long**-0.5
 
     def of_twin(state):
         return (*state[:n], *(slow * x for x in state[n:]))
 
-    y, struck = state_of(model, model.bent, free), both_feet_down(model, free)
-    found, wanted = rates(twin, twin.bent, of_twin(y)), np.array(rates(model, model.bent, y)) / long
+    y, struck = state_of(model, BENT, free), both_feet_down(model, free)
+    found, wanted = rates(twin, BENT, of_twin(y)), np.array(rates(model, BENT, y)) / long
     assert walkers_differ_by(found, wanted) < 1e-9
     assert walkers_differ_by(heel_strike(twin, of_twin(struck)), of_twin(heel_strike(model, struck))) < 1e-9
-    force = heavy * np.array(ground_reaction(model, model.bent, y))
-    assert ground_reaction(twin, twin.bent, of_twin(y)) == pytest.approx(force, rel=1e-8, abs=1e-7)
+    force = heavy * np.array(ground_reaction(Mode(model, BENT), y))
+    assert ground_reaction(Mode(twin, BENT), of_twin(y)) == pytest.approx(force, rel=1e-8, abs=1e-7)
 
 
 def by_parts(assembly, radius_m, leg_length_m):
@@ -290,9 +289,9 @@ def test_a_walker_by_its_parts_in_frames_of_their_own_is_that_of_its_type(assemb
     )
     moved = mapped(assembly, lambda name, at: tuple(np.add(at, shifts[name.split()[0]])))
     listed = standing(assembly_of(by_parts(moved, model.radius, model.leg_length)), G, slope)
-    y, struck = state_of(model, model.bent, free), both_feet_down(model, free)
-    assert walkers_differ_by(rates(listed, listed.bent, y), rates(model, model.bent, y)) < 1e-9
+    y, struck = state_of(model, BENT, free), both_feet_down(model, free)
+    assert walkers_differ_by(rates(listed, BENT, y), rates(model, BENT, y)) < 1e-9
     assert walkers_differ_by(heel_strike(listed, struck), heel_strike(model, struck)) < 1e-9
-    assert ground_reaction(listed, listed.bent, y) == pytest.approx(
-        ground_reaction(model, model.bent, y), rel=1e-8, abs=1e-7
+    assert ground_reaction(Mode(listed, BENT), y) == pytest.approx(
+        ground_reaction(Mode(model, BENT), y), rel=1e-8, abs=1e-7
     )

@@ -5,23 +5,24 @@ import pytest
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from rigid_physics import heel_strike, knee_strike, potential_energy, rates, state_linked
 
-from walkerlab.mechanics.impact import heel_strike, heel_strike_along, knee_strike, knee_strike_along
-from walkerlab.mechanics.links import spread
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import (
+    BENT,
     STANCE,
+    STRAIGHT,
     SWING,
     Mode,
     ground_reaction,
     kinetic_energy,
+    linked,
     mode_jacobian,
-    potential_energy,
-    rates,
     swing_foot,
 )
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled, impact
+from walkerlab.solvers.system import derivative
 
 THIGH = Limb(0.46, 1.1, 0.21, 0.02, 0.013)
 SHANK = Limb(0.52, 0.4, 0.17, -0.015, 0.004)
@@ -30,7 +31,7 @@ RADIUS, AHEAD = 0.18, 0.03
 HIP, TORSO, ABOVE, TORSO_INERTIA = 0.8, 2.3, 0.31, 0.06
 G, SLOPE = 9.81, 0.07
 KNEED = standing(with_torso(kneed_legs(THIGH, SHANK, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE)
-STRAIGHT = standing(straight_legs(LEG, HIP, Arc(RADIUS, AHEAD)), G, SLOPE)
+ON_STRAIGHT_LEGS = standing(straight_legs(LEG, HIP, Arc(RADIUS, AHEAD)), G, SLOPE)
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 
 angle, rate = st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)
@@ -95,7 +96,7 @@ def test_a_rolling_kneed_walker_with_a_torso_moves_as_lagrange_says(lagrange, nu
     psi = np.array(numbers[:3]) + SLOPE
     M, rest, T, V = lagrange[0](psi, numbers[3:])
     wanted = np.linalg.solve(M, -rest[:, 0])
-    found = rates(KNEED, KNEED.bent, y)
+    found = rates(KNEED, BENT, y)
     assert found[:3] == pytest.approx(wanted, rel=1e-10, abs=1e-9)
     assert found[3] == pytest.approx(0.5 * (found[0] + found[1]), rel=1e-12)
     assert kinetic_energy(KNEED, y) == pytest.approx(T, rel=1e-12)
@@ -103,7 +104,7 @@ def test_a_rolling_kneed_walker_with_a_torso_moves_as_lagrange_says(lagrange, nu
     at_rest = potential_energy(KNEED, kneed_state((-SLOPE, -SLOPE, -SLOPE, 0, 0, 0)))
     assert potential_energy(KNEED, y) - at_rest == pytest.approx(V - upright, abs=1e-11)
     force = lagrange[1](psi, numbers[3:], wanted)[:, 0]
-    assert ground_reaction(KNEED, KNEED.bent, y) == pytest.approx(force, rel=1e-9, abs=1e-8)
+    assert ground_reaction(Mode(KNEED, BENT), y) == pytest.approx(force, rel=1e-9, abs=1e-8)
 
 
 @given(free)
@@ -114,7 +115,7 @@ def test_a_straight_leg_moves_as_one_body(lagrange, numbers):
     M, rest, _, _ = lagrange[0](np.array([thigh, stance, thigh]) + SLOPE, (d_thigh, d_stance, d_thigh))
     E = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
     wanted = np.linalg.solve(E.T @ M @ E, -E.T @ rest[:, 0])
-    found = rates(KNEED, KNEED.straight, y)
+    found = rates(KNEED, STRAIGHT, y)
     assert (found[0], found[1]) == pytest.approx(wanted, rel=1e-10, abs=1e-9)
     assert found[2] == found[0]
 
@@ -123,7 +124,7 @@ def test_a_straight_leg_moves_as_one_body(lagrange, numbers):
 def test_the_assembled_compass_swings_by_appendix_a(y, sign):
     walker = PAPER._replace(c21_sign=sign, leg_inertia=0.1)
     model = assembled(walker)
-    assert rates(model, model.bent, y) == pytest.approx(accelerations(walker, *y), rel=1e-12, abs=1e-12)
+    assert rates(model, BENT, y) == pytest.approx(accelerations(walker, *y), rel=1e-12, abs=1e-12)
     assert heel_strike(model, y) == pytest.approx(impact(walker, *y), rel=1e-12, abs=1e-12)
 
 
@@ -206,56 +207,61 @@ def differences(f, y, h=1e-5, along=None):
     return np.array(columns).T / (2 * h)
 
 
-def linked(mode, y):
-    """A state with the followers where their links have them."""
-    return np.array((*spread(mode.links, tuple(y[:4])), *spread(mode.links, tuple(y[4:]))))
-
-
-@pytest.mark.parametrize("links", [KNEED.bent, KNEED.straight.links], ids=["bent", "straight"])
+@pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 @given(numbers=free)
-def test_the_jacobian_is_the_slope_of_the_rates(links, numbers):
-    mode = Mode(KNEED, links)
+def test_the_jacobian_is_the_slope_of_the_rates(phase, numbers):
     y = np.array(kneed_state(numbers))
-    J = np.zeros((8, 8))
-    mode_jacobian(mode, 0.0, tuple(y), J)
-    slopes = differences(lambda x: rates(KNEED, mode.links, x), y)
+    J = np.full((8, 8), np.nan)
+    mode_jacobian(Mode(KNEED, phase), 0.0, y, J)
+    slopes = differences(lambda x: rates(KNEED, phase, x), y)
     assert J[4:] == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
+    assert (J[:4] == np.eye(4, 8, 4)).all()
+
+
+@pytest.mark.parametrize("phase", [BENT, STRAIGHT])
+@given(numbers=free)
+def test_columns_behind_a_state_change_by_the_jacobian(phase, numbers):
+    y, directions = np.array(kneed_state(numbers)), np.random.default_rng(0).normal(size=(3, 8))
+    J, f = np.zeros((8, 8)), np.full(32, np.nan)
+    mode_jacobian(Mode(KNEED, phase), 0.0, y, J)
+    derivative(Mode(KNEED, phase), 0.0, np.concatenate((y, *directions)), f)
+    assert tuple(f[:4]) == tuple(y[4:])
+    assert tuple(f[4:8]) == rates(KNEED, phase, y)
+    assert f[8:].reshape(3, 8) == pytest.approx(directions @ J.T, rel=1e-9, abs=1e-9 * np.abs(J).max())
 
 
 @given(numbers=free)
-def test_the_jacobian_of_a_leg_in_one_piece_is_the_slope_along_what_it_can_do(numbers):
-    mode = Mode(KNEED, KNEED.straight)
-    y, J = linked(mode, kneed_state(numbers)), np.zeros((8, 8))
-    mode_jacobian(mode, 0.0, tuple(y), J)
-    possible = [linked(mode, unit) for unit in np.eye(8)]
-    slopes = differences(lambda x: rates(KNEED, mode.links, x), y, along=possible)
-    assert J[4:] @ np.array(possible).T == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
+def test_a_straight_leg_moves_as_a_leg_made_in_one_piece(numbers):
+    """Thigh and shank as one limb, by the parallel axes of their masses."""
+    mass, below = THIGH.mass_kg + SHANK.mass_kg, THIGH.length_m + SHANK.mass_below_m
+    ahead = (THIGH.mass_kg * THIGH.mass_ahead_m + SHANK.mass_kg * SHANK.mass_ahead_m) / mass
+    down = (THIGH.mass_kg * THIGH.mass_below_m + SHANK.mass_kg * below) / mass
+    inertia = THIGH.inertia_kg_m2 + SHANK.inertia_kg_m2
+    inertia += THIGH.mass_kg * ((THIGH.mass_ahead_m - ahead) ** 2 + (THIGH.mass_below_m - down) ** 2)
+    inertia += SHANK.mass_kg * ((SHANK.mass_ahead_m - ahead) ** 2 + (below - down) ** 2)
+    leg = Limb(THIGH.length_m + SHANK.length_m, mass, down, ahead, inertia)
+    one_piece = standing(with_torso(straight_legs(leg, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE)
+    y = state_linked(KNEED, STRAIGHT, kneed_state(numbers))
+    found = rates(KNEED, STRAIGHT, y)
+    expected = rates(one_piece, STRAIGHT, [y[k] for k in (0, 1, 3, 4, 5, 7)])
+    assert [found[k] for k in (0, 1, 3)] == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
-@given(numbers=free)
-def test_a_straight_leg_in_one_piece_moves_as_its_parts_held_in_line(numbers):
-    y = linked(Mode(KNEED, KNEED.straight), kneed_state(numbers))
-    assert rates(KNEED, KNEED.straight, tuple(y)) == pytest.approx(
-        rates(KNEED, KNEED.straight.links, tuple(y)), rel=1e-10, abs=1e-10
-    )
-
-
-@pytest.mark.parametrize("strike", [(heel_strike, heel_strike_along), (knee_strike, knee_strike_along)])
+@pytest.mark.parametrize("strike", [heel_strike, knee_strike])
 @given(numbers=free)
 def test_the_derivative_of_a_strike_is_its_slope(strike, numbers):
-    impact_of, along = strike
     y = np.array(kneed_state(numbers))
-    after = impact_of(KNEED, tuple(y))
-    found = np.array([along(KNEED, tuple(y), after, tuple(e)) for e in np.eye(8)]).T
-    slopes = differences(lambda x: impact_of(KNEED, x), y)
+    found = np.array(strike(KNEED, y, np.eye(8))[8:]).reshape(8, 8).T
+    slopes = differences(lambda x: strike(KNEED, x), y)
     assert found == pytest.approx(slopes, rel=1e-6, abs=1e-7 * np.abs(slopes).max())
 
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
 def test_both_feet_touch_where_straight_legs_lean_alike(leg):
-    y = spread(STRAIGHT.straight, (0.3 - 2.0 * (SLOPE + STRAIGHT.lean), -0.3) if leg else (0.2, 0.1))
-    both = y[SWING] + y[STANCE] + 2.0 * (SLOPE + STRAIGHT.lean)
-    height, _ = swing_foot(STRAIGHT, (*y, 0.0, 0.0))
+    lean = ON_STRAIGHT_LEGS.lean
+    y = linked(ON_STRAIGHT_LEGS, STRAIGHT, (0.3 - 2.0 * (SLOPE + lean), -0.3) if leg else (0.2, 0.1))
+    both = y[SWING] + y[STANCE] + 2.0 * (SLOPE + lean)
+    height, _ = swing_foot(ON_STRAIGHT_LEGS, (*y, 0.0, 0.0))
     assert (abs(height) < 1e-12) == (abs(both) < 1e-12)
 
 
@@ -267,10 +273,10 @@ def test_what_goes_to_zero_leaves_the_compass(order, walker):
     """Radius and torso mass: the rates of the legs come back linearly."""
     y = (0.2, -0.1, -0.8, -1.1)
     compass = standing(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
-    wanted = np.array(rates(compass, compass.bent, y))
+    wanted = np.array(rates(compass, BENT, y))
     errors = []
     for e in (1e-3, 1e-4):
         model = standing(walker(e), G, SLOPE)
         full = y if len(model.blank) == 4 else (*y[:2], 0.05, *y[2:], -0.95)
-        errors.append(np.abs(np.array(rates(model, model.bent, full))[:2] - wanted).max())
+        errors.append(np.abs(np.array(rates(model, BENT, full))[:2] - wanted).max())
     assert np.log10(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)

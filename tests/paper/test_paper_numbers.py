@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.config.schema import Contact
-from walkerlab.mechanics.standing import Mode
+from walkerlab.mechanics.standing import BENT, Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
 from walkerlab.paper.judged import Verdict, agreement, weigh
 from walkerlab.paper.measured import (
@@ -204,7 +204,7 @@ def test_the_adams_start_falls_when_another_integration_says_so(study):
     hip.terminal = True
     start = adams_start_as_printed()
     model = assembled(walker)
-    leg = Mode(model, model.bent)
+    leg = Mode(model, BENT)
     probe = np.zeros(4)
 
     def rate(t, y):

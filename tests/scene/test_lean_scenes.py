@@ -20,8 +20,8 @@ from walkerlab.mechanics.parts import Assembly, Body, Particle
 from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
+from walkerlab.solvers.in_tuples import derivative, jacobian
 from walkerlab.solvers.registry import method_named
-from walkerlab.solvers.system import derivative, jacobian
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute, preview

@@ -4,9 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from walkerlab.kernels import kernel
+from walkerlab.solvers.in_tuples import blank, derivative, jacobian
 from walkerlab.solvers.stepping import STEP_DONE, T, advance, begin
-from walkerlab.solvers.system import blank, derivative, jacobian
-from walkerlab.solvers.vectors import load
 
 LINEAR, CURVE, VAN_DER_POL, EXPLOSION = range(4)
 ROBERTSON, HIRES = range(2)
@@ -116,11 +115,11 @@ STIFF = Planar(VAN_DER_POL, 1e-6, 0.0, 1.0)  # mu = 1 / eps = 1e6
 @kernel
 def drive(method: Any, system: Any, t: float, y: Any, h: float, t_end: float) -> int:
     """Integrate from t to t_end; with h > 0 in fixed steps of that length, each begun anew."""
-    begin(method, system, t, load(y, 0, blank(system)), h)
+    begin(method, system, t, y, h)
     while method.clock[T] < t_end:
         status = advance(method, system, t_end if h == 0.0 else min(t_end, method.clock[T] + h))
         if status != STEP_DONE:
             return status
         if h > 0.0 and method.clock[T] < t_end:
-            begin(method, system, method.clock[T], load(method.y, 0, blank(system)), h)
+            begin(method, system, method.clock[T], method.y, h)
     return STEP_DONE

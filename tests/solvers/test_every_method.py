@@ -22,7 +22,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import blank, derivative, jacobian
+from walkerlab.solvers.system import block, derivative, jacobian
 
 MOON = 0.012277471
 PLENTY = 10**6
@@ -34,26 +34,23 @@ class Satellite(NamedTuple):
     moon: float
 
 
-START = (0.994, 0.0, 0.0, -2.00158510637908252240537862224)
+START = np.array((0.994, 0.0, 0.0, -2.00158510637908252240537862224))
 PERIOD = 17.0652165601579625588917206249
 
 
-@blank.case(Satellite)
-def satellite_blank(system):
+@block.case(Satellite)
+def satellite_block(system):
     return (0.0, 0.0, 0.0, 0.0)
 
 
 @derivative.case(Satellite)
-def satellite_derivative(system, t, y):
+def satellite_derivative(system, t, y, f):
     m, e = system.moon, 1.0 - system.moon
     earth = ((y[0] + m) ** 2 + y[1] ** 2) ** 1.5
     moon = ((y[0] - e) ** 2 + y[1] ** 2) ** 1.5
-    return (
-        y[2],
-        y[3],
-        y[0] + 2.0 * y[3] - e * (y[0] + m) / earth - m * (y[0] - e) / moon,
-        y[1] - 2.0 * y[2] - e * y[1] / earth - m * y[1] / moon,
-    )
+    f[0], f[1] = y[2], y[3]
+    f[2] = y[0] + 2.0 * y[3] - e * (y[0] + m) / earth - m * (y[0] - e) / moon
+    f[3] = y[1] - 2.0 * y[2] - e * y[1] / earth - m * y[1] / moon
 
 
 @jacobian.case(Satellite)
@@ -96,9 +93,7 @@ def step(method, system, t_end):
 @kernel
 def half_way(method, system, out):
     prepare_dense(method, system)
-    y = interpolate(method, system, 0.5)
-    for i in range(4):
-        out[i] = y[i]
+    interpolate(method, system, 0.5, out)
 
 
 @kernel
@@ -125,7 +120,7 @@ TURN = RADIUS**-1.5 - 1.0
 
 def on_circle(t):
     x, y = RADIUS * math.cos(TURN * t), RADIUS * math.sin(TURN * t)
-    return (x, y, -TURN * y, TURN * x)
+    return np.array((x, y, -TURN * y, TURN * x))
 
 
 def circled(name, rtol):

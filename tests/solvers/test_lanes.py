@@ -5,21 +5,18 @@ import math
 import numpy as np
 import pytest
 
+from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.fused import fused
-from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import Mode
+from walkerlab.mechanics.standing import STRAIGHT, Mode
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.mechanics.tuples import put
-from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.lanes import WIDTH, any_positive, choose, in_lanes, load_lanes, nearest, store_lanes
-from walkerlab.solvers.system import blank, derivative
+from walkerlab.solvers import system
+from walkerlab.solvers.fused import fused
+from walkerlab.solvers.in_tuples import derivative
+from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes
 
 MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))
-WALKER = Mode(MODEL, MODEL.bent)
-KNEED = standing(kneed_legs(Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5, Arc(0.2)), 9.81, 0.05)
-BENT = Mode(KNEED, KNEED.bent)
+WALKER = two_legs(MODEL)
 
 
 @kernel
@@ -42,11 +39,8 @@ def sines(x, out):
 
 @kernel
 def rates(system, y, out):
-    state = in_lanes(blank(system))
-    for i in range(len(state)):
-        state = put(state, i, load_lanes(y, i))
-    rate = derivative(system, 0.0, state)
-    for i in range(len(state)):
+    rate = derivative(system, 0.0, (load_lanes(y, 0), load_lanes(y, 1), load_lanes(y, 2), load_lanes(y, 3)))
+    for i in range(4):
         store_lanes(rate[i], out, i)
 
 
@@ -88,15 +82,27 @@ def test_a_lane_does_not_feel_its_neighbours():
     assert (alone[:, 0] == beside[:, 0]).all()
 
 
-@pytest.mark.parametrize("system", [WALKER, BENT], ids=["straight legs", "knees"])
-def test_equations_of_motion_are_those_of_a_walker_alone(system):
-    y = np.random.default_rng(2).uniform(-2.0, 2.0, (len(blank(system)), WIDTH))
-    out = np.zeros(y.shape)
-    rates(system, y, out)
+def test_equations_of_motion_are_those_of_a_walker_alone():
+    y = np.random.default_rng(2).uniform(-2.0, 2.0, (4, WIDTH))
+    out = np.zeros((4, WIDTH))
+    rates(WALKER, y, out)
 
     @kernel
     def alone(system, y):
         return derivative(system, 0.0, y)
 
-    expected = np.transpose([alone(system, tuple(column)) for column in y.T.tolist()])
+    expected = np.transpose([alone(WALKER, tuple(column)) for column in y.T.tolist()])
     np.testing.assert_allclose(out, expected, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_two_legs_written_out_move_as_the_bodies_of_the_rigid_model(radius):
+    model = MODEL.changed(radius=radius)
+    y = np.random.default_rng(3).uniform(-2.0, 2.0, (4, WIDTH))
+    out, expected = np.zeros((4, WIDTH)), np.zeros((4, WIDTH))
+    rates(two_legs(model), y, out)
+    for lane in range(WIDTH):
+        f = np.zeros(4)
+        system.derivative(Mode(model, STRAIGHT), 0.0, y[:, lane].copy(), f)
+        expected[:, lane] = f
+    np.testing.assert_allclose(out, expected, rtol=1e-12, atol=1e-12)

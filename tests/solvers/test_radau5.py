@@ -27,6 +27,7 @@ from stiff_problems import (
 )
 
 from walkerlab.kernels import kernel
+from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.radau5 import new_radau5
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.solvers.stepping import (
@@ -45,15 +46,13 @@ from walkerlab.solvers.stepping import (
     interpolate,
     rewind,
 )
-from walkerlab.solvers.system import derivative
-from walkerlab.solvers.vectors import store
 
 PLENTY = 10**7
 
 
 @kernel
 def read_off(method: Any, system: Any, fraction: float, out: Any) -> None:
-    store(interpolate(method, system, fraction), out, 0)
+    interpolate(method, system, fraction, out)
 
 
 @kernel

@@ -45,7 +45,7 @@ def error_of(name, problem, tolerance):
     if METHODS[name].compiled:
         status = drive(method, system, 0.0, np.array(start), 0.0, t_end)
     else:
-        status = in_python(method, system, start, t_end)
+        status = in_python(method, system, np.array(start), t_end)
     assert status == STEP_DONE
     assert method.clock[T] == t_end
     return np.abs(method.y[: len(end)] / end - 1.0).max(), int(method.counts[ACCEPTED])

@@ -104,7 +104,8 @@ def test_a_kneed_walkers_case_passes_every_measure(name):
 def test_a_heel_strike_keeps_momentum_summed_over_the_masses_of_any_walker(name):
     config = config_of(name)
     model, before = start_of(config)
-    after = np.array(heel_strike(model, tuple(before.tolist())))
+    after = np.zeros(before.size)
+    heel_strike(model, before, after)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
     assert masses.feet_off_the_slope(before[None]) < 1e-12
     assert masses.momentum_change(before[None], after[None]) < 1e-12

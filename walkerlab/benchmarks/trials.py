@@ -13,7 +13,7 @@ from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import Unobserved
 from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
-from walkerlab.hybrid.rigid_walk import is_bent, walk
+from walkerlab.hybrid.rigid_walk import walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import Standing
 from walkerlab.paper.appendix_a import RigidWalker
@@ -82,14 +82,16 @@ class RigidTrial:
         n = len(self.walker.blank)
         method = entry.new(n, rtol, atol, budget)
         finder = finder_for(method, RIGID_EVENTS)
-        strikes, knees = np.zeros(self.steps), np.zeros(self.steps if is_bent(self.walker.knee) else 0)
+        strikes, knees = np.zeros(self.steps), np.zeros(self.steps if self.walker.kneed else 0)
         before, after = np.zeros((self.steps, n)), np.zeros((self.steps, n))
         stride = walk if entry.compiled else uncompiled(walk)
 
         def run() -> TrialRun:
             clear_counts(method)
             method.clock[H_NEXT] = 0.0
-            status, _ = stride(self.walker, method, finder, Unobserved(), self.start, strikes, before, after, knees)
+            status, _ = stride(
+                self.walker, method, finder, Unobserved(), np.array(self.start), strikes, before, after, knees
+            )
             return finished(Outcome(status), after[-1], method.counts)
 
         return run

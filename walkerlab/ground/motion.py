@@ -12,7 +12,8 @@ from walkerlab.mechanics.tree import (
     with_centrifugal,
 )
 from walkerlab.mechanics.tuples import Vector, put
-from walkerlab.solvers.system import State, blank, derivative, jacobian
+from walkerlab.solvers.in_tuples import blank, derivative, jacobian
+from walkerlab.solvers.system import State
 
 
 class OnGround(NamedTuple):

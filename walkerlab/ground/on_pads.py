@@ -12,7 +12,8 @@ from walkerlab.ground.terrain import carried_in_cell, cell_at
 from walkerlab.ground.walker import ContactWalker, foot_motion
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.system import State, blank, derivative, jacobian
+from walkerlab.solvers.in_tuples import blank, derivative, jacobian
+from walkerlab.solvers.system import State
 
 
 class OnPads(NamedTuple):

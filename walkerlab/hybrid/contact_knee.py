@@ -12,8 +12,9 @@ from walkerlab.hybrid.contact_tangent import Tangent, jump
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, tree_gradients
 from walkerlab.mechanics.tuples import Vector, put
-from walkerlab.solvers.stepping import T, end_state
-from walkerlab.solvers.system import State, derivative
+from walkerlab.solvers.in_tuples import derivative, end_state
+from walkerlab.solvers.stepping import T
+from walkerlab.solvers.system import State
 
 
 @by_type

@@ -10,7 +10,8 @@ from walkerlab.hybrid.contact_events import CLIMB, HEIGHT, PER_FOOT, feet_motion
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
-from walkerlab.solvers.stepping import T_OLD, T, end_state, interpolate
+from walkerlab.solvers.in_tuples import end_state, interpolate
+from walkerlab.solvers.stepping import T_OLD, T
 from walkerlab.solvers.system import State
 
 # indices into `books`

@@ -22,8 +22,9 @@ from walkerlab.hybrid.contact_walk import walk_part
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tuples import put
 from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.in_tuples import end_state
 from walkerlab.solvers.registry import sharing
-from walkerlab.solvers.stepping import T, dense_degree, end_state
+from walkerlab.solvers.stepping import T, dense_degree
 from walkerlab.solvers.system import State
 
 

@@ -8,10 +8,10 @@ from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_sig
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.solvers.dop853 import Dop853
 from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.in_tuples import blank, interpolate
 from walkerlab.solvers.radau5 import Radau5
 from walkerlab.solvers.scipy_methods import ScipyMethod
-from walkerlab.solvers.stepping import interpolate
-from walkerlab.solvers.system import State, blank
+from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
 
 

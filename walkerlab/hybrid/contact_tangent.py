@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import inlined
+from walkerlab.solvers.in_tuples import interpolate, jacobian
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.radau5_tableau import C
-from walkerlab.solvers.stepping import T_OLD, T, interpolate
-from walkerlab.solvers.system import jacobian
+from walkerlab.solvers.stepping import T_OLD, T
 
 THIS_SIDE = 4e-12  # s, some times as much as the time of an event is uncertain by
 ROOT6 = 6.0**0.5

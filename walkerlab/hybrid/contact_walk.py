@@ -29,18 +29,8 @@ from walkerlab.hybrid.contact_scan import Feet, Scene, scan
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.stepping import (
-    H_NEXT,
-    OUT_OF_BUDGET,
-    STEP_DONE,
-    T_OLD,
-    T,
-    advance,
-    begin,
-    end_state,
-    prepare_dense,
-    rewind,
-)
+from walkerlab.solvers.in_tuples import begin, end_state
+from walkerlab.solvers.stepping import H_NEXT, OUT_OF_BUDGET, STEP_DONE, T_OLD, T, advance, prepare_dense, rewind
 from walkerlab.solvers.system import State
 
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted

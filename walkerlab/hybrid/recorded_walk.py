@@ -26,8 +26,7 @@ from walkerlab.hybrid.rigid_observer import (
 )
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.links import spread
-from walkerlab.mechanics.standing import STANCE, Mode, NoKnee, Standing, rolled_distance, swing_foot
+from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, Mode, Standing, linked, rolled_distance, swing_foot
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
@@ -137,9 +136,9 @@ class Recorder:
         self.finder = finder_for(method, EVENTS)
         # a library's method is integrated with in Python
         self.walk: Callable[..., tuple[int, int]] = uncompiled(walk) if isinstance(method, ScipyMethod) else walk
-        self.numbers, self.kneed = len(walker.blank), not isinstance(walker.knee, NoKnee)
+        self.numbers, self.kneed = len(walker.blank), walker.kneed
         first = new_observer(np.zeros(0), self.numbers)
-        observe_start(first, Mode(walker, walker.bent), start)
+        observe_start(first, Mode(walker, BENT), start)
         self.energy_at_start = float(first.energy[LATEST])
         self.extremes = first.extremes
         self.energy_integral, self.duration = 0.0, 0.0
@@ -158,7 +157,7 @@ class Recorder:
         clear_counts(self.method)
         self.method.counts[BUDGET] = self._left_for(steps)
         status, taken = self.walk(
-            self.walker, self.method, self.finder, observer, self.state, strikes, before, after, knees
+            self.walker, self.method, self.finder, observer, np.array(self.state), strikes, before, after, knees
         )
         self.counts += self.method.counts
         self._keep(observer)
@@ -253,7 +252,7 @@ def with_scaled_rates(walker: Standing, state: State, swing: float, stance: floa
     """A state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
-    return (*state[:n], *spread(walker.at_strike, tuple(rates)))
+    return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

@@ -12,15 +12,17 @@ import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
-from walkerlab.kernels import by_type, inlined, kernel
+from walkerlab.kernels import by_type, inlined, kernel, vector
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import Mode, NoKnee, Standing, rates
-from walkerlab.solvers.dop853 import ERROR_3, ERROR_5, GROW_MOST, SAFETY, SHRINK_MOST, error_sums, stages_of
+from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
+from walkerlab.solvers.in_tuples import derivative
+from walkerlab.solvers.lane_steps import ERROR_3, ERROR_5, combine, error_sums, stages_of
 from walkerlab.solvers.lanes import WIDTH, Lanes, any_positive, choose, load_lanes, store_lanes
-from walkerlab.solvers.system import State, derivative
-from walkerlab.solvers.vectors import combine
+from walkerlab.solvers.system import State
 
 # rows of a batch's memory, each with one number a lane
 START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
@@ -46,6 +48,12 @@ class TwoLegs(NamedTuple):
     """The rigid model of two straight legs, with what lanes need of it."""
 
     model: Standing
+    A: tuple[float, ...]  # (4,) constants of standing.py, row by row
+    B: tuple[float, ...]
+    A_centrifugal: tuple[float, ...]
+    B_centrifugal: tuple[float, ...]
+    arm_x: tuple[float, ...]  # (2,)
+    arm_y: tuple[float, ...]
     slope: float  # rad
     upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
     fallen: float  # rad from there, beyond which the hip is too low
@@ -54,30 +62,42 @@ class TwoLegs(NamedTuple):
 
 def two_legs(model: Standing) -> TwoLegs | None:
     """The model as that of two straight legs; None if it has more bodies."""
-    if len(model.tree.arm_x) != 2 or not isinstance(model.knee, NoKnee):
+    if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
+    pairs = (model.A, model.B, model.A_centrifugal, model.B_centrifugal)
     return TwoLegs(
         model,
-        model.slope,
+        *(tuple(numbers.ravel().tolist()) for numbers in (*pairs, model.arm_x, model.arm_y)),
+        float(model.slope),
         math.atan2(x, y),
         math.acos(max(-1.0, lowest)),
         math.sqrt(model.leg_length / model.gravity),
     )
 
 
-class Swings(NamedTuple):
-    """The swing phases of one walker in all lanes."""
-
-    mode: Mode
-
-
-@derivative.case(Swings, woven=True)
-def swings_derivative(system: Swings, t: float, y: State) -> State:
-    """As that of the walker alone."""
-    alpha = rates(system.mode.model, system.mode.links, y)
-    return (y[2], y[3], alpha[0], alpha[1])
+@derivative.case(TwoLegs, woven=True)
+def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
+    """The equations of motion of standing.py for two bodies, written out: of floats or of lanes."""
+    model, R = system.model, system.model.radius
+    s_1, c_1 = sine_cosine(y[0] + system.slope)
+    s_2, c_2 = sine_cosine(y[1] + system.slope)
+    F_1, U_1 = c_1 * system.arm_x[0] - s_1 * system.arm_y[0], s_1 * system.arm_x[0] + c_1 * system.arm_y[0]
+    F_2, U_2 = c_2 * system.arm_x[1] - s_2 * system.arm_y[1], s_2 * system.arm_x[1] + c_2 * system.arm_y[1]
+    cos_d, sin_d = c_1 * c_2 + s_1 * s_2, s_1 * c_2 - c_1 * s_2
+    squared_1, squared_2 = y[2] * y[2], y[3] * y[3]
+    pulled = model.mass * model.gravity_along + squared_1 * F_1 + squared_2 * F_2
+    r_1 = -model.gravity_along * U_1 - model.gravity_down * F_1
+    r_2 = -model.gravity_along * U_2 - model.gravity_down * F_2 - R * pulled
+    r_2 = r_2 + squared_1 * (system.A_centrifugal[2] * sin_d - system.B_centrifugal[2] * cos_d)
+    r_1 = r_1 - squared_2 * (system.A_centrifugal[1] * sin_d + system.B_centrifugal[1] * cos_d)
+    M_12 = system.A[2] * cos_d + system.B[2] * sin_d + R * U_1
+    M_22 = system.A[3] + R * U_2 + R * U_2 + model.mass * R * R
+    inverse = 1.0 / system.A[0]
+    factor = M_12 * inverse
+    alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)
+    return (y[2], y[3], r_1 * inverse - factor * alpha_2, alpha_2)
 
 
 class LaneMemory(NamedTuple):
@@ -117,7 +137,7 @@ class Strikes(NamedTuple):
 
 
 @by_type
-def struck(observer: Any, walk: int, step: int, t: float, y: State) -> int:
+def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
     """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
 
     walk  number of the start
@@ -126,7 +146,7 @@ def struck(observer: Any, walk: int, step: int, t: float, y: State) -> int:
 
 
 @struck.case(Strikes)
-def keep_strike(observer: Strikes, walk: int, step: int, t: float, y: State) -> int:
+def keep_strike(observer: Strikes, walk: int, step: int, t: float, y: Any) -> int:
     """Keep it."""
     observer.times[walk, step] = t
     for i in range(4):
@@ -180,7 +200,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
     """Have a lane start a swing from state y at time t (s), with a step h."""
     rows = memory.rows
-    rate = derivative(Mode(walker.model, walker.model.bent), t, y)
+    rate = derivative(walker, t, y)
     for i in range(4):
         rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
     rows[STEP, lane], rows[TIME, lane] = h, t
@@ -210,7 +230,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     y, k1 = four(rows, START), four(rows, START_RATE)
     left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
     h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(Swings(Mode(walker.model, walker.model.bent)), 0.0, y, k1, h)
+    used, end, end_rate = stages_of(walker, 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
@@ -301,27 +321,24 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         usual = abs(rows[USUAL, lane])
         rows[STEP, lane] = max(-usual, min(usual, wait))
         return GOES_ON
-    y = bridged(rows, lane, wait)
-    new = heel_strike(walker.model, y)
+    y, new = vector(walker.model.blank), vector(walker.model.blank)
+    bridge(rows, lane, wait, y)
+    heel_strike(walker.model, y, new)
     step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
     if outcome == GOES_ON:
-        begin_swing(walker, memory, lane, t, new, rows[USUAL, lane])
+        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[USUAL, lane])
     return outcome
 
 
 @inlined
-def bridged(rows: Any, lane: int, wait: float) -> State:
-    """The state a moment later: Taylor's expansion, of second order in the angles, which the guard consists of."""
-    omega_1, omega_2 = rows[START + 2, lane], rows[START + 3, lane]
-    alpha_1, alpha_2 = rows[START_RATE + 2, lane], rows[START_RATE + 3, lane]
-    return (
-        rows[START, lane] + wait * (omega_1 + 0.5 * wait * alpha_1),
-        rows[START + 1, lane] + wait * (omega_2 + 0.5 * wait * alpha_2),
-        omega_1 + wait * alpha_1,
-        omega_2 + wait * alpha_2,
-    )
+def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
+    """The state a moment later into y: a Taylor expansion, of second order in the angles that the guard is made of."""
+    for i in range(2):
+        omega, alpha = rows[START + 2 + i, lane], rows[START_RATE + 2 + i, lane]
+        y[i] = rows[START + i, lane] + wait * (omega + 0.5 * wait * alpha)
+        y[2 + i] = omega + wait * alpha
 
 
 @inlined

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from walkerlab.hybrid.recorded_walk import Array, RecordedWalk, Samples
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.standing import STANCE, SWING, Standing, ground_reaction, kinetic_energy, potential_energy
-from walkerlab.solvers.vectors import load
+from walkerlab.mechanics import standing
+from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, SWING, Mode, Standing, ground_reaction
 
 
 def energies(walker: Standing, states: Array) -> Array:
@@ -35,20 +35,14 @@ def reactions(walker: Standing, states: Array, bent: NDArray[np.bool_] | None = 
 def fill_energies(walker: Standing, states: Any, out: Any) -> None:
     """Write the energies of `states` (samples, 2 n) into `out` (samples, 2)."""
     for i in range(states.shape[0]):
-        y = load(states, i, walker.blank)
-        out[i, 0] = kinetic_energy(walker, y)
-        out[i, 1] = potential_energy(walker, y)
+        out[i, 0], out[i, 1] = standing.energies(walker, states[i])
 
 
 @kernel
 def fill_reactions(walker: Standing, states: Any, bent: Any, out: Any) -> None:
     """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
     for i in range(states.shape[0]):
-        y = load(states, i, walker.blank)
-        if bent[i]:
-            out[i, 0], out[i, 1] = ground_reaction(walker, walker.bent, y)
-        else:
-            out[i, 0], out[i, 1] = ground_reaction(walker, walker.straight, y)
+        out[i, 0], out[i, 1] = ground_reaction(Mode(walker, BENT if bent[i] else STRAIGHT), states[i])
 
 
 @dataclass(frozen=True)
@@ -66,7 +60,7 @@ def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedW
 
     knee_m  the knee in its thigh's frame; None without knees
     """
-    n = len(walker.tree.arm_x)
+    n = len(walker.arm_x)
     psi = samples.state[:, :n] + walker.slope
     touches = np.concatenate(([0.0], np.cumsum(walk.lengths)))[samples.step]
     set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]

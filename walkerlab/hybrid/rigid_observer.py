@@ -4,10 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import by_type, inlined
-from walkerlab.mechanics.standing import Mode, ground_reaction, swing_foot, total_energy
+from walkerlab.kernels import by_type, inlined, vector
+from walkerlab.mechanics.standing import Mode, energies, ground_reaction, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
-from walkerlab.solvers.system import State
 
 NO_FORCE = 1e300  # above any normal force
 # indices into Observer.extremes
@@ -35,12 +34,12 @@ class Observer(NamedTuple):
 
 
 @by_type
-def observe_start(observer: Any, mode: Mode, y: State) -> None:
+def observe_start(observer: Any, mode: Mode, y: Any) -> None:
     """Take note of the start of a swing phase."""
 
 
 @by_type
-def observe(observer: Any, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
+def observe(observer: Any, method: Any, mode: Mode, fraction: float, step: int) -> None:
     """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
 
 
@@ -50,12 +49,12 @@ def wants_dense(observer: Any) -> bool:
 
 
 @observe_start.case(Unobserved)
-def ignore_start(observer: Unobserved, mode: Mode, y: State) -> None:
+def ignore_start(observer: Unobserved, mode: Mode, y: Any) -> None:
     """Nothing."""
 
 
 @observe.case(Unobserved)
-def ignore(observer: Unobserved, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
+def ignore(observer: Unobserved, method: Any, mode: Mode, fraction: float, step: int) -> None:
     """Nothing."""
 
 
@@ -73,22 +72,30 @@ def new_observer(times: Any, numbers: int) -> Observer:
 
 
 @observe_start.case(Observer)
-def record_start(observer: Observer, mode: Mode, y: State) -> None:
+def record_start(observer: Observer, mode: Mode, y: Any) -> None:
     """The energy that the swing phase must keep."""
-    energy = total_energy(mode.model, y)
-    observer.energy[LEAST], observer.energy[MOST] = energy, energy
+    kinetic, potential = energies(mode.model, y)
+    observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
     record_extremes(observer, mode, y)
 
 
 @inlined
-def assumptions(mode: Mode, y: State) -> tuple[float, float, float]:
+def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     """What the model assumes (section 3.1 of the paper), worst where largest.
 
     Pull of the ground (N), friction ratio where it pushes, depth of the swing foot (m).
     """
-    along, normal = ground_reaction(mode.model, mode.links, y)
+    along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     return -normal, ratio, -swing_foot(mode.model, y)[0]
+
+
+@inlined
+def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, float, float]:
+    """`assumptions` at a fraction of the last step."""
+    y = vector(mode.model.blank)
+    interpolate(method, mode, fraction, y)
+    return assumptions(mode, y)
 
 
 @inlined
@@ -101,12 +108,13 @@ def keep_worst(observer: Observer, found: tuple[float, float, float]) -> None:
 
 
 @inlined
-def record_extremes(observer: Observer, mode: Mode, y: State) -> tuple[float, float, float]:
+def record_extremes(observer: Observer, mode: Mode, y: Any) -> tuple[float, float, float]:
     """Keep the worst of what the model assumes, and the energy."""
     extremes, energy = observer.extremes, observer.energy
     found = assumptions(mode, y)
     keep_worst(observer, found)
-    now = total_energy(mode.model, y)
+    kinetic, potential = energies(mode.model, y)
+    now = kinetic + potential
     energy[LEAST], energy[MOST], energy[LATEST] = min(energy[LEAST], now), max(energy[MOST], now), now
     extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], energy[MOST] - energy[LEAST])
     return found
@@ -121,44 +129,46 @@ def vertex(before: float, at: float, after: float) -> float:
 
 @inlined
 def climb_to_worst(
-    observer: Observer, method: Any, mode: Mode, system: Any, measure: int, middle: float, spacing: float, last: float
+    observer: Observer, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
     """Follow a measure of `assumptions` to its maximum near `middle` of the step, by parabolas that close in.
 
     The fractions of the step are kept below `last`.
     """
     for _ in range(CLOSER):
-        before = assumptions(mode, interpolate(method, system, middle - spacing))
-        at = assumptions(mode, interpolate(method, system, middle))
-        after = assumptions(mode, interpolate(method, system, middle + spacing))
+        before = assumptions_at(method, mode, middle - spacing)
+        at = assumptions_at(method, mode, middle)
+        after = assumptions_at(method, mode, middle + spacing)
         shift = vertex(before[measure], at[measure], after[measure])
         if abs(shift) > 1.0:
             return
         middle += shift * spacing
-        keep_worst(observer, assumptions(mode, interpolate(method, system, middle)))
+        keep_worst(observer, assumptions_at(method, mode, middle))
         spacing *= 0.125
         middle = min(max(middle, spacing), last - spacing)
 
 
 @observe.case(Observer)
-def record(observer: Observer, method: Any, mode: Mode, system: Any, fraction: float, step: int) -> None:
+def record(observer: Observer, method: Any, mode: Mode, fraction: float, step: int) -> None:
     """Samples that fall into the integration step; extremes and the energy's integral from eighths of it."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
     mean_energy = SIMPSON[0] * observer.energy[LATEST]
-    before = at = assumptions(mode, interpolate(method, system, 0.0))
+    y = vector(mode.model.blank)
+    before = at = assumptions_at(method, mode, 0.0)
     for eighth in range(1, 9):
-        after = record_extremes(observer, mode, interpolate(method, system, spacing * eighth))
+        interpolate(method, mode, spacing * eighth, y)
+        after = record_extremes(observer, mode, y)
         mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
-                climb_to_worst(observer, method, mode, system, measure, spacing * (eighth - 1), spacing, fraction)
+                climb_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before, at = at, after
     observer.energy[INTEGRAL] += mean_energy * fraction * h
     observer.energy[DURATION] += fraction * h
     index = observer.recorded[0]
     while index < observer.times.size and observer.times[index] <= t_end:
-        y = interpolate(method, system, (observer.times[index] - t) / h)
+        interpolate(method, mode, (observer.times[index] - t) / h, y)
         for i in range(len(y)):
             observer.states[index, i] = y[i]
         observer.steps[index] = step

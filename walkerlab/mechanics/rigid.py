@@ -8,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import Anchor, levers, tree_about
-from walkerlab.mechanics.links import Independent, InLine, Links
 from walkerlab.mechanics.parts import Assembly, Revolute
-from walkerlab.mechanics.standing import SHANK, STANCE, SWING, NoKnee, Standing, SwingKnee, on_slope
-from walkerlab.mechanics.tree import merged_tree
-from walkerlab.mechanics.tuples import numbers
+from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
 
 Floats = NDArray[np.float64]
 ALIKE = 1e-12  # relative difference up to which two legs are alike
@@ -54,28 +51,36 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     torso, knees = torso_rows(assembly, places), knee_rows(places)
     n = len(places.names)
     free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
-    tree = merged_tree(tree_about(assembly, root), places.members)
-    return Standing(
-        tree=tree,
-        centrifugal=tree,
-        radius=foot.radius_m,
-        foot_x=numbers(to_foot[:, 0]),
-        foot_y=numbers(to_foot[:, 1]),
-        hip_x=float(to_hip[STANCE, 0]),
-        hip_y=float(to_hip[STANCE, 1]),
-        knee=SwingKnee(places.knees[0][1], places.knees[0][0]) if places.knees else NoKnee(),
-        straight=links(torso, knees, n),
-        bent=links(torso, {}, n),
-        at_strike=links(torso, {} if free else knees, n),
+    tree, members = tree_about(assembly, root), places.members
+    A, B = (members.T @ np.reshape(pairs, (len(members),) * 2) @ members for pairs in (tree.cosine, tree.sine))
+    picked = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
+    in_line = {**torso, **knees}
+    reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
+    shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
+    return new_standing(
+        n,
+        A=A,
+        B=B,
+        A_centrifugal=A,
+        B_centrifugal=B,
+        arm_x=np.array(tree.arm_x) @ members,
+        arm_y=np.array(tree.arm_y) @ members,
+        foot_x=to_foot[:, 0],
+        foot_y=to_foot[:, 1],
+        E=reductions,
         roles=places.roles,
-        picked=(STANCE, n + SWING, n + STANCE, *(n + shank for shank in free)),
+        section=[*picked, *[0] * (n + 1 - len(picked))],
+        coordinates=len(picked),
+        thigh=thigh,
+        shank=shank,
+        mass=tree.mass,
+        radius=foot.radius_m,
+        hip_x=to_hip[STANCE, 0],
+        hip_y=to_hip[STANCE, 1],
         lean=math.atan2(hanging[0], -hanging[1]),
-        leg_length=float(foot.radius_m - hanging[1]),
+        leg_length=foot.radius_m - hanging[1],
         gravity=gravity,
-        gravity_along=0.0,
         gravity_down=gravity,
-        slope=0.0,
-        blank=(0.0,) * (2 * n),
     )
 
 
@@ -120,19 +125,12 @@ def knee_rows(places: Places) -> dict[int, Floats]:
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
-def links(torso: dict[int, Floats], knees: dict[int, Floats], n: int) -> Independent | Links | InLine:
-    """The links of n bodies by the followers' weights."""
-    rows = {**torso, **knees}
-    if not rows:
-        return Independent()
-    weights = np.eye(n)
+def reduction(rows: dict[int, Floats], n: int) -> Floats:
+    """E (n, n) by the followers' weights."""
+    E = np.eye(n)
     for follower, row in rows.items():
-        weights[follower] = row
-    every = Links(tuple(1.0 if k in rows else 0.0 for k in range(n)), numbers(weights.ravel()))
-    if not knees:
-        return every
-    others = links({k - 1: np.delete(row, SHANK) for k, row in torso.items()}, {}, n - 1)
-    return InLine(every, others, (0.0,) * (n - 1), (0.0,) * (n - 1) ** 2)
+        E[follower] = row
+    return E
 
 
 def hip_of(assembly: Assembly) -> Revolute:

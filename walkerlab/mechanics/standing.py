@@ -1,12 +1,16 @@
 """A walker standing on one foot that is pinned to the ground or rolls on it without slip.
 
 The centre of the foot's arc is the tree's root; it moves along the slope by -R times the stance leg's angle, and R = 0
-is a hinge. With the projections of the first moments c_k on the slope and its normal, F_k = (R(psi_k) c_k)_x and
-U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal and s the stance leg:
+is a hinge. With Delta = theta_l - theta_k, the projections of the first moments c_k on the slope and its normal,
+F_k = (R(psi_k) c_k)_x and U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and s the stance leg:
 
+    M_kl = A_kl cos Delta + B_kl sin Delta
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
-    r_k = sum over l of omega_l^2 (A_kl sin D - B_kl cos D) - g_along U_k - g_down F_k
+    r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
           - d_ks R (sum over l of omega_l^2 F_l + m g_along)
+
+Bodies that follow others (a locked shank its thigh, a torso the bisector of the legs) are a reduction theta = E z with
+a constant E, which turns M' alpha = r into E' M' E dz' = E' r.
 
 Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then what
 belongs to both legs.
@@ -15,369 +19,324 @@ belongs to both legs.
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import by_type, inlined, woven
-from walkerlab.mechanics.links import Independent, InLine, Links, gathered, reduced, solve_linked, spread
-from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, with_centrifugal
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.kernels import inlined, matrix, vector, woven, zeros
+from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.mechanics.tuples import Vector, factored, put, solve_factored
-from walkerlab.solvers.system import State, blank, derivative, jacobian
+from walkerlab.solvers.system import block, derivative, jacobian
 
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 SWING, STANCE, SHANK = 0, 1, 2
+# rows of E: while the swing knee is free, with the swing leg straight, and in the heel strike
+BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
+NO_SHANK = -1
 
 
-class Standing(NamedTuple):
-    """Everything that stays the same while the rigid model walks, SI."""
+class Standing(np.record):
+    """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type."""
 
-    tree: Tree  # about the centre of the stance foot's arc
-    centrifugal: Tree  # constants of the centrifugal terms: the tree's own, unless somebody misprinted them
+    A: Floats  # (n, n) kg m^2
+    B: Floats
+    A_centrifugal: Floats  # (n, n) those of the centrifugal terms: the same, unless somebody misprinted them
+    B_centrifugal: Floats
+    arm_x: Floats  # (n,) c, kg m: first moments about the root
+    arm_y: Floats
+    foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
+    foot_y: Floats
+    E: Floats  # (3, n, n) the reductions; the row of a body that follows others has zero on the diagonal
+    roles: Integers  # (n,) which body takes each place after the heel strike
+    section: Integers  # (n + 1,) places in the state of the section's coordinates, the stance leg's angle first
+    coordinates: int  # [d] of the section
+    thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
+    shank: int
+    mass: float  # kg
     radius: float  # [R] m, of either foot; 0 is a point
-    foot_x: Vector  # (n) m, levers from the stance foot's centre to the swing foot's, body by body
-    foot_y: Vector
     hip_x: float  # m, to the hip, which belongs to the stance leg
     hip_y: float
-    knee: Any  # NoKnee or SwingKnee
-    straight: Any  # links of a straight swing leg
-    bent: Any  # links while its knee is free; the same for a leg without a knee
-    at_strike: Any  # links in the heel strike
-    roles: tuple[int, ...]  # (n) which body takes each place after the heel strike
-    picked: tuple[int, ...]  # (d) places in the state of the section's coordinates, the stance leg's angle first
     lean: float  # rad, angle of the line from hip to foot centre in a straight leg
     leg_length: float  # [L] m, hip to sole
     gravity: float  # [g] m/s^2
     gravity_along: float  # m/s^2
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # [phi] rad, positive downhill in walking direction
-    blank: State  # (2 n) zeros: the bodies' angles from the vertical and their velocities
+    blank: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
+
+    @property
+    def picked(self) -> tuple[int, ...]:
+        """Places (d) in the state of the section's coordinates."""
+        return tuple(self.section[: self.coordinates].tolist())
+
+    @property
+    def kneed(self) -> bool:
+        """Whether the swing leg has a knee."""
+        return bool(self.shank != NO_SHANK)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all numbers are the same."""
+        return isinstance(other, Standing) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
+
+    def __hash__(self) -> int:
+        """Of all numbers."""
+        return hash(self.tobytes())
+
+    def changed(self, **fields: Any) -> "Standing":
+        """The same with other values of some fields."""
+        other = self.copy()
+        for name, value in fields.items():
+            other[name] = value
+        return frozen(other)
 
 
-class NoKnee(NamedTuple):
-    """Legs that are straight for good."""
+def frozen(model: Any) -> Standing:
+    """A copy that nobody can write to."""
+    memory = np.array(model)
+    memory.flags.writeable = False
+    read_only: Standing = memory[()]
+    return read_only
 
 
-class SwingKnee(NamedTuple):
-    """The knee of the swing leg: it locks where the shank comes into line with its thigh from behind."""
-
-    thigh: int  # places of both among the bodies
-    shank: int
+def new_standing(n: int, **fields: Any) -> Standing:
+    """The rigid model of n bodies with these fields; the others are zero."""
+    square, each = (n, n), (n,)
+    shapes = {
+        **dict.fromkeys(("A", "B", "A_centrifugal", "B_centrifugal"), square),
+        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
+        "E": (3, n, n),
+        "blank": (2 * n,),
+    }
+    whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": ()}
+    layout = [
+        (name, np.int64, whole[name]) if name in whole else (name, np.float64, shapes.get(name, ()))
+        for name in Standing.__annotations__
+    ]
+    model = np.zeros((), np.dtype((Standing, layout)))
+    for name, value in fields.items():
+        model[name] = value
+    return frozen(model)
 
 
 def on_slope(model: Standing, slope: float) -> Standing:
     """The same walker on another slope (rad)."""
     along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
-    return model._replace(slope=slope, gravity_along=along, gravity_down=down)
+    return model.changed(slope=slope, gravity_along=along, gravity_down=down)
 
 
 class Mode(NamedTuple):
-    """The walker between events."""
+    """The walker between events, alone or with how its motion changes along directions of its start.
+
+    Its state (2 n,) are the bodies' angles and their velocities; behind it come as many columns (2 n,) as there is room
+    for in what a method integrates: the variational equations.
+    """
 
     model: Standing
-    links: Any
+    phase: int  # BENT or STRAIGHT
 
 
-class Variation(NamedTuple):
-    """A mode with how its motion changes along directions of the start: the state, then a column (2 n) a direction."""
-
-    mode: Mode
-    blank: State
-
-
-@blank.case(Mode)
-def mode_blank(system: Mode) -> State:
-    """Angles and velocities."""
-    return system.model.blank
-
-
-@blank.case(Variation)
-def variation_blank(system: Variation) -> State:
-    """The state and its columns."""
-    return system.blank
-
-
-@inlined
-def projections(arm_x: Vector, arm_y: Vector, s: Vector, c: Vector) -> tuple[Vector, Vector]:
-    """Levers or moments (n) seen along the slope and normal to it: F and U."""
-    F, U = s, s
-    for k in range(len(s)):
-        F = put(F, k, c[k] * arm_x[k] - s[k] * arm_y[k])
-        U = put(U, k, s[k] * arm_x[k] + c[k] * arm_y[k])
-    return F, U
-
-
-@inlined
-def standing_mass(model: Any, s: Vector, c: Vector, U: Vector) -> Vector:
-    """M' (n n), kg m^2."""
-    n, R = len(s), model.radius
-    M = mass_matrix(model.tree, s, c)
-    if R == 0.0:
-        return M
-    for k in range(n):
-        M = put(M, STANCE * n + k, M[STANCE * n + k] + R * U[k])
-        M = put(M, k * n + STANCE, M[k * n + STANCE] + R * U[k])
-    corner = STANCE * n + STANCE
-    return put(M, corner, M[corner] + model.tree.mass * R * R)
-
-
-@inlined
-def standing_torques(model: Any, s: Vector, c: Vector, F: Vector, U: Vector, y: State) -> Vector:
-    """r (n), N m."""
-    n = len(s)
-    r = U
-    for k in range(n):
-        r = put(r, k, -model.gravity_along * U[k] - model.gravity_down * F[k])
-    if model.radius != 0.0:
-        pulled = model.tree.mass * model.gravity_along
-        for k in range(n):
-            pulled += y[n + k] * y[n + k] * F[k]
-        r = put(r, STANCE, r[STANCE] - model.radius * pulled)
-    return with_centrifugal(model.centrifugal, s, c, y, n, r)
+@block.case(Mode)
+def state_or_column(system: Mode) -> Any:
+    """A state, or a column."""
+    return zeros(system.model.blank)
 
 
 @woven
-def rates(model: Standing, links: Any, y: State) -> Vector:
-    """Angular accelerations (n) in rad/s^2."""
-    return rates_of(links, model, y)
+def projections(lever_x: Any, lever_y: Any, s: Any, c: Any, F: Any, U: Any) -> None:
+    """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
+    for k in range(len(lever_x)):
+        F[k] = c[k] * lever_x[k] - s[k] * lever_y[k]
+        U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
 
 
-@by_type
-def rates_of(links: Any, model: Any, y: State) -> Vector:
-    """`rates` of the bodies that `links` leave to themselves."""
+@woven
+def sines_cosines(model: Standing, y: Any, s: Any, c: Any) -> None:
+    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
+    for k in range(len(model.arm_x)):
+        s[k], c[k] = sine_cosine(y[k] + model.slope)
 
 
-@rates_of.case(Independent, woven=True)
-@rates_of.case(Links, woven=True)
-def linked_rates(links: Any, model: Any, y: State) -> Vector:
-    """M'^-1 r with the followers out of the way."""
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
-    return solve_linked(links, standing_mass(model, s, c, U), standing_torques(model, s, c, F, U, y))
-
-
-class OneLess(NamedTuple):
-    """What a walker's equations of motion need, with its straight swing leg as one body."""
-
-    tree: Tree
-    centrifugal: Tree
-    radius: float
-    gravity_along: float
-    gravity_down: float
-    slope: float
-
-
-@rates_of.case(InLine, woven=True)
-def rates_in_line(links: InLine, model: Standing, y: State) -> Vector:
-    """Those of one body less."""
-    one = OneLess(
-        straight_tree(links, model.tree),
-        straight_tree(links, model.centrifugal),
-        model.radius,
-        model.gravity_along,
-        model.gravity_down,
-        model.slope,
-    )
-    n, less = len(model.tree.arm_x), len(links.one_each)
-    state = links.one_each + links.one_each
-    for k in range(less):
-        state = put(state, k, y[k if k < SHANK else k + 1])
-        state = put(state, less + k, y[n + (k if k < SHANK else k + 1)])
-    alpha, every = rates_of(links.others, one, state), model.tree.arm_x
+@woven
+def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
+    """M' (n, n) in kg m^2 and r (n,) in N m at the state y, with all that they are made of."""
+    n, R = len(model.arm_x), model.radius
+    sines_cosines(model, y, s, c)
+    projections(model.arm_x, model.arm_y, s, c, F, U)
     for k in range(n):
-        every = put(every, k, alpha[place_in_line(k)])
-    return every
-
-
-@inlined
-def place_in_line(k: int) -> int:
-    """Where body k is among those of one body less."""
-    return SWING if k == SHANK else (k if k < SHANK else k - 1)
-
-
-@inlined
-def straight_tree(links: InLine, tree: Tree) -> Tree:
-    """The tree with the swing leg in one piece: constants of bodies that turn as one add up."""
-    n, less = len(tree.arm_x), len(links.one_each)
-    A, B, arm_x, arm_y = links.square, links.square, links.one_each, links.one_each
+        r[k] = -model.gravity_along * U[k] - model.gravity_down * F[k]
+        M[k, k] = model.A[k, k]
+    if R != 0.0:
+        pulled = model.mass * model.gravity_along
+        for k in range(n):
+            pulled += y[n + k] * y[n + k] * F[k]
+        r[STANCE] -= R * pulled
     for k in range(n):
-        row = place_in_line(k)
-        arm_x, arm_y = put(arm_x, row, arm_x[row] + tree.arm_x[k]), put(arm_y, row, arm_y[row] + tree.arm_y[k])
-        for l in range(n):
-            at = row * less + place_in_line(l)
-            A, B = put(A, at, A[at] + tree.cosine[k * n + l]), put(B, at, B[at] + tree.sine[k * n + l])
-    return Tree(tree.mass, A, B, arm_x, arm_y)
+        for l in range(k):
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            M[k, l] = model.A[k, l] * cos_d + model.B[k, l] * sin_d
+            M[l, k] = M[k, l]
+            of_l = model.A_centrifugal[k, l] * sin_d - model.B_centrifugal[k, l] * cos_d
+            of_k = model.A_centrifugal[l, k] * sin_d + model.B_centrifugal[l, k] * cos_d
+            r[k] += y[n + l] * y[n + l] * of_l
+            r[l] -= y[n + k] * y[n + k] * of_k
+    if R != 0.0:
+        for k in range(n):
+            M[STANCE, k] += R * U[k]
+            M[k, STANCE] += R * U[k]
+        M[STANCE, STANCE] += model.mass * R * R
 
 
-@inlined
+@derivative.case(Mode)
+def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
+    """The equations of motion as a first-order system, and the variational equations of the columns behind."""
+    model = system.model
+    like, phase = model.arm_x, system.phase
+    n = len(like)
+    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
+    equations(model, y, s, c, F, U, M, alpha)
+    factor_linked(model, phase, M, alpha)
+    solve_linked(model, phase, M, alpha)
+    for k in range(n):
+        f[k], f[n + k] = y[n + k], alpha[k]
+    if len(y) > 2 * n:
+        by_angle, by_rate = matrix(like), matrix(like)
+        torque_gradients(model, y, s, c, F, U, alpha, by_angle, by_rate)
+        for at in range(2 * n, len(y), 2 * n):
+            # alpha serves as the column's right-hand side: d alpha of E' M' E d alpha = E' (dr - dM' alpha)
+            for k in range(n):
+                total = 0.0
+                for l in range(n):
+                    total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
+                alpha[k] = total
+            gathered(model, phase, alpha)
+            solve_linked(model, phase, M, alpha)
+            for k in range(n):
+                f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
+
+
+@woven
 def torque_gradients(
-    model: Standing, s: Vector, c: Vector, F: Vector, U: Vector, alpha: Vector, y: State
-) -> tuple[Vector, Vector]:
-    """Derivatives (n n each) of r - M' alpha at fixed alpha with respect to the angles and to their velocities."""
-    n, tree, R = len(s), model.tree, model.radius
-    by_angle, by_rate = tree.cosine, tree.cosine
+    model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, alpha: Any, by_angle: Any, by_rate: Any
+) -> None:
+    """Derivatives (n, n) of r - M' alpha at fixed alpha with respect to the angles and to their velocities."""
+    n, R = len(model.arm_x), model.radius
     for k in range(n):
         own = model.gravity_down * U[k] - model.gravity_along * F[k] - R * F[k] * alpha[STANCE]
         for l in range(n):
             omega = y[n + l]
-            A, B = tree.cosine[k * n + l], tree.sine[k * n + l]
-            A_c, B_c = model.centrifugal.cosine[k * n + l], model.centrifugal.sine[k * n + l]
+            A_c, B_c = model.A_centrifugal[k, l], model.B_centrifugal[k, l]
             cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            between = omega * omega * (A_c * cos_d + B_c * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
+            between = omega * omega * (A_c * cos_d + B_c * sin_d)
+            between += alpha[l] * (model.A[k, l] * sin_d - model.B[k, l] * cos_d)
             own -= between
-            by_angle = put(by_angle, k * n + l, between)
-            by_rate = put(by_rate, k * n + l, 2.0 * omega * (A_c * sin_d - B_c * cos_d))
-        by_angle = put(by_angle, k * n + k, by_angle[k * n + k] + own)
+            by_angle[k, l] = between
+            by_rate[k, l] = 2.0 * omega * (A_c * sin_d - B_c * cos_d)
+        by_angle[k, k] += own
     for l in range(n):
-        omega, at = y[n + l], STANCE * n + l
-        by_angle = put(by_angle, at, by_angle[at] - R * (F[l] * alpha[l] - omega * omega * U[l]))
-        by_rate = put(by_rate, at, by_rate[at] - 2.0 * R * omega * F[l])
-    return by_angle, by_rate
-
-
-@inlined
-def rates_along(model: Standing, links: Any, y: State, columns: State, first: int) -> State:
-    """Derivatives of `rates` along the directions of `columns`: dz' of E' M' E dz' = E' (dr - dM' alpha).
-
-    columns  begins with a state (see Variation) or, for first = 0, with a direction
-
-    Returns `columns` with the rates of their own change in their places from `first` on.
-    """
-    n = len(model.tree.arm_x)
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
-    M, r = reduced(links, standing_mass(model, s, c, U), standing_torques(model, s, c, F, U, y))
-    factors = factored(M, n)
-    alpha = spread(links, solve_factored(factors, r))
-    by_angle, by_rate = torque_gradients(model, s, c, F, U, alpha, y)
-    out = columns
-    for k in range(n):
-        out = put(out, k, columns[n + k])
-        out = put(out, n + k, alpha[k])
-    for at in range(first, len(columns), 2 * n):
-        change = alpha
-        for k in range(n):
-            total = 0.0
-            for l in range(n):
-                total += by_angle[k * n + l] * columns[at + l] + by_rate[k * n + l] * columns[at + n + l]
-            change = put(change, k, total)
-        faster = spread(links, solve_factored(factors, gathered(links, change)))
-        for k in range(n):
-            out = put(out, at + k, columns[at + n + k])
-            out = put(out, at + n + k, faster[k])
-    return out
-
-
-@derivative.case(Mode, woven=True)
-def mode_derivative(system: Mode, t: float, y: State) -> State:
-    """The equations of motion as a first-order system."""
-    n = len(system.model.tree.arm_x)
-    alpha = rates(system.model, system.links, y)
-    rate = system.model.blank
-    for k in range(n):
-        rate = put(rate, k, y[n + k])
-        rate = put(rate, n + k, alpha[k])
-    return rate
-
-
-@derivative.case(Variation)
-def variation_derivative(system: Variation, t: float, y: State) -> State:
-    """Variational equations beside the equations of motion."""
-    mode = system.mode
-    return rates_along(mode.model, mode.links, y, y, len(mode.model.blank))
+        omega = y[n + l]
+        by_angle[STANCE, l] -= R * (F[l] * alpha[l] - omega * omega * U[l])
+        by_rate[STANCE, l] -= 2.0 * R * omega * F[l]
 
 
 @jacobian.case(Mode)
-def mode_jacobian(system: Mode, t: float, y: State, J: Any) -> None:
-    """Derivatives of the equations of motion, one direction a column."""
+def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
+    """Derivatives of the equations of motion: the rates of unit columns, one direction a column."""
     model = system.model
-    n = len(model.tree.arm_x)
+    like, phase = model.arm_x, system.phase
+    n = len(like)
+    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
+    by_angle, by_rate = matrix(like), matrix(like)
+    equations(model, y, s, c, F, U, M, alpha)
+    factor_linked(model, phase, M, alpha)
+    solve_linked(model, phase, M, alpha)
+    torque_gradients(model, y, s, c, F, U, alpha, by_angle, by_rate)
     for j in range(2 * n):
-        along = rates_along(model, system.links, y, direction(model.blank, j), 0)
-        for i in range(2 * n):
-            J[i, j] = along[i]
+        for k in range(n):
+            J[k, j] = 1.0 if j == n + k else 0.0
+            alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
+        gathered(model, phase, alpha)
+        solve_linked(model, phase, M, alpha)
+        for k in range(n):
+            J[n + k, j] = alpha[k]
 
 
 @inlined
-def direction(like: State, j: int) -> State:
-    """The unit vector along number j."""
-    return put(like, j, 1.0)
-
-
-@inlined
-def ground_reaction(model: Standing, links: Any, y: State) -> tuple[float, float]:
+def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it."""
-    n = len(model.tree.arm_x)
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
-    alpha = rates(model, links, y)
-    along = -model.tree.mass * (model.radius * alpha[STANCE] + model.gravity_along)
-    normal = model.tree.mass * model.gravity_down
+    model = system.model
+    n = len(model.arm_x)
+    s, c, F, U, f = (
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.blank),
+    )
+    sines_cosines(model, y, s, c)
+    projections(model.arm_x, model.arm_y, s, c, F, U)
+    derivative(system, 0.0, y, f)
+    along = -model.mass * (model.radius * f[n + STANCE] + model.gravity_along)
+    normal = model.mass * model.gravity_down
     for k in range(n):
         squared = y[n + k] * y[n + k]
-        along -= U[k] * alpha[k] + F[k] * squared
-        normal += F[k] * alpha[k] - U[k] * squared
+        along -= U[k] * f[n + k] + F[k] * squared
+        normal += F[k] * f[n + k] - U[k] * squared
     return along, normal
 
 
 @inlined
-def kinetic_energy(model: Standing, y: State) -> float:
-    """Kinetic energy (J)."""
-    n = len(model.tree.arm_x)
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    _, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
-    M = standing_mass(model, s, c, U)
-    total = 0.0
-    for k in range(n):
-        for l in range(n):
-            total += M[k * n + l] * y[n + k] * y[n + l]
-    return 0.5 * total
+def energies(model: Standing, y: Any) -> tuple[float, float]:
+    """Kinetic and potential energy (J).
 
-
-@inlined
-def potential_energy(model: Standing, y: State) -> float:
-    """Potential energy (J) from the current foothold: where the foot touches with its leg normal to the slope."""
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.tree.arm_x, model.tree.arm_y, s, c)
+    The latter is that from the current foothold: where the foot touches with its leg normal to the slope.
+    """
+    n = len(model.arm_x)
+    s, c, F, U, r, M = (
+        vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
+        matrix(model.arm_x),
+    )  # fmt: skip
+    equations(model, y, s, c, F, U, M, r)
+    kinetic = 0.0
     rolled = -model.radius * (y[STANCE] + model.slope)
-    total = model.tree.mass * (model.gravity_down * model.radius - model.gravity_along * rolled)
-    for k in range(len(s)):
-        total += model.gravity_down * U[k] - model.gravity_along * F[k]
-    return total
+    potential = model.mass * (model.gravity_down * model.radius - model.gravity_along * rolled)
+    for k in range(n):
+        potential += model.gravity_down * U[k] - model.gravity_along * F[k]
+        for l in range(n):
+            kinetic += M[k, l] * y[n + k] * y[n + l]
+    return 0.5 * kinetic, potential
 
 
 @inlined
-def total_energy(model: Standing, y: State) -> float:
-    """Kinetic and potential energy (J) from the current foothold."""
-    return kinetic_energy(model, y) + potential_energy(model, y)
-
-
-@inlined
-def swing_foot(model: Standing, y: State) -> tuple[float, float]:
+def swing_foot(model: Standing, y: Any) -> tuple[float, float]:
     """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
-    return swing_foot_motion(model, y)[0]
+    height, ahead, _, _ = swing_foot_motion(model, y)
+    return height, ahead
 
 
 @inlined
-def swing_foot_motion(model: Standing, y: State) -> tuple[tuple[float, float], tuple[float, float]]:
+def swing_foot_motion(model: Standing, y: Any) -> tuple[float, float, float, float]:
     """`swing_foot` and its rates (m/s)."""
-    n = len(model.tree.arm_x)
-    s, c = sines_cosines(model.tree, y, 0, model.slope)
-    F, U = projections(model.foot_x, model.foot_y, s, c)
+    n = len(model.arm_x)
     height, ahead, upward, apart = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
-        height += U[k]
-        ahead += F[k]
-        upward += F[k] * y[n + k]
-        apart -= U[k] * y[n + k]
-    return (height, ahead), (upward, apart)
+        s, c = sine_cosine(y[k] + model.slope)
+        F, U = c * model.foot_x[k] - s * model.foot_y[k], s * model.foot_x[k] + c * model.foot_y[k]
+        height += U
+        ahead += F
+        upward += F * y[n + k]
+        apart -= U * y[n + k]
+    return height, ahead, upward, apart
 
 
 @inlined
-def hip_height(model: Standing, y: State) -> float:
+def hip_height(model: Standing, y: Any) -> float:
     """Height of the hip over the slope (m)."""
     s, c = sine_cosine(y[STANCE] + model.slope)
     return model.radius + s * model.hip_x + c * model.hip_y
 
 
 @inlined
-def feet_on_slope(model: Standing, y: State) -> float:
+def feet_on_slope(model: Standing, y: Any) -> float:
     """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on the slope.
 
     It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
@@ -386,6 +345,18 @@ def feet_on_slope(model: Standing, y: State) -> float:
 
 
 @inlined
-def rolled_distance(model: Standing, start: State, end: State) -> float:
+def rolled_distance(model: Standing, start: Any, end: Any) -> float:
     """How far (m) the stance foot's point of contact has moved along the slope between two states of one step."""
     return -model.radius * (end[STANCE] - start[STANCE])
+
+
+def kinetic_energy(model: Standing, y: Any) -> float:
+    """Kinetic energy (J)."""
+    return energies(model, y)[0]
+
+
+def linked(model: Standing, phase: int, values: Any) -> Floats:
+    """Values (n,) of all bodies, those of the followers from those that they follow."""
+    every = np.array(values, float)
+    spread(model, phase, every)
+    return every

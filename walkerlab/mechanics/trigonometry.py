@@ -7,7 +7,7 @@ from typing import Any
 from numba.extending import overload
 
 from walkerlab.kernels import PART_FLAGS, inlined
-from walkerlab.mechanics.fused import fused
+from walkerlab.solvers.fused import fused
 from walkerlab.solvers.lanes import Lanes, any_positive, holds_lanes, nearest
 
 QUARTER_PI = 0.7853981633974483

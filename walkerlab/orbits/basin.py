@@ -33,7 +33,6 @@ from walkerlab.orbits import step_map
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.stepping import H_NEXT, clear_counts
-from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -69,7 +68,7 @@ class Capture(NamedTuple):
 
 
 @struck.case(Capture)
-def captured(observer: Capture, walk: int, step: int, t: float, y: State) -> int:
+def captured(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
     """Whether the walk is near to an attractor now."""
     for i in range(3):
         observer.last[walk, i] = y[i + 1]
@@ -160,7 +159,7 @@ def walk_one_by_one(
     strikes, knees = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
     before, after = np.zeros((AT_ONCE, size)), np.zeros((AT_ONCE, size))
     for number, start in enumerate(z):
-        y = step_map.on_section(walker, tuple(start.tolist()))
+        y = np.array(step_map.on_section(walker, start))
         outcome, steps = REJECTED if hip_above_fall(walker, y) < 0.0 else WALKED, 0
         while outcome == WALKED and steps < capture.most:
             clear_counts(method)
@@ -174,7 +173,7 @@ def walk_one_by_one(
                 capture.attractor[number] = capture.owner[np.argmax(near[taken - 1])]
                 outcome = WALKED
             if taken:
-                capture.last[number], y = points[taken - 1], tuple(after[taken - 1].tolist())
+                capture.last[number], y = points[taken - 1], after[taken - 1].copy()
             steps += taken
             if near.any():
                 break

@@ -86,7 +86,8 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
 
     seed  of the random starting values
     """
-    if walker.slope <= 0.0 and walker.centrifugal == walker.tree:
+    misprinted = (walker.A_centrifugal != walker.A).any() or (walker.B_centrifugal != walker.B).any()
+    if walker.slope <= 0.0 and not misprinted:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker, settings)
     generator = np.random.default_rng(seed)

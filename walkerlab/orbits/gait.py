@@ -59,7 +59,7 @@ def measured(walker: Standing, units: Units, method: Any, z: Vector, DP: Vector)
     method  an integrator for the walker's equations
     DP      (d, d) derivative of the step map there
     """
-    start = on_section(walker, [float(number) for number in z])
+    start = on_section(walker, z)
     step = take_walk(walker, method, start, 1)
     if step.steps == 0:
         return None
@@ -76,6 +76,6 @@ def measured(walker: Standing, units: Units, method: Any, z: Vector, DP: Vector)
         min_normal_force=step.min_normal_force * units.force,
         max_friction_ratio=step.max_friction_ratio or None,
         max_scuff_depth=step.max_scuff_depth * units.length,
-        trailing_foot_rises=swing_foot_motion(walker, start)[1][0] >= 0.0,
+        trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
         knee_strike=None if step.knee_strikes is None else float(step.knee_strikes[0]) * units.time,
     )

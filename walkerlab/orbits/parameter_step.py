@@ -2,43 +2,31 @@
 
 from typing import Any
 
-from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import HEEL_STRIKE, on_event, swing
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import Mode
-from walkerlab.orbits.step_map import WALKED, Shooting, on_section, step_with_jacobian
-from walkerlab.solvers.stepping import H_NEXT, clear_counts
+from walkerlab.orbits.step_map import WALKED, Shooting, step_from
+from walkerlab.solvers.stepping import clear_counts
 
 
 @kernel
-def step_with_parameter(shooting: Shooting, near: Any, weights: Any, method: Any, z: Any, Dp: Any) -> tuple[int, float]:
+def step_with_parameter(shooting: Shooting, near: Any, weights: Any, z: Any, Dp: Any) -> tuple[int, float]:
     """One step from z (d,); its end and derivative are left in `shooting`, that along the parameter in Dp (d,).
 
     near     walkers at parameter values beside the shooting's own, in one tuple
     weights  (walkers,) of the difference formula, per unit of the parameter
-    method   for the walker's equations
 
     Returns the outcome's number and the step's duration (s).
     """
     clear_counts(shooting.method)
-    clear_counts(method)
-    status, period = step_with_jacobian(shooting, z)
-    for i in range(shooting.move.size):
+    beside = WALKED
+    for i in range(len(z)):
         Dp[i] = 0.0
     for k in range(len(near)):
-        if status != WALKED:
-            break
-        walker = near[k]
-        method.clock[H_NEXT] = 0.0
-        bent, start = Mode(walker, walker.bent), on_section(walker, z)
-        status = swing(method, bent, walker, shooting.finder, Unobserved(), 0.0, start, 0, shooting.knee_time)
-        if status == WALKED:
-            _, y = on_event(method, Mode(walker, walker.straight), HEEL_STRIKE)
-            new = heel_strike(walker, y)
-            for i in range(shooting.move.size):
-                Dp[i] += weights[k] * new[walker.picked[i]]
-    return status, period
+        if beside == WALKED:
+            beside, _, _ = step_from(shooting, near[k], z, False)
+            for i in range(len(z)):
+                Dp[i] += weights[k] * shooting.z_next[i]
+    status, period, _ = step_from(shooting, shooting.walker, z, True)
+    return beside if status == WALKED else status, period
 
 
 @kernel
@@ -56,7 +44,7 @@ def walk_with_tangent(
     """
     for step in range(lengths.size):
         clear_counts(shooting.method)
-        status, period = step_with_jacobian(shooting, z)
+        status, period, _ = step_from(shooting, shooting.walker, z, True)
         if status != WALKED:
             return status, step
         total = 0.0

@@ -18,8 +18,7 @@ from walkerlab.orbits.step_map import (
     Shooting,
     copied,
     newton_move,
-    residual_alone,
-    step_with_jacobian,
+    step_from,
 )
 from walkerlab.solvers.stepping import T, clear_counts
 
@@ -73,7 +72,8 @@ def follow(shooting: Shooting, known: KnownGaits, z: Any) -> int:
     """
     clear_counts(shooting.method)
     best, move = shooting.best, shooting.move
-    best_residual, scale, evaluations = residual_alone(shooting, z), 1.0, 1
+    _, _, best_residual = step_from(shooting, shooting.walker, z, False)
+    scale, evaluations = 1.0, 1
     stale, exact, nearer = True, False, True
     while NEAR_RESIDUAL < best_residual < NO_RESIDUAL and evaluations < MOST_EVALUATIONS:
         if nearer:
@@ -83,7 +83,7 @@ def follow(shooting: Shooting, known: KnownGaits, z: Any) -> int:
             if gait >= 0:
                 return gait
         if stale:
-            status, _ = step_with_jacobian(shooting, z)
+            status, _, _ = step_from(shooting, shooting.walker, z, True)
             if status != WALKED:
                 return NOWHERE
             stale, exact, scale = False, True, 1.0
@@ -93,7 +93,7 @@ def follow(shooting: Shooting, known: KnownGaits, z: Any) -> int:
                 return NOWHERE
         for i in range(z.size):
             z[i] = best[i] + scale * move[i]
-        residual = residual_alone(shooting, z)
+        _, _, residual = step_from(shooting, shooting.walker, z, False)
         evaluations += 1
         nearer = residual < best_residual
         if nearer:

@@ -7,8 +7,6 @@ import math
 from typing import NamedTuple
 
 from walkerlab.mechanics.standing import Standing, on_slope
-from walkerlab.mechanics.tree import Tree
-from walkerlab.mechanics.tuples import Vector
 
 
 class Units(NamedTuple):
@@ -31,27 +29,13 @@ class Units(NamedTuple):
 
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""
-    length, mass = walker.leg_length, walker.tree.mass
+    length, mass = float(walker.leg_length), float(walker.mass)
     inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
-
-    def unit_tree(tree: Tree) -> Tree:
-        A, B = scaled(tree.cosine, inertia), scaled(tree.sine, inertia)
-        return Tree(1.0, A, B, scaled(tree.arm_x, moment), scaled(tree.arm_y, moment))
-
-    unit = walker._replace(
-        tree=unit_tree(walker.tree),
-        centrifugal=unit_tree(walker.centrifugal),
-        radius=walker.radius / length,
-        foot_x=scaled(walker.foot_x, 1.0 / length),
-        foot_y=scaled(walker.foot_y, 1.0 / length),
-        hip_x=walker.hip_x / length,
-        hip_y=walker.hip_y / length,
-        leg_length=1.0,
-        gravity=1.0,
-    )
+    scales = {
+        **dict.fromkeys(("A", "B", "A_centrifugal", "B_centrifugal"), inertia),
+        **dict.fromkeys(("arm_x", "arm_y"), moment),
+        **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
+    }
+    scaled = {name: scale * walker[name] for name, scale in scales.items()}
+    unit = walker.changed(mass=1.0, leg_length=1.0, gravity=1.0, **scaled)
     return on_slope(unit, walker.slope), Units(length, mass, math.sqrt(length / walker.gravity))
-
-
-def scaled(vector: Vector, by: float) -> Vector:
-    """A vector times a number."""
-    return tuple(by * value for value in vector)

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.links import spread
 from walkerlab.mechanics.standing import (
-    NoKnee,
+    STRAIGHT,
     Standing,
+    equations,
     kinetic_energy,
+    linked,
     on_slope,
-    standing_mass,
     swing_foot,
 )
 from walkerlab.solvers.system import State
@@ -69,11 +69,9 @@ class Modes(NamedTuple):
 
 def linear_modes(walker: Standing) -> Modes | None:
     """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
-    n = len(walker.tree.arm_y)
-    s, c = (0.0,) * n, (1.0,) * n
     legs = leg_columns(walker)
-    D = legs.T @ np.reshape(standing_mass(walker, s, c, walker.tree.arm_y), (n, n)) @ legs
-    stiffness = walker.gravity * legs.T @ np.diag(walker.tree.arm_y) @ legs
+    D = legs.T @ upright_mass(walker) @ legs
+    stiffness = walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
     try:
         rates, V = eigh(stiffness, D)
     except np.linalg.LinAlgError:
@@ -83,15 +81,22 @@ def linear_modes(walker: Standing) -> Modes | None:
     return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
 
 
+def upright_mass(walker: Standing) -> Vector:
+    """Mass matrix (n, n) with all angles zero, kg m^2."""
+    n, level = len(walker.arm_x), on_slope(walker, 0.0)
+    M, scratch = np.empty((n, n)), np.empty((5, n))
+    equations(level, level.blank, *scratch[:4], M, scratch[4])
+    return M
+
+
 def leg_columns(walker: Standing) -> Vector:
     """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
-    n = len(walker.tree.arm_x)
-    return np.array([spread(walker.straight, tuple(float(k == leg) for k in range(n))) for leg in range(2)]).T
+    return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
 def has_small_gaits(walker: Standing) -> bool:
     """Whether upright legs balance, so that gaits shrink with the slope."""
-    return isinstance(walker.knee, NoKnee) and walker.lean == 0.0 and not any(walker.tree.arm_x)
+    return not walker.kneed and walker.lean == 0.0 and not walker.arm_x.any()
 
 
 def seeds(walker: Standing) -> tuple[Seed, ...]:
@@ -102,7 +107,7 @@ def seeds(walker: Standing) -> tuple[Seed, ...]:
         if modes is None or long is None:
             return ()
         short = short_period_seed(walker, modes, long.period)
-    except ZeroDivisionError:  # masses that all sit in one place leave a heel strike undetermined
+    except FloatingPointError:  # masses that all sit in one place leave a heel strike undetermined
         return ()
     return (long,) if short is None else (long, short)
 
@@ -134,6 +139,7 @@ def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float
     return Seed(name, slope, z, period, per_angle / np.cbrt(kappa))
 
 
+@np.errstate(divide="raise", invalid="raise")
 def loss(walker: Standing, per_angle: Vector) -> float:
     """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs.
 
@@ -143,10 +149,18 @@ def loss(walker: Standing, per_angle: Vector) -> float:
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
-    after = heel_strike(flat, before)
+    after = after_strike(flat, before)
     lost = kinetic_energy(flat, before) - kinetic_energy(flat, after)
     length = swing_foot(flat, before)[1] + flat.radius * angle
-    return float(lost / (flat.tree.mass * flat.gravity * length * angle**3))
+    return float(lost / (flat.mass * flat.gravity * length * angle**3))
+
+
+@np.errstate(divide="raise", invalid="raise")
+def after_strike(walker: Standing, state: State) -> Vector:
+    """The state (2 n,) after a heel strike."""
+    after = np.zeros(len(state))
+    heel_strike(walker, np.array(state), after)
+    return after
 
 
 def leg_state(walker: Standing, theta: tuple[float, float], omega: tuple[float, float]) -> State:
@@ -192,15 +206,15 @@ class LinearStep:
         """Prepare the heel strike's map at vanishing angles, with the change of roles."""
         self.modes = modes
         self.inverse = np.linalg.inv(modes.V)
-        flat, n = on_slope(walker, 0.0), len(walker.tree.arm_x)
+        flat, n = on_slope(walker, 0.0), len(walker.arm_x)
         self.strike = np.zeros((3, 4))
         self.strike[0, 0] = 1.0
         for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
-            self.strike[1:, 2 + leg] = heel_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
+            self.strike[1:, 2 + leg] = after_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
         # a foot that rolls on a slope of one radian is in balance with its leg off the vertical
         legs = leg_columns(flat)
-        pull = np.array([0.0, flat.tree.mass * flat.gravity * flat.radius])
-        rest = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.tree.arm_y) @ legs, pull)
+        pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
+        rest = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
         self.rest = np.zeros((4, 4))
         self.rest[:2, 3] = rest
 

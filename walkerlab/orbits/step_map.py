@@ -11,17 +11,15 @@ import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import HEEL_STRIKE, head, on_event, swing
-from walkerlab.kernels import inlined, kernel
-from walkerlab.mechanics.impact import heel_strike, heel_strike_along
+from walkerlab.hybrid.rigid_walk import take_step
+from walkerlab.kernels import inlined, kernel, vector
 from walkerlab.mechanics.links import spread
-from walkerlab.mechanics.standing import STANCE, SWING, Mode, Standing, Variation
-from walkerlab.mechanics.tuples import Vector, put
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing
 from walkerlab.solvers.dop853 import new_dop853
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.stepping import BUDGET, H_NEXT, T, clear_counts
-from walkerlab.solvers.system import State, derivative
+from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
+from walkerlab.solvers.system import State
 
 WALKED, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.NO_HEEL_STRIKE)
 SMALLEST_MOVE = 2.0**-8
@@ -35,32 +33,30 @@ With an absolute tolerance of a tenth of the relative one they keep some three d
 ROUNDING = 1e-10  # a residual this small that no longer shrinks is rounding
 
 
-@inlined
 def on_section(walker: Standing, z: Any) -> State:
     """The state (2 n) of section coordinates z (d,)."""
-    return lifted(walker, z, -2.0 * (walker.slope + walker.lean))
+    y = np.zeros(len(walker.blank))
+    lift(walker, z, -2.0 * (walker.slope + walker.lean), y, 0)
+    return tuple(y.tolist())
 
 
 @inlined
-def lifted(walker: Standing, z: Any, both: float) -> State:
-    """The state (2 n) of section coordinates z (d,) with straight legs whose angles sum to `both` (rad).
+def lift(walker: Standing, z: Any, both: float, y: Any, at: int) -> None:
+    """The state of section coordinates z (d,) with straight legs whose angles sum to `both` (rad), from y[at] on.
 
-    Linear in z for `both` = 0: the derivative of `on_section` along z.
+    Linear in z for `both` = 0: the derivative of the state on the section along z.
     """
-    n = len(walker.tree.arm_x)
-    theta, omega = walker.tree.arm_x, walker.tree.arm_x
+    n = len(walker.arm_x)
+    theta, omega = vector(walker.arm_x), vector(walker.arm_x)
     for k in range(n):
-        theta, omega = put(theta, k, 0.0), put(omega, k, 0.0)
-    theta = put(theta, STANCE, z[0])
-    theta = put(theta, SWING, both - z[0])
-    for i in range(1, len(walker.picked)):
-        omega = put(omega, walker.picked[i] - n, z[i])
-    theta, omega = spread(walker.straight, theta), spread(walker.at_strike, omega)
-    y = walker.blank
+        theta[k], omega[k] = 0.0, 0.0
+    theta[STANCE], theta[SWING] = z[0], both - z[0]
+    for i in range(1, len(z)):
+        omega[walker.section[i] - n] = z[i]
+    spread(walker, STRAIGHT, theta)
+    spread(walker, AT_STRIKE, omega)
     for k in range(n):
-        y = put(y, k, theta[k])
-        y = put(y, n + k, omega[k])
-    return y
+        y[at + k], y[at + n + k] = theta[k], omega[k]
 
 
 def section_of(walker: Standing, y: Any) -> Any:
@@ -72,11 +68,12 @@ class Shooting(NamedTuple):
     """A walker's step map with the memory to evaluate, differentiate and invert it."""
 
     walker: Standing
-    method: Any  # for the equations of Variation
+    method: Any  # for the equations of the walker with a column for each coordinate
     plain: Any  # for those of the walker alone
     finder: CrossingFinder
-    blank: State  # zeros of Variation
-    no_move: Vector  # (d) zeros
+    y: Any  # (2 n (1 + d),) the state with its columns, at the step's start and end
+    plain_y: Any  # (2 n,)
+    unit: Any  # (d,) a unit vector
     z_next: Any  # (d,) where a step led
     DP: Any  # (d, d) its derivative
     system: Any  # (d, d) Newton's matrix
@@ -98,80 +95,50 @@ def new_shooting(walker: Standing, method: Any, finder: CrossingFinder) -> Shoot
     d = len(walker.picked)
     plain = new_dop853(len(walker.blank), method.rtol, method.atol, int(method.counts[BUDGET]))
     return Shooting(
-        walker, method, plain, finder, (0.0,) * variation_size(walker), (0.0,) * d, np.zeros(d), np.zeros((d, d)),
-        np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d), np.zeros(d), np.zeros((d, d)),
+        walker, method, plain, finder, np.zeros(variation_size(walker)), np.zeros(len(walker.blank)), np.zeros(d),
+        np.zeros(d), np.zeros((d, d)), np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d),
+        np.zeros(d), np.zeros((d, d)),
     )  # fmt: skip
 
 
 @inlined
-def start_of_variation(shooting: Shooting, z: Any) -> State:
-    """The state on the section with the directions of the section's coordinates."""
-    walker, y = shooting.walker, shooting.blank
-    size = len(walker.blank)
-    start = on_section(walker, z)
-    for i in range(size):
-        y = put(y, i, start[i])
-    for j in range(len(walker.picked)):
-        column = lifted(walker, put(shooting.no_move, j, 1.0), 0.0)
-        for i in range(size):
-            y = put(y, size * (j + 1) + i, SMALL * column[i])
-    return y
+def step_from(shooting: Shooting, walker: Standing, z: Any, derived: bool) -> tuple[int, float, float]:
+    """One step of `walker` from z (d,): where it led is left in `z_next`, and if `derived` its derivative in `DP`.
 
+    Without the derivative it is a fraction of the work.
 
-@inlined
-def step_with_jacobian(shooting: Shooting, z: Any) -> tuple[int, float]:
-    """One step from z (d,), its end and derivative left in `z_next` and `DP`.
-
-    The derivative is that of the flow, corrected for the events' own shifts in time, times that of the impacts
-    (saltation): J_impact (Phi - f (grad g Phi) / (grad g f)).
-
-    Returns the outcome's number and the step's duration (s).
+    Returns the outcome's number, the step's duration (s) and the residual, the largest component of P(z) - z: huge if
+    the step did not end in a heel strike.
     """
-    walker, method = shooting.walker, shooting.method
-    n = len(walker.tree.arm_x)
-    system = Variation(Mode(walker, walker.bent), shooting.blank)
+    section, unit = walker.section, shooting.unit
+    method = shooting.method if derived else shooting.plain
+    y = shooting.y if derived else shooting.plain_y
+    size, d = len(walker.blank), len(z)
+    lift(walker, z, -2.0 * (walker.slope + walker.lean), y, 0)
+    for j in range(len(y) // size - 1):
+        for i in range(d):
+            unit[i] = SMALL if i == j else 0.0
+        lift(walker, unit, 0.0, y, size * (j + 1))
+    if not derived:
+        clear_counts(method)
     method.clock[H_NEXT] = 0.0
-    y0 = start_of_variation(shooting, z)
-    status = swing(method, system, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time)
+    status, period = take_step(walker, method, shooting.finder, Unobserved(), 0.0, y, 0, shooting.knee_time)
     if status != WALKED:
-        return status, method.clock[T]
-    t, full = on_event(method, Variation(Mode(walker, walker.straight), shooting.blank), HEEL_STRIKE)
-    before = head(walker.blank, full, 0)
-    after = heel_strike(walker, before)
-    f = derivative(Mode(walker, walker.straight), t, before)
-    for i in range(len(walker.picked)):
-        shooting.z_next[i] = after[walker.picked[i]]
-    for j in range(len(walker.picked)):
-        column = head(walker.blank, full, 2 * n * (j + 1))
-        wait = -(column[SWING] + column[STANCE]) / (before[n + SWING] + before[n + STANCE])
-        for i in range(2 * n):
-            column = put(column, i, column[i] + wait * f[i])
-        column = heel_strike_along(walker, before, after, column)
-        for i in range(len(walker.picked)):
-            shooting.DP[i, j] = column[walker.picked[i]] / SMALL
-    return WALKED, t
+        return status, period, NO_RESIDUAL
+    residual = 0.0
+    for i in range(d):
+        shooting.z_next[i] = y[section[i]]
+        residual = max(residual, abs(shooting.z_next[i] - z[i]))
+        if derived:
+            for j in range(d):
+                shooting.DP[i, j] = y[size * (j + 1) + section[i]] / SMALL
+    return status, period, residual
 
 
 def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
-    """`step_with_jacobian` for callers outside compiled code: Newton's first look, without a move."""
+    """A step with its derivative for callers outside compiled code: Newton's first look, without a move."""
     status, period, _, _ = newton(shooting, np.array(z, float), NO_RESIDUAL)
     return status, period
-
-
-@kernel
-def residual_alone(shooting: Shooting, z: Any) -> float:
-    """Residual of the step from z (d,), without its derivative: a fraction of the work."""
-    walker, method = shooting.walker, shooting.plain
-    clear_counts(method)
-    method.clock[H_NEXT] = 0.0
-    mode, y0 = Mode(walker, walker.bent), on_section(walker, z)
-    status = swing(method, mode, walker, shooting.finder, Unobserved(), 0.0, y0, 0, shooting.knee_time)
-    if status == WALKED:
-        _, y = on_event(method, Mode(walker, walker.straight), HEEL_STRIKE)
-        after = heel_strike(walker, y)
-        for i in range(len(walker.picked)):
-            shooting.z_next[i] = after[walker.picked[i]]
-    return residual_of(shooting, z, status)
 
 
 @kernel
@@ -191,10 +158,9 @@ def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, fl
     scale, evaluations = 1.0, 0
     while evaluations < MOST_EVALUATIONS:
         evaluations += 1
-        residual = residual_alone(shooting, z) if scale < 1.0 else 0.0
-        if residual < best_residual:
-            status, period = step_with_jacobian(shooting, z)
-            residual = residual_of(shooting, z, status)
+        status, period, residual = step_from(shooting, shooting.walker, z, scale == 1.0)
+        if residual < best_residual and scale < 1.0:
+            status, period, residual = step_from(shooting, shooting.walker, z, True)
         if residual < best_residual:
             best_status, best_period, best_residual = status, period, residual
             keep(z, shooting.DP, best, DP)
@@ -238,14 +204,3 @@ def newton_move(shooting: Shooting, z: Any, move: Any) -> bool:
         return False
     solve(shooting.system, shooting.pivots, move, 0, shooting.move.size)
     return True
-
-
-@inlined
-def residual_of(shooting: Shooting, z: Any, status: int) -> float:
-    """Largest component of P(z) - z; huge if the step did not end in a heel strike."""
-    if status != WALKED:
-        return NO_RESIDUAL
-    largest = 0.0
-    for i in range(shooting.move.size):
-        largest = max(largest, abs(shooting.z_next[i] - z[i]))
-    return largest

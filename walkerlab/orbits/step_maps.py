@@ -184,11 +184,11 @@ class RigidMap:
         walker, units = unit
         shooting = self._shooting_of(walker)
         start = np.array(z, float)
-        status, period = step_with_parameter(shooting, near[0], near[1], self._method, start, self._Dp)
+        status, period = step_with_parameter(shooting, near[0], near[1], start, self._Dp)
         if status != Outcome.WALKED:
             return no_step(Outcome(status), self._section)
         ahead = shooting.z_next.copy()
-        after = on_section(walker, [float(number) for number in ahead])
+        after = on_section(walker, ahead)
         rolled = -walker.radius * (after[SWING] - start[0])  # the foot behind is the one that stood
         length = rolled - swing_foot(walker, after)[1]
         return MappedStep(
@@ -207,7 +207,7 @@ class RigidMap:
         unit = self._unit_at(p)
         assert unit is not None, "what is watched was walked"
         walker, units = unit
-        taken = take_walk(walker, self._method, on_section(walker, [float(number) for number in z]), steps)
+        taken = take_walk(walker, self._method, on_section(walker, z), steps)
         return np.array(
             [
                 taken.min_normal_force * units.force,
@@ -223,7 +223,7 @@ class RigidMap:
             return Iterates(Outcome.REJECTED, np.zeros((0, self._section)), np.zeros(0), np.zeros(0), np.zeros(0))
         walker, units = unit
         if tangent is None:
-            start = on_section(walker, [float(number) for number in z])
+            start = np.array(on_section(walker, z))
             strikes, knees = np.zeros(steps), np.zeros(steps)
             before, after = np.zeros((steps, len(start))), np.zeros((steps, len(start)))
             status, taken = walk(walker, self._quick, self._finder, Unobserved(), start, strikes, before, after, knees)

@@ -10,11 +10,11 @@ positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.mechanics.fused import fused
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
+from walkerlab.solvers.fused import fused
 
 CORRECTED = -1.0
 AS_PRINTED = 1.0
@@ -187,9 +187,9 @@ def impact_jacobian(
 
 def as_printed(model: Standing) -> Standing:
     """A compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign that (A.5) prints."""
-    A = list(model.tree.cosine)
-    A[2 * STANCE + SWING] *= -1.0
-    return model._replace(centrifugal=model.tree._replace(cosine=tuple(A)))
+    A = model.A.copy()
+    A[STANCE, SWING] *= -1.0
+    return model.changed(A_centrifugal=A)
 
 
 def assembled(walker: RigidWalker) -> Standing:

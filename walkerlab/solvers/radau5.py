@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from walkerlab.kernels import inlined
+from walkerlab.solvers.fused import fused
 from walkerlab.solvers.radau5_stages import (
     ERROR_OLD,
     FRESH,
@@ -40,13 +41,11 @@ from walkerlab.solvers.stepping import (
     advance,
     begin,
     dense_degree,
-    end_state,
     interpolate,
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import State, blank, derivative, jacobian
-from walkerlab.solvers.vectors import combine, load, store
+from walkerlab.solvers.system import derivative, jacobian
 
 __all__ = ["Radau5", "new_radau5"]
 
@@ -57,19 +56,20 @@ FIRST_STEP = 1e-6
 
 
 @begin.case(Radau5)
-def begin_radau5(method: Radau5, system: Any, t: float, y: State, h: float) -> None:
+def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
     """Derivative and Jacobian at the start; what was learnt of the step before is forgotten."""
     clock, control = method.clock, method.control
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_STEP
-    store(y, method.y, 0)
-    store(derivative(system, t, y), method.slope, 0)
+    for i in range(method.y.size):
+        method.y[i] = y[i]
+    derivative(system, t, method.y, method.slope[0])
     method.counts[RHS] += 1
-    refresh(method, system, t, y)
+    refresh(method, system)
     control[H_OLD], control[RATE], control[SMOOTH] = 0.0, 1.0, 0.0
 
 
 @inlined
-def step_error(method: Radau5, system: Any, t: float, y: State, h: float, again: bool) -> float:
+def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
     """Error relative to the tolerance, (8.19); filtered once more, (8.20), after a rejection or a start."""
     n = method.y.size
     error, z = method.f[0], method.z
@@ -77,26 +77,27 @@ def step_error(method: Radau5, system: Any, t: float, y: State, h: float, again:
         method.f[1, i] = (ERROR[0] * z[0, i] + ERROR[1] * z[1, i] + ERROR[2] * z[2, i]) / h
         error[i] = method.slope[0, i] + method.f[1, i]
     solve_real(method, error)
-    size = error_size(method, y, error)
+    size = error_size(method, error)
     if size >= 1.0 and again:
-        at = combine((1.0, 1.0), (y, load(method.f, 0, y)))
-        store(derivative(system, t, at), method.f, 0)
+        for i in range(n):
+            method.at[i] = method.y[i] + error[i]
+        derivative(system, t, method.at, error)
         method.counts[RHS] += 1
         for i in range(n):
             error[i] += method.f[1, i]
         solve_real(method, error)
-        size = error_size(method, y, error)
+        size = error_size(method, error)
     return size
 
 
 @inlined
-def error_size(method: Radau5, y: State, error: Any) -> float:
+def error_size(method: Radau5, error: Any) -> float:
     """Root mean square of the error over the tolerance."""
-    total = 0.0
-    for i in range(len(y)):
+    y, total = method.y, 0.0
+    for i in range(y.size):
         scale = method.atol + method.rtol * max(abs(y[i]), abs(y[i] + method.z[2, i]))
         total += (error[i] / scale) ** 2
-    return max(1e-10, math.sqrt(total / len(y)))
+    return max(1e-10, math.sqrt(total / y.size))
 
 
 @advance.case(Radau5)
@@ -104,7 +105,6 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     """One accepted step with Hairer's predictive step control."""
     clock, control = method.clock, method.control
     t, h = clock[T], clock[H_NEXT]
-    y = load(method.y, 0, blank(system))
     rejected = False
     while method.counts[RHS] < method.counts[BUDGET]:
         if h <= SMALLEST_STEP * max(abs(t), 1e-3):
@@ -113,21 +113,21 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
         if last:
             h = t_end - t
         fine = control[H_FACTORED] == h or factor_matrices(method, h)
-        iterations = solve_stages(method, system, t, y, h) if fine else 0
+        iterations = solve_stages(method, system, t, h) if fine else 0
         if iterations == 0:
             method.counts[REJECTED] += 1
             control[SMOOTH] = 0.0
             if control[FRESH] == 0.0:
-                refresh(method, system, t, y)
+                refresh(method, system)
             else:
                 h *= 0.5
             rejected = True
             continue
-        error = step_error(method, system, t, y, h, rejected or control[SMOOTH] == 0.0)
+        error = step_error(method, system, t, h, rejected or control[SMOOTH] == 0.0)
         safety = min(SAFETY, SAFETY * (1 + 2 * NEWTON_MOST) / (iterations + 2 * NEWTON_MOST))
         shrink = max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, error**0.25 / safety))
         if error < 1.0:
-            accept(method, system, t, t_end if last else t + h, h, y)
+            accept(method, system, t, t_end if last else t + h)
             h_new = next_step(method, h, error, shrink, safety)
             clock[H_NEXT] = max(h_new, clock[H_NEXT]) if last else h_new
             return STEP_DONE
@@ -139,9 +139,9 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
 
 
 @inlined
-def refresh(method: Radau5, system: Any, t: float, y: State) -> None:
+def refresh(method: Radau5, system: Any) -> None:
     """The Jacobian at the step's start."""
-    jacobian(system, t, y, method.J)
+    jacobian(system, method.clock[T], method.y, method.J)
     method.counts[JACOBIANS] += 1
     method.control[FRESH], method.control[H_FACTORED] = 1.0, 0.0
     method.control[UNKNOWNS] = unknowns(method.J)
@@ -162,35 +162,34 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
 
 
 @inlined
-def accept(method: Radau5, system: Any, t: float, t_new: float, h: float, y: State) -> None:
+def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
     """Make the step's end the state, keep its polynomial, and renew derivative and Jacobian."""
     clock, control = method.clock, method.control
-    y_new = combine((1.0, 1.0), (y, load(method.z, 2, y)))
-    z1, z2, z3 = load(method.z, 0, y), load(method.z, 1, y), load(method.z, 2, y)
-    store(combine(P_1, (z1, z2, z3)), method.dense, 0)
-    store(combine(P_2, (z1, z2, z3)), method.dense, 1)
-    store(combine(P_3, (z1, z2, z3)), method.dense, 2)
-    store(y, method.y_old, 0)
-    store(y_new, method.y, 0)
-    store(load(method.slope, 0, y), method.slope, 1)
-    store(derivative(system, t_new, y_new), method.slope, 0)
+    y, z, slope, dense = method.y, method.z, method.slope, method.dense
+    for i in range(y.size):
+        dense[0, i] = fused(P_1[2], z[2, i], fused(P_1[1], z[1, i], P_1[0] * z[0, i]))
+        dense[1, i] = fused(P_2[2], z[2, i], fused(P_2[1], z[1, i], P_2[0] * z[0, i]))
+        dense[2, i] = fused(P_3[2], z[2, i], fused(P_3[1], z[1, i], P_3[0] * z[0, i]))
+        method.y_old[i], slope[1, i] = y[i], slope[0, i]
+        y[i] += z[2, i]
+    derivative(system, t_new, y, slope[0])
     method.counts[RHS] += 1
     method.counts[ACCEPTED] += 1
     clock[T_OLD], clock[T] = t, t_new
     control[SMOOTH] = 1.0
     control[FRESH] = 0.0
     if control[RATE] > FRESH_RATE:
-        refresh(method, system, t_new, y_new)
+        refresh(method, system)
 
 
 @rewind.case(Radau5)
 def rewind_radau5(method: Radau5, system: Any) -> None:
     """Back to the step's start; the Jacobian of its end is near enough, the polynomial is not used."""
     clock, control = method.clock, method.control
-    store(load(method.y_old, 0, blank(system)), method.y, 0)
-    store(load(method.slope, 1, blank(system)), method.slope, 0)
+    for i in range(method.y.size):
+        method.y[i], method.slope[0, i] = method.y_old[i], method.slope[1, i]
     clock[T] = clock[T_OLD]
-    refresh(method, system, clock[T], load(method.y, 0, blank(system)))
+    refresh(method, system)
     control[SMOOTH], control[H_OLD] = 0.0, 0.0
 
 
@@ -200,17 +199,11 @@ def prepare_dense_radau5(method: Radau5, system: Any) -> None:
 
 
 @interpolate.case(Radau5)
-def interpolate_radau5(method: Radau5, system: Any, fraction: float) -> State:
+def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
     """The collocation polynomial."""
-    like, s = blank(system), fraction
-    rows = (load(method.dense, 0, like), load(method.dense, 1, like), load(method.dense, 2, like))
-    return combine((1.0, s, s * s, s * s * s), (load(method.y_old, 0, like), rows[0], rows[1], rows[2]))
-
-
-@end_state.case(Radau5)
-def end_state_radau5(method: Radau5, system: Any) -> State:
-    """The state at the end of the last step."""
-    return load(method.y, 0, blank(system))
+    s, dense = fraction, method.dense
+    for i in range(y.size):
+        y[i] = fused(s * s * s, dense[2, i], fused(s * s, dense[1, i], fused(s, dense[0, i], method.y_old[i])))
 
 
 @dense_degree.case(Radau5)

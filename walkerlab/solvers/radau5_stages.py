@@ -12,8 +12,7 @@ from walkerlab.kernels import inlined
 from walkerlab.solvers.radau5_tableau import ALPHA, BETA, GAMMA, INV_1, INV_2, INV_3, T_1, T_2, C
 from walkerlab.solvers.shifted_system import factor_shifted, solve_shifted
 from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
-from walkerlab.solvers.system import State, derivative
-from walkerlab.solvers.vectors import combine, load, store
+from walkerlab.solvers.system import derivative
 
 NEWTON_MOST = 7
 
@@ -30,6 +29,7 @@ class Radau5(NamedTuple):
     y_old: Any
     y: Any
     counts: Any
+    at: Any  # (n,) where a derivative is asked for
     slope: Any  # (2, n) derivative at the start of the next step, and of the last
     z: Any  # (3, n) stages less the step's start
     w: Any  # (3, n) the same, transformed
@@ -50,7 +50,7 @@ def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
     counts[BUDGET] = budget
     three, square = (3, n), (n, n)
     return Radau5(
-        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros((2, n)),
+        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros(n), np.zeros((2, n)),
         np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
         np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
         np.zeros(n), np.zeros(n, np.complex128), np.zeros(7),
@@ -96,14 +96,15 @@ def first_guess(method: Radau5, h: float) -> None:
 
 
 @inlined
-def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> float:
+def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     """One simplified Newton iteration on the stages; returns the size of its move relative to the tolerance."""
-    z, w, f = method.z, method.w, method.f
+    y, z, w, f = method.y, method.z, method.w, method.f
+    n = y.size
     for stage in range(3):
-        at = combine((1.0, 1.0), (y, load(z, stage, y)))
-        store(derivative(system, t + C[stage] * h, at), f, stage)
+        for i in range(n):
+            method.at[i] = y[i] + z[stage, i]
+        derivative(system, t + C[stage] * h, method.at, f[stage])
     method.counts[RHS] += 3
-    n = method.y.size
     real = method.move
     for i in range(n):
         f1, f2, f3 = f[0, i], f[1, i], f[2, i]
@@ -127,13 +128,13 @@ def newton_move(method: Radau5, system: Any, t: float, y: State, h: float) -> fl
 
 
 @inlined
-def solve_stages(method: Radau5, system: Any, t: float, y: State, h: float) -> int:
+def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     """Iterate until the stages are accurate to a part of the tolerance; the iterations used, 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
     size_old, rate = 0.0, method.control[RATE]
     for iteration in range(1, NEWTON_MOST + 1):
-        size = newton_move(method, system, t, y, h)
+        size = newton_move(method, system, t, h)
         if not size < 1e100:
             return 0
         if iteration > 1:

@@ -29,13 +29,11 @@ from walkerlab.solvers.stepping import (
     advance,
     begin,
     dense_degree,
-    end_state,
     interpolate,
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import State, blank, derivative, jacobian
-from walkerlab.solvers.vectors import load, store
+from walkerlab.solvers.system import derivative, jacobian
 
 
 class Entry(NamedTuple):
@@ -87,13 +85,13 @@ class OutOfBudgetError(Exception):
 @kernel
 def right_hand_side(system: Any, t: float, y: Any, dy: Any) -> None:
     """dy/dt of any system, arrays in and out."""
-    store(derivative(system, t, load(y, 0, blank(system))), dy, 0)
+    derivative(system, t, y, dy)
 
 
 @kernel
 def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
     """The Jacobian of any system, arrays in and out."""
-    jacobian(system, t, load(y, 0, blank(system)), J)
+    jacobian(system, t, y, J)
 
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
@@ -162,7 +160,7 @@ def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[floa
 
 
 @begin.case(ScipyMethod)
-def begin_scipy(method: ScipyMethod, system: Any, t: float, y: State, h: float) -> None:
+def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
     """Make a new solver; it chooses its first step itself."""
     n = method.y.size
     method.y[:] = y
@@ -225,16 +223,10 @@ def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
 
 
 @interpolate.case(ScipyMethod)
-def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float) -> State:
+def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
     """The library's dense output."""
     t_old, t = method.clock[T_OLD], method.clock[T]
-    return tuple(method.dense(t_old + fraction * (t - t_old)).tolist())
-
-
-@end_state.case(ScipyMethod)
-def end_state_scipy(method: ScipyMethod, system: Any) -> State:
-    """The state at the end of the last step."""
-    return tuple(method.y.tolist())
+    y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
 @dense_degree.case(ScipyMethod)

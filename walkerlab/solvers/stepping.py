@@ -11,7 +11,6 @@ counts       (5,) see the indices below
 from typing import Any
 
 from walkerlab.kernels import by_type, inlined
-from walkerlab.solvers.system import State
 
 # indices into `clock`
 T_OLD, T, H_NEXT = 0, 1, 2
@@ -24,8 +23,8 @@ SMALLEST_STEP = 1e-15
 
 
 @by_type
-def begin(method: Any, system: Any, t: float, y: State, h: float) -> None:
-    """Start, or start again after an event, from state y at time t (s); h = 0 lets the method choose its first step."""
+def begin(method: Any, system: Any, t: float, y: Any, h: float) -> None:
+    """Start, or start again after an event, from state y (n,) at time t (s); for h = 0 the method chooses its step."""
 
 
 @by_type
@@ -44,13 +43,8 @@ def prepare_dense(method: Any, system: Any) -> None:
 
 
 @by_type
-def interpolate(method: Any, system: Any, fraction: float) -> State:
-    """The state at `fraction` (0 to 1) of the last step."""
-
-
-@by_type
-def end_state(method: Any, system: Any) -> State:
-    """The state at the end of the last step."""
+def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
+    """Write the state at `fraction` (0 to 1) of the last step, or its first numbers, into y."""
 
 
 @by_type

@@ -1,7 +1,7 @@
 """What a continuous system is to an integrator: functions whose bodies are chosen by the type of the system.
 
-A system is a NamedTuple that registers a body for each of these; an integrator calls nothing else. States go in and
-come out as tuples of floats, so that compiled code keeps them in registers.
+A system is a NamedTuple that registers a body for each of these; an integrator calls nothing else. States are arrays
+(n,) in memory of the caller, which `derivative` and `jacobian` read and never write.
 """
 
 from typing import Any
@@ -9,18 +9,19 @@ from typing import Any
 from walkerlab.kernels import by_type
 
 State = tuple[float, ...]
+"""A state outside compiled code: it is never written to."""
 
 
 @by_type
-def blank(system: Any) -> State:
-    """A state of zeros: its length is the number of equations, known while compiling."""
+def block(system: Any) -> Any:
+    """As long as the blocks that loops over the state run in: its length, known while compiling, divides n."""
 
 
 @by_type
-def derivative(system: Any, t: float, y: State) -> State:
-    """dy/dt of `system` at time t (s) and state y."""
+def derivative(system: Any, t: float, y: Any, f: Any) -> None:
+    """Write dy/dt of `system` at time t (s) and state y (n,) into f (n,)."""
 
 
 @by_type
-def jacobian(system: Any, t: float, y: State, J: Any) -> None:
+def jacobian(system: Any, t: float, y: Any, J: Any) -> None:
     """Write the derivatives of dy/dt with respect to y into J (n, n); implicit methods need it."""

@@ -16,7 +16,6 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.scene.contact import GAIT_METHOD, ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 
@@ -58,10 +57,7 @@ def compare_releases(config: ContactConfig, start: KneedStart) -> dict[str, Any]
 
 def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str, Any]:
     """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
-    own = rigid_walker(config, "corrected")
-    ruled = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
-    # which coordinates a section would have is no matter to a walk: as they are no other code is compiled
-    model = ruled._replace(picked=own.picked)
+    model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
     method = method_named(RIGID_METHOD).new(len(model.blank), RTOL, ATOL, BUDGET)
     walk = take_walk(model, method, state, RIGID_STEPS)
     last = {} if not walk.steps else {"period_s": float(walk.periods[-1]), "length_m": float(walk.lengths[-1])}

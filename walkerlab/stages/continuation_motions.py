@@ -52,7 +52,7 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
         return
     walker = rigid_walker(changed, changed.equations)
     unit, units = unit_walker(walker)
-    section, n = on_section(unit, [float(number) for number in point.z]), len(walker.tree.arm_x)
+    section, n = on_section(unit, point.z), len(walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     method = new_dop853(2 * n, RTOL, ATOL, ENDLESS)

@@ -173,7 +173,7 @@ def fixed(
     system = OnPads(ready.scene.walker, ready.scene.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
-    taken = int(semi_implicit_euler(system, y, end, h, cap))
+    taken = int(semi_implicit_euler(system, y, np.empty_like(y), end, h, cap))
     wall_s = time.perf_counter() - began
     arrived: NDArray[np.float64] | None = y
     if taken == cap and taken * h < end * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY)):

@@ -48,7 +48,7 @@ def prepared(config: WalksConfig) -> Prepared | None:
         start: State = as_state(gait.state)
     else:
         start = config.start
-    mass = walker.tree.mass
+    mass = walker.mass
     speed = walker.leg_length * max(abs(rate) for rate in start[len(start) // 2 :])
     energy = mass * (walker.gravity * walker.leg_length + 0.5 * speed**2)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)

@@ -32,8 +32,8 @@ from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, knee
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
 from walkerlab.mechanics.tree import mass_matrix
+from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.registry import method_named
-from walkerlab.solvers.system import derivative
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.fused import fused
+from walkerlab.solvers.fused import fused
 
 numbers = st.floats(-1e6, 1e6)
 
