@@ -38,17 +38,17 @@ from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
-from walkerlab.orbits.families import Span
+from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
 from walkerlab.orbits.gait import Gait
-from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.slope_branch import SlopeBranch
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import newton, on_section
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
 from walkerlab.stages.accuracy import OFF_THE_GAIT
-from walkerlab.stages.continuation import Question, contact_branches, rigid_branches
+from walkerlab.stages.continuation import FamilyQuestion, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
 from walkerlab.stages.tune import MAP_RTOL
@@ -228,7 +228,7 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     seed = seeds(search.walker)[0]
 
     def solve() -> None:
-        reached = Branch(search.looking, seed).follow(search.walker.slope)
+        reached = SlopeBranch(search.looking, seed).follow(search.walker.slope)
         assert reached.z is not None, "the gait can be followed"
         z = np.array(reached.z)
         newton(search.solving, z, search.settings.solved_residual)
@@ -239,9 +239,9 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
 def family_lines(watch: Stopwatch) -> Iterator[Line]:
     """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
     config = load().config
-    rigid = Question(config, parameter_of("slope_rad", config), Span(1e-4, 0.1), periods=16, points=400)
+    rigid = FamilyQuestion(config, parameter_of("slope_rad", config), ValueSpan(1e-4, 0.1), periods=16, points=400)
     yield at_most("rigid branches to period 16", watch(lambda: rigid_branches(rigid, Silent())), "s", 5.0, 2.5)
-    contact = Question(config, parameter_of("slope_deg", config), Span(0.2, 4.2), periods=1, points=400)
+    contact = FamilyQuestion(config, parameter_of("slope_deg", config), ValueSpan(0.2, 4.2), periods=1, points=400)
     seconds = watch(lambda: contact_branches(contact, Silent()))
     yield at_most("contact branch from 0.2 deg to beyond its first flip", seconds, "s", 60.0, 30.0)
 
@@ -339,8 +339,8 @@ def process_line(repeats: int) -> Line:
 
 
 def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
-    """Error and work with steps that end at the force law's joins, and without."""
-    smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_joins=False)))
+    """Error and work with steps that end at the force law's switching points, and without."""
+    smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_switching=False)))
     rows = []
     for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
         cells = [f"{tolerance:.0e}"]

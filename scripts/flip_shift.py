@@ -21,12 +21,12 @@ from typing import NamedTuple
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.orbits.families import Span
+from walkerlab.orbits.families import ValueSpan
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.stages.continuation import Question, contact_branches, first_flip, rigid_branches
+from walkerlab.stages.continuation import FamilyQuestion, contact_branches, first_flip, rigid_branches
 from walkerlab.stages.progress import Silent
 
-SPAN = Span(3.9, 4.5)  # deg; holds every flip that is asked for
+SPAN = ValueSpan(3.9, 4.5)  # deg; holds every flip that is asked for
 
 
 class Ground(NamedTuple):
@@ -56,9 +56,9 @@ def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
     return load(Path(of), [*sets, f"walker.foot_radius_m={ground.radius!r}", *more]).config
 
 
-def question(config: Config) -> Question:
+def question(config: Config) -> FamilyQuestion:
     """Gaits of one step over the slope."""
-    return Question(config, parameter_of("slope_deg", config), SPAN, periods=1, points=400)
+    return FamilyQuestion(config, parameter_of("slope_deg", config), SPAN, periods=1, points=400)
 
 
 def flip(ground: Ground) -> float:

@@ -52,8 +52,8 @@ def faults(walker: Standing) -> list[str]:
     wrong += [
         f"the gait of {gait.period:.4g} s does not repeat itself" for gait in search.gaits if strays(walker, gait)
     ]
-    carried = [gait for gait in search.gaits if not gait.objections]
-    if carried and search.gait != min(carried, key=lambda gait: gait.spectral_radius):
+    has_ground = [gait for gait in search.gaits if not gait.objections]
+    if has_ground and search.gait != min(has_ground, key=lambda gait: gait.spectral_radius):
         wrong.append("the gait chosen is not the least unstable one")
     return wrong
 

@@ -73,12 +73,12 @@ class Scene:
 
 
 def with_books(kept: bool) -> None:
-    """A walk of the paper's model, with or without the energy's books: what damping, friction and edges took."""
+    """A walk of the paper's model, with or without the energy balance: what damping, friction and edges took."""
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
     methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, BUDGET)
     start = start_state(scene, GAIT)
-    walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, 10, None, booked=kept)
+    walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, 10, None, track_energy=kept)
 
 
 @dataclass(frozen=True)

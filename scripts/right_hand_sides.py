@@ -59,7 +59,7 @@ def wrench_anywhere(
     """A foot's force and torques by its force law, times zero where it is over the ground."""
     motion = foot_motion(walker, foot, s, c, y)
     inside = 1.0 if motion.height < 0.0 else 0.0
-    force = foot_force(walker, FootMotion(motion.along, -abs(motion.height), motion.slip, motion.climb))
+    force = foot_force(walker, FootMotion(motion.along, -abs(motion.height), motion.slip, motion.vertical_velocity))
     along, normal = inside * force.along, inside * force.normal.force
     torques = wrench[2]
     for k in range(len(s)):
@@ -75,15 +75,15 @@ def wrench_of_point(
 ) -> tuple[float, float, Vector]:
     """A point foot's force and torques."""
     n = len(s)
-    along, height, slip, climb = y[0], y[1], y[2 + n], y[3 + n]
+    along, height, slip, vertical_velocity = y[0], y[1], y[2 + n], y[3 + n]
     for k in range(n):
         forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
         upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
         along, height = along + forward, height + upward
-        slip, climb = slip - y[4 + n + k] * upward, climb + y[4 + n + k] * forward
+        slip, vertical_velocity = slip - y[4 + n + k] * upward, vertical_velocity + y[4 + n + k] * forward
     if height >= 0.0:
         return wrench
-    force = foot_force(walker, FootMotion(along, height, slip, climb))
+    force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
     torques = wrench[2]
     for k in range(n):
         forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]

@@ -73,13 +73,15 @@ def measure(points: int) -> None:
     from walkerlab.config.loader import template
     from walkerlab.store.runfolder import RunFolder
     from walkerlab.sweeps.question import asked, axis_of_text
-    from walkerlab.sweeps.sweep import Sweep, Work
+    from walkerlab.sweeps.sweep import SweepRun, SweepWork
 
     runs = Path(os.environ["SWEEP_SCALE_RUNS"], str(points))
     real_summary()
     before, started, used = peak_mb(), time.perf_counter(), time.process_time()
     question = asked("echo", [axis_of_text(f"slope_deg=0.5:5:{points}")])
-    swept = Sweep(question, template(None), RunFolder(runs, "scale"), GRAPH).run(Work(graph=f"{HERE.stem}:GRAPH"))
+    swept = SweepRun(question, template(None), RunFolder(runs, "scale"), GRAPH).run(
+        SweepWork(graph=f"{HERE.stem}:GRAPH")
+    )
     wall, used = time.perf_counter() - started, time.process_time() - used
     size, chunks = swept.path.stat().st_size, list(swept.path.parent.glob("sweep-chunks/*.h5"))
     print(

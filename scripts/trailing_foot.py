@@ -100,7 +100,7 @@ def strike(walker: ContactWalker, y: State) -> Struck:
         return (*derivative(system, t, tuple(x[:-2].tolist())), *pushes)
 
     def sinking(_t: float, x: Any) -> float:
-        return feet(x)[LEADING].climb
+        return feet(x)[LEADING].vertical_velocity
 
     ending: Any = sinking
     ending.terminal, ending.direction = True, 1.0
@@ -109,7 +109,7 @@ def strike(walker: ContactWalker, y: State) -> Struck:
     assert run.status == 1, "the leading foot stops"
     end = run.y[:, -1]
     foot = feet(end)[TRAILING]
-    return Struck(foot.slip, foot.climb, float(end[-1] / end[-2]))
+    return Struck(foot.slip, foot.vertical_velocity, float(end[-1] / end[-2]))
 
 
 def main() -> None:
@@ -124,7 +124,15 @@ def main() -> None:
     for ground in GROUNDS:
         walker, y = at_touch(ground, asked.config, slope)
         found, free = strike(walker, y), freed(walker, y)
-        numbers = (ground.stiffer, ground.damped, ground.rubbed, found.slips, found.rises, free.slip, free.climb)
+        numbers = (
+            ground.stiffer,
+            ground.damped,
+            ground.rubbed,
+            found.slips,
+            found.rises,
+            free.slip,
+            free.vertical_velocity,
+        )
         print("".join(f"{number:17.5g}" for number in numbers) + f"{found.share:17.2%}", flush=True)
 
 

@@ -188,7 +188,7 @@ def sweep(
     """
     from walkerlab.sweeps.engines import Order, engine_named
     from walkerlab.sweeps.question import asked
-    from walkerlab.sweeps.sweep import Sweep, Work, modules_of
+    from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     found = resolve(str(config), settings(set), runs=Path(runs))
     listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
@@ -196,7 +196,7 @@ def sweep(
     question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
     chosen, address = engine_named(engine)
     order = Order(jobs, address, modules_of(stage, found.template.base.config, PIPELINE), found.folder.path)
-    swept = Sweep(question, found.template, found.folder).run(Work(chosen, order))
+    swept = SweepRun(question, found.template, found.folder).run(SweepWork(chosen, order))
     if swept.failed:
         raise swept.error()
     return dataset(swept.content[""])

@@ -94,7 +94,7 @@ def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
     assert 0.0 < changes[1][0] - result.touch_time_s[0] < 2e-3
     assert changes[2][0] == pytest.approx(result.knee_strike_s[1], abs=1e-4)
     # the ground stops the foot, at about 2000 m/s^2 from 0.4 m/s, within the step that the cubic spans
-    assert rules.ledger.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
+    assert rules.walk_state.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
 
 
 def test_a_knee_that_a_touch_releases_is_free_from_the_next_step_on():
@@ -124,17 +124,17 @@ def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
     for i in range(1, 20):
         q, v = scene.from_base(tuple(samples.states[i]))
         rules = follower(scene, 3, *scene.from_base(scene.start))
-        rules.ledger.carried[:] = samples.carried[i]
+        rules.walk_state.has_ground[:] = samples.has_ground[i]
         forces = rules.look.forces(q, v).copy()
         law, friction = scene.ours.normal, scene.ours.friction
         power = 0.0
-        for foot, (_, height, slip, climb) in enumerate(rules.look.feet(q, v)):
-            if height < 0.0 and samples.carried[i, foot]:
+        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.look.feet(q, v)):
+            if height < 0.0 and samples.has_ground[i, foot]:
                 depth = -height
                 share = min(1.0, depth / law.full_damping_penetration)
                 damping = law.damping * share**2 * (3.0 - 2.0 * share)
-                normal = max(0.0, law.stiffness * depth**law.exponent - damping * climb)
-                power += normal * (climb + friction_coefficient(friction, slip)[0] * slip)
+                normal = max(0.0, law.stiffness * depth**law.exponent - damping * vertical_velocity)
+                power += normal * (vertical_velocity + friction_coefficient(friction, slip)[0] * slip)
         assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
@@ -143,12 +143,12 @@ def test_the_rules_see_our_own_walk_as_it_was(scene):
     rules = follower(scene, 4, *scene.from_base(scene.start))
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
         rules.follow(float(time_s), *scene.from_base(tuple(y)))
-    seen = rules.ledger.touch_time[:3]
+    seen = rules.walk_state.touch_time[:3]
     # the ground stops the foot, at about 700 m/s^2 from 0.27 m/s, within the step that the cubic spans
     bound = 700.0 * 1e-4**2 / (8.0 * 0.27)
     assert seen == pytest.approx(result.touch_time_s[:3], abs=bound)
-    assert rules.ledger.touch_along[:3] == pytest.approx(result.touch_along_m[:3], abs=bound)
-    assert rules.ledger.slip[:3] == pytest.approx(result.slip_m[:3], abs=bound)
+    assert rules.walk_state.touch_along[:3] == pytest.approx(result.touch_along_m[:3], abs=bound)
+    assert rules.walk_state.slip[:3] == pytest.approx(result.slip_m[:3], abs=bound)
 
 
 def test_a_walk_whose_numbers_are_lost_is_a_failed_solver(scene):

@@ -9,7 +9,7 @@ from crashing_tasks import Answers, Crashes, Raises, Sleeps
 from walkerlab.benchmarks.engines import process
 from walkerlab.benchmarks.engines.adapter import Stepping
 from walkerlab.benchmarks.engines.experiments import lost_row
-from walkerlab.benchmarks.engines.process import Lost, OwnProcess
+from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 
 
 @pytest.fixture
@@ -25,19 +25,19 @@ def test_results_come_back_and_what_an_engine_prints_does_not(own, capfd):
 
 def test_a_crash_is_told_with_its_code_and_the_next_task_runs(own):
     lost = own.do(Crashes(), 30.0)
-    assert isinstance(lost, Lost)
+    assert isinstance(lost, TaskLost)
     assert "-11" in lost.why
     assert own.do(Answers(3), 30.0) == 3
 
 
 def test_an_exception_is_told_in_its_words(own):
-    assert own.do(Raises(), 30.0) == Lost("RuntimeError: bad model")
+    assert own.do(Raises(), 30.0) == TaskLost("RuntimeError: bad model")
 
 
 def test_what_takes_for_ever_is_ended(own, monkeypatch):
     assert own.do(Answers(1), 30.0) == 1
     lost = own.do(Sleeps(), 0.2)
-    assert isinstance(lost, Lost)
+    assert isinstance(lost, TaskLost)
     assert lost.timed_out
     monkeypatch.setattr(process, "START_UP_S", 30.0)
     assert own.do(Answers(2), 1.0) == 2
@@ -48,13 +48,13 @@ def test_who_stops_waiting_ends_what_runs(own):
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(own.do, Sleeps(), 60.0)
         own.abandon()
-        assert isinstance(waiting.result(30.0), Lost)
+        assert isinstance(waiting.result(30.0), TaskLost)
     with pytest.raises(RuntimeError, match="nobody waits"):
         own.do(Answers(2), 1.0)
 
 
 def test_a_lost_run_took_no_time_that_anybody_knows():
     scene = SimpleNamespace(name="compass")
-    row = lost_row(scene, "engine", "1.0", "own-law", Stepping("rule", 1e-4), "rule", 1.0, Lost("it crashed"))
+    row = lost_row(scene, "engine", "1.0", "own-law", Stepping("rule", 1e-4), "rule", 1.0, TaskLost("it crashed"))
     assert row.wall_s is None
     assert row.error is None

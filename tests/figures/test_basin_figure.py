@@ -11,7 +11,7 @@ from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results
 from walkerlab.report.sections.basin import section
 from walkerlab.stages.basin import group_of, summary, window_of
-from walkerlab.stages.basin_pieces import Found
+from walkerlab.stages.basin_pieces import WalkEnds
 
 CONFIG = load(None, ["basin.cells=[4,3]"]).config
 Z = [0.17, -0.6, -0.86]
@@ -22,7 +22,7 @@ def basin(attractor, aperiodic=False, config=CONFIG):
     window = window_of(config, Z)
     attractor = np.resize(attractor, window.size)
     walks = attractor != NONE
-    found = Found(np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, 7, 1))
+    found = WalkEnds(np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, 7, 1))
     attractors = [{"period": 1}, {"period": 2}]
     said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
     return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}

@@ -31,14 +31,14 @@ def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):
     return contact_walker(Assembly((body,), (), feet=feet), normal, friction, GRAVITY, slope)
 
 
-def placed(walker, foot, depth, theta, omega, slip, climb, along=0.0):
+def placed(walker, foot, depth, theta, omega, slip, vertical_velocity, along=0.0):
     """The state in which a foot's lowest point is `depth` inside the ground and moves with (slip, climb)."""
     lever = walker.feet[foot]
     tilted, omega = np.array(theta) + walker.slope, np.array(omega)
     s, c = np.sin(tilted), np.cos(tilted)
     forward, upward = c * lever.lever_x - s * lever.lever_y, s * lever.lever_x + c * lever.lever_y
     position = along - forward.sum(), lever.radius - depth - upward.sum()
-    velocity = slip - omega @ (np.array(lever.rolling) - upward), climb - omega @ forward
+    velocity = slip - omega @ (np.array(lever.rolling) - upward), vertical_velocity - omega @ forward
     return tuple(map(float, (*position, *theta, *velocity, *omega)))
 
 

@@ -37,15 +37,15 @@ def check(system, state):
     assert np.abs(J - K).max() <= 1e-10 * (1.0 + np.abs(K).max())
 
 
-@pytest.mark.parametrize("carried", [(True, True), (False, True), (False, False)])
-def test_compiled_walker_on_ground_moves_as_in_python(carried):
+@pytest.mark.parametrize("has_ground", [(True, True), (False, True), (False, False)])
+def test_compiled_walker_on_ground_moves_as_in_python(has_ground):
     walker = ground.compass(inertia=0.1)
     for state in states_on_ground(walker, 40):
-        check(OnGround(walker, carried), state)
+        check(OnGround(walker, has_ground), state)
 
 
-@pytest.mark.parametrize("carried", [False, True])
-def test_compiled_hinged_walker_moves_as_in_python(carried):
-    pinned = pinned_walker(compass_assembly(ground.parts()), ground.compass(), 1, 0.0)._replace(carried=carried)
+@pytest.mark.parametrize("has_ground", [False, True])
+def test_compiled_hinged_walker_moves_as_in_python(has_ground):
+    pinned = pinned_walker(compass_assembly(ground.parts()), ground.compass(), 1, 0.0)._replace(has_ground=has_ground)
     for state in states_on_ground(pinned.walker, 20):
         check(pinned, (*state[2:4], *state[6:]))

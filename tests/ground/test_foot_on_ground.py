@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from walkerlab.ground.energy import book_energy, dissipated_power, kinetic_energy, potential_energy
+from walkerlab.ground.energy import dissipated_power, kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
@@ -31,11 +31,11 @@ def motion_of(walker, foot, state):
     return foot_motion(walker, walker.feet[foot], s, c, state)
 
 
-@given(theta=angles, omega=rates, slip=slips, climb=climbs, depth=depths, foot=feet)
-def test_slip_is_the_velocity_of_the_balls_own_material(theta, omega, slip, climb, depth, foot):
+@given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
+def test_slip_is_the_velocity_of_the_balls_own_material(theta, omega, slip, vertical_velocity, depth, foot):
     """Follow the material point that is lowest now for a moment: the ball turns with its leg."""
     walker = ground.compass(radius=BALL)
-    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, climb))
+    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
     _, _, (_, hip, v_hip) = ground.masses_of_the_compass(state)
     reach, angle, w = 1.0 - BALL, theta[foot] + ground.SLOPE, omega[foot]
     centre_to_lowest = np.array([0.0, -BALL])
@@ -47,31 +47,31 @@ def test_slip_is_the_velocity_of_the_balls_own_material(theta, omega, slip, clim
 
     velocity = (material_point(1e-5) - material_point(-1e-5)) / 2e-5
     motion = motion_of(walker, foot, tuple(state))
-    np.testing.assert_allclose((motion.slip, motion.climb), velocity, atol=1e-8)
-    np.testing.assert_allclose((motion.slip, motion.climb), (slip, climb), atol=1e-12)
+    np.testing.assert_allclose((motion.slip, motion.vertical_velocity), velocity, atol=1e-8)
+    np.testing.assert_allclose((motion.slip, motion.vertical_velocity), (slip, vertical_velocity), atol=1e-12)
     np.testing.assert_allclose((motion.along, motion.height), material_point(0.0), atol=1e-12)
     assert motion.height == pytest.approx(-depth, abs=1e-12)
 
 
-@given(theta=angles, omega=rates, slip=slips, climb=climbs, depth=depths, foot=feet)
-def test_energies_are_those_of_legs_and_hip(theta, omega, slip, climb, depth, foot):
+@given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
+def test_energies_are_those_of_legs_and_hip(theta, omega, slip, vertical_velocity, depth, foot):
     walker = ground.compass()
-    state = ground.placed(walker, foot, depth, theta, omega, slip, climb)
+    state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     bodies = ground.masses_of_the_compass(state)
     field = ground.GRAVITY * np.array([np.sin(ground.SLOPE), -np.cos(ground.SLOPE)])
     assert kinetic_energy(walker, state) == pytest.approx(sum(m * v @ v for m, _, v in bodies) / 2, rel=1e-12)
     assert potential_energy(walker, state) == pytest.approx(-sum(m * p @ field for m, p, _ in bodies), rel=1e-12)
 
 
-@given(theta=angles, omega=rates, slip=slips, climb=climbs, depth=depths, foot=feet)
+@given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
 def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_contact(
-    theta, omega, slip, climb, depth, foot
+    theta, omega, slip, vertical_velocity, depth, foot
 ):
     """Newton and Euler of legs and hip about the contact point, for the whole walker: forces of gravity and ground."""
     walker = ground.compass(radius=BALL)
-    carried = (foot == 0, foot == 1)
-    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, climb))
-    rate = np.array(derivative(OnGround(walker, carried), 0.0, tuple(state)))
+    has_ground = (foot == 0, foot == 1)
+    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
+    rate = np.array(derivative(OnGround(walker, has_ground), 0.0, tuple(state)))
     motion = motion_of(walker, foot, tuple(state))
     force = foot_force(walker, motion)
     contact = np.array([motion.along, motion.height])
@@ -92,11 +92,11 @@ def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_conta
     np.testing.assert_allclose(change, [*pull, torque], atol=1e-7 * size)
 
 
-@given(theta=angles, omega=rates, slip=slips, climb=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
-def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, climb, depth, foot):
-    """dE/dt of the books along the motion is what damping and friction take."""
+@given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
+def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertical_velocity, depth, foot):
+    """dE/dt of the energy balance along the motion is what damping and friction take."""
     walker = ground.compass(normal=SOFT)
-    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, climb))
+    state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
     rate = np.array(derivative(OnGround(walker, BOTH), 0.0, tuple(state)))
     powers = [dissipated_power(walker, each, tuple(state))[:2] for each in range(2)]
     damping, friction = np.sum(powers, axis=0)
@@ -104,7 +104,7 @@ def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, climb, 
     assert friction >= 0.0
     assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-5)  # the other foot is at no join of the law
     h = 1e-7 / (1.0 + np.abs(rate).max() * 1e-2)
-    before, after = (book_energy(walker, BOTH, tuple(state + step * rate)) for step in (-h, h))
+    before, after = (total_energy(walker, BOTH, tuple(state + step * rate)) for step in (-h, h))
     size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker, tuple(state))
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
@@ -131,10 +131,10 @@ def test_smooth_ground_has_no_tangential_force():
         assert dissipated_power(walker, 1, state)[1] == 0.0
 
 
-@given(theta=angles, omega=rates, slip=slips, climb=climbs, depth=depths, foot=feet)
-def test_smooth_ground_is_friction_with_a_coefficient_of_zero(theta, omega, slip, climb, depth, foot):
+@given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
+def test_smooth_ground_is_friction_with_a_coefficient_of_zero(theta, omega, slip, vertical_velocity, depth, foot):
     smooth, none = ground.compass(friction=ground.SMOOTH), ground.compass(friction=Coulomb(0.0, 0.0, 0.1, 1.0))
-    state = ground.placed(smooth, foot, depth, theta, omega, slip, climb)
+    state = ground.placed(smooth, foot, depth, theta, omega, slip, vertical_velocity)
     assert derivative(OnGround(smooth, BOTH), 0.0, state) == derivative(OnGround(none, BOTH), 0.0, state)
     J, K = np.zeros((8, 8)), np.zeros((8, 8))
     jacobian(OnGround(smooth, BOTH), 0.0, state, J)
@@ -159,30 +159,32 @@ def differenced(system, state, steps):
     theta=angles,
     omega=rates,
     slip=st.sampled_from([-1.4, -0.5, -0.06, 0.003, 0.4, 1.2]),
-    climb=climbs,
+    vertical_velocity=climbs,
     depth=st.floats(1e-4, 4e-3),
     foot=feet,
 )
-def test_derivatives_of_the_motion_on_ground_are_those_of_differences(friction, theta, omega, slip, climb, depth, foot):
+def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
+    friction, theta, omega, slip, vertical_velocity, depth, foot
+):
     walker = ground.compass(friction=friction, normal=SOFT, radius=BALL, inertia=0.2)
-    state = ground.placed(walker, foot, depth, theta, omega, slip, climb)
-    carried = (foot == 0, foot == 1)
+    state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
+    has_ground = (foot == 0, foot == 1)
     motion = motion_of(walker, foot, state)
     assume(foot_force(walker, motion).normal.force > 1e-2)  # not clipped, nor about to be
     J = np.zeros((8, 8))
-    jacobian(OnGround(walker, carried), 0.0, state, J)
+    jacobian(OnGround(walker, has_ground), 0.0, state, J)
     position = 1e-3 * depth
     steps = (1e-6, position, position, position, 1e-5, 1e-5, 1e-5, 1e-5)
-    expected = differenced(OnGround(walker, carried), state, steps)
+    expected = differenced(OnGround(walker, has_ground), state, steps)
     # every column by its own size: stiffness along the height is a million times friction's along the speed
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-4
 
 
 @pytest.mark.parametrize("climb", [-1e-4, 0.0, 1e-4])
-def test_derivatives_hold_at_the_stiffness_of_the_paper(climb):
+def test_derivatives_hold_at_the_stiffness_of_the_paper(vertical_velocity):
     walker = ground.compass()
-    state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, climb)
+    state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, vertical_velocity)
     J = np.zeros((8, 8))
     jacobian(OnGround(walker, (False, True)), 0.0, state, J)
     steps = (1e-6, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from walkerlab.ground.compliant import KneeRules, contact_walker
-from walkerlab.ground.energy import book_energy
+from walkerlab.ground.energy import total_energy
 from walkerlab.ground.friction import Coulomb
-from walkerlab.ground.held import Independent, NoneBends, OneBends
+from walkerlab.ground.held import NoneBends, NoneHeld, OneBends
 from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, merged_state, place_of, store_whole
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
@@ -49,13 +49,13 @@ def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, locked
     knees = NoneBends(False) if len(locked) == 2 else OneBends(fewer.thighs, fewer.shanks, False)
     small = as_fewer(walker, fewer, fewer.held, knees)
     z = merged_state(fewer.onto, np.array(y), small.blank)
-    always = () if isinstance(fewer.held, Independent) else fewer.held.always
+    always = () if isinstance(fewer.held, NoneHeld) else fewer.held.always
     rate = derivative(OnGround(small, BOTH, always, ()), 0.0, z)
     whole = np.zeros(len(y))
     store_whole(small.merging, rate, whole)
     np.testing.assert_allclose(whole, expected, rtol=1e-10, atol=1e-9)
     assert np.abs(expected).max() > 10.0  # the ground pushes
-    assert book_energy(small, BOTH, z) == pytest.approx(book_energy(walker, BOTH, y), rel=1e-12)
+    assert total_energy(small, BOTH, z) == pytest.approx(total_energy(walker, BOTH, y), rel=1e-12)
     store_whole(small.merging, z, whole)
     np.testing.assert_array_equal(whole, y)
 

@@ -68,13 +68,13 @@ def check_jacobian(system, state):
     foot=st.sampled_from([0, 1]),
 )
 def test_derivatives_hold_with_the_other_foot_in_the_ground(angle, depth, swing, stance, foot):
-    system = hinged(radius=0.01, inertia=0.1, foot=foot)._replace(carried=True)
+    system = hinged(radius=0.01, inertia=0.1, foot=foot)._replace(has_ground=True)
     # legs that end at the balls' centres: by as much as the swing leg reaches further down
     other = -math.acos(math.cos(angle) + depth / 0.99)
     legs = np.array([[other, angle], [swing, stance]])[:, :: 1 if foot == 1 else -1]
     legs[0] -= system.walker.slope
     state = tuple(legs.ravel().tolist())
-    without = np.array(derivative(system._replace(carried=False), 0.0, state))
+    without = np.array(derivative(system._replace(has_ground=False), 0.0, state))
     # a foot that rises fast is let go
     assume(np.abs(np.array(derivative(system, 0.0, state)) - without).max() > 1.0)
     check_jacobian(system, state)
@@ -88,7 +88,7 @@ def test_the_hinge_stays_where_it_is_and_the_ball_just_touches(state, along, rad
     motion = foot_motion(system.walker, system.walker.feet[1], s, c, full)
     assert motion.along == pytest.approx(along, abs=1e-12)
     assert motion.height == pytest.approx(0.0, abs=1e-12)
-    assert motion.climb == pytest.approx(0.0, abs=1e-12)
+    assert motion.vertical_velocity == pytest.approx(0.0, abs=1e-12)
     assert motion.slip == pytest.approx(radius * state[3], abs=1e-12)  # the ball turns over the hinge
     assert (full[2:4], full[6:]) == (state[:2], state[2:])
 

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from walkerlab.ground.terrain import (
     AfterMidSwing,
     Checkerboard,
-    carried_in_air,
-    carried_in_cell,
     cell_at,
     cell_edges,
+    has_ground_in_air,
+    has_ground_in_cell,
     order_matters,
-    starts_carried,
+    starts_with_ground,
     stride_measure,
 )
 
@@ -42,7 +42,7 @@ def test_cells_follow_each_other_without_gap_or_overlap(pitch, foot, cell):
     here, there = cell_edges(terrain, foot, cell), cell_edges(terrain, foot, cell + 1)
     assert here[1] == pytest.approx(there[0], abs=1e-9)
     assert cell_at(terrain, foot, 0.5 * (here[0] + here[1])) == cell
-    assert carried_in_cell(terrain, cell) != carried_in_cell(terrain, cell + 1)
+    assert has_ground_in_cell(terrain, cell) != has_ground_in_cell(terrain, cell + 1)
 
 
 @given(pitch=pitches, j=st.integers(-20, 20))
@@ -51,19 +51,19 @@ def test_each_legs_pads_lie_centred_on_its_footholds(pitch, j):
     terrain = walked_on(pitch)
     for foothold, foot in ((2 * j * pitch, 1), ((2 * j + 1) * pitch, 0)):
         cell = cell_at(terrain, foot, foothold)
-        assert carried_in_cell(terrain, cell)
-        assert not carried_in_cell(terrain, cell_at(terrain, 1 - foot, foothold))
+        assert has_ground_in_cell(terrain, cell)
+        assert not has_ground_in_cell(terrain, cell_at(terrain, 1 - foot, foothold))
         assert sum(cell_edges(terrain, foot, cell)) / 2 == pytest.approx(foothold, abs=1e-9)
 
 
-@pytest.mark.parametrize("carried", [False, True])
+@pytest.mark.parametrize("has_ground", [False, True])
 @pytest.mark.parametrize("ahead", [False, True])
-def test_a_pad_stays_where_it_is(carried, ahead):
+def test_a_pad_stays_where_it_is(has_ground, ahead):
     terrain = walked_on(0.4)
     for stands in (True, False):
-        assert carried_in_air(terrain, carried, stands, ahead) == carried
-    assert starts_carried(terrain, False)
-    assert starts_carried(terrain, True)
+        assert has_ground_in_air(terrain, has_ground, stands, ahead) == has_ground
+    assert starts_with_ground(terrain, False)
+    assert starts_with_ground(terrain, True)
     assert not order_matters(terrain)
     assert stride_measure(terrain) == 0.4
 
@@ -80,10 +80,10 @@ def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
 def test_on_a_plane_a_foot_is_carried_only_after_it_was_in_the_air_ahead():
     terrain = AfterMidSwing(0.4)
     assert order_matters(terrain)
-    assert starts_carried(terrain, True)
-    assert not starts_carried(terrain, False)  # it is about to swing
-    assert not carried_in_air(terrain, True, False, False)  # leaves its stance, or fell back, behind: swings through
-    assert carried_in_air(terrain, True, False, True)  # bounces at its landing
-    assert not carried_in_air(terrain, False, False, False)  # scuffs behind
-    assert carried_in_air(terrain, False, False, True)  # has passed, in the air
-    assert carried_in_air(terrain, True, True, False)  # the stance foot bounces
+    assert starts_with_ground(terrain, True)
+    assert not starts_with_ground(terrain, False)  # it is about to swing
+    assert not has_ground_in_air(terrain, True, False, False)  # leaves its stance, or fell back, behind: swings through
+    assert has_ground_in_air(terrain, True, False, True)  # bounces at its landing
+    assert not has_ground_in_air(terrain, False, False, False)  # scuffs behind
+    assert has_ground_in_air(terrain, False, False, True)  # has passed, in the air
+    assert has_ground_in_air(terrain, True, True, False)  # the stance foot bounces

@@ -4,7 +4,7 @@ import functools
 
 from walkerlab.config.loader import load
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, walk_contact
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.solvers.registry import method_named
 
@@ -37,7 +37,7 @@ def walked(*sets, start=FIXED_POINT, steps=10, step=RIGID_STEP, interval=None, *
     scene = scene_of(*sets, step=step)
     return walk_contact(
         scene.walker,
-        Ground(scene.terrain, scene.frame),
+        JudgedGround(scene.terrain, scene.frame),
         scene.pinned,
         STANCE_FOOT,
         start_state(scene, start),

@@ -190,17 +190,17 @@ def matrices(walker, y, hinged, locked):
 
 
 @njit
-def rate(walker, y, hinged, locked, carried):
+def rate(walker, y, hinged, locked, has_ground):
     """dy/dt."""
     n = walker.inertias.size
     A, b = matrices(walker, y, hinged, locked)
     dy = np.zeros_like(y)
     for foot in range(2):
-        _, h, slip, climb, _ = foot_at(walker, foot, y)
-        if h < 0.0 and carried[foot] and foot != hinged:
+        _, h, slip, vertical_velocity, _ = foot_at(walker, foot, y)
+        if h < 0.0 and has_ground[foot] and foot != hinged:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
             spring = walker.stiffness * (-h) ** walker.exponent
-            normal = max(0.0, spring - c * climb)
+            normal = max(0.0, spring - c * vertical_velocity)
             if abs(slip) < walker.stiction:
                 mu = -cubic(slip, -walker.stiction, -walker.static, walker.stiction, walker.static)
             else:
@@ -212,7 +212,7 @@ def rate(walker, y, hinged, locked, carried):
                 rx, rh = turned(walker, walker.foot_levers[foot], y, k)
                 b[2 + k] += rx * normal - rh * push
             b[2 + walker.foot_bodies[foot]] += walker.radius * push
-            dy[4 + 2 * n + DAMPING] += (spring - normal) * climb
+            dy[4 + 2 * n + DAMPING] += (spring - normal) * vertical_velocity
             dy[4 + 2 * n + FRICTION] -= push * slip
     dy[: 2 + n] = y[2 + n : 4 + 2 * n]
     dy[2 + n : 4 + 2 * n] = solve(A, b)[: 2 + n]
@@ -220,14 +220,14 @@ def rate(walker, y, hinged, locked, carried):
 
 
 @njit
-def reaction(walker, y, hinged, locked, carried):
+def reaction(walker, y, hinged, locked, has_ground):
     """How fast (1/s) the ground reacts to a foot's velocity, and a foot crosses the depth where damping sets in."""
     n, fastest = walker.inertias.size, 0.0
     for foot in range(2):
-        _, h, _, climb, _ = foot_at(walker, foot, y)
-        if h < 0.0 and carried[foot] and foot != hinged:
+        _, h, _, vertical_velocity, _ = foot_at(walker, foot, y)
+        if h < 0.0 and has_ground[foot] and foot != hinged:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
-            normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * climb)
+            normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * vertical_velocity)
             gives, (A, J) = np.zeros(2), matrices(walker, y, hinged, locked)
             for axis in range(2):
                 J[:] = 0.0
@@ -239,17 +239,17 @@ def reaction(walker, y, hinged, locked, carried):
                     J[2 + walker.foot_bodies[foot]] += walker.radius
                 gives[axis] = J @ solve(A.copy(), J.copy())
             grip = 1.5 * walker.static * normal / walker.stiction
-            fastest = max(fastest, grip * gives[0], c * gives[1], abs(climb) / walker.full)
+            fastest = max(fastest, grip * gives[0], c * gives[1], abs(vertical_velocity) / walker.full)
     return fastest
 
 
 @njit
-def runge_kutta(walker, y, h, hinged, locked, carried):
+def runge_kutta(walker, y, h, hinged, locked, has_ground):
     """One step of the classical method."""
-    k1 = rate(walker, y, hinged, locked, carried)
-    k2 = rate(walker, y + 0.5 * h * k1, hinged, locked, carried)
-    k3 = rate(walker, y + 0.5 * h * k2, hinged, locked, carried)
-    k4 = rate(walker, y + h * k3, hinged, locked, carried)
+    k1 = rate(walker, y, hinged, locked, has_ground)
+    k2 = rate(walker, y + 0.5 * h * k1, hinged, locked, has_ground)
+    k3 = rate(walker, y + 0.5 * h * k2, hinged, locked, has_ground)
+    k4 = rate(walker, y + h * k3, hinged, locked, has_ground)
     return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
@@ -273,7 +273,7 @@ def stored(walker, foot, y):
 
 
 @njit
-def energy(walker, y, carried):
+def energy(walker, y, has_ground):
     """Energy (J) of motion, of weight over the slope's first foothold, and in the ground."""
     n = walker.inertias.size
     total = 0.0
@@ -287,7 +287,7 @@ def energy(walker, y, carried):
     for k in range(n):
         total += 0.5 * walker.inertias[k] * y[4 + n + k] ** 2
     for foot in range(2):
-        if carried[foot]:
+        if has_ground[foot]:
             total += stored(walker, foot, y)
     return total
 
@@ -310,9 +310,9 @@ def event_values(walker, y, cells, stance, touched):
     g = np.ones(EVENTS)
     x = np.zeros(2)
     for foot in range(2):
-        x[foot], g[3 * foot], _, climb, _ = foot_at(walker, foot, y)
+        x[foot], g[3 * foot], _, vertical_velocity, _ = foot_at(walker, foot, y)
         if foot == stance:
-            g[SINKING] = climb
+            g[SINKING] = vertical_velocity
         if walker.terrain == CHECKERBOARD:
             centre = lane(walker, foot) + cells[foot] * walker.pitch
             g[3 * foot + 1] = x[foot] - centre + 0.5 * walker.pitch
@@ -338,7 +338,7 @@ def take_steps(walker, y, h, hinged, diary):
     steps = times.size
     outcome, end_s, end, ground = WALKED, 0.0, y, np.ones(2, np.bool_)
     stance, done, t, last, grounded_at, releasing = 1, 0, 0.0, 0.0, 0.0, False
-    cells, left, carried = np.zeros(2, np.int64), np.zeros(2, np.int64), np.ones(2, np.bool_)
+    cells, left, has_ground = np.zeros(2, np.int64), np.zeros(2, np.int64), np.ones(2, np.bool_)
     foothold, touched = np.zeros(2), np.zeros(2)
     stood, leaving, armed = np.zeros((2, 2)), np.zeros(2, np.bool_), np.zeros(max(knees, 1), np.bool_)
     locked = np.zeros(knees, np.bool_)
@@ -346,22 +346,22 @@ def take_steps(walker, y, h, hinged, diary):
         locked[1] = True
     side = np.ones(EVENTS)
     for foot in range(2):
-        x, height, _, climb, _ = foot_at(walker, foot, y)
+        x, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
         foothold[foot], touched[foot] = x, material(walker, foot, y)
         if walker.terrain == CHECKERBOARD:
             cells[foot] = int(np.floor((x - lane(walker, foot)) / walker.pitch + 0.5))
-            carried[foot] = cells[foot] % 2 == 0
+            has_ground[foot] = cells[foot] % 2 == 0
         elif walker.terrain == AFTER_MID_SWING:
-            carried[foot] = foot == stance
+            has_ground[foot] = foot == stance
         left[foot] = cells[foot]
-        inside = climb <= 1e-12 if abs(height) < 1e-13 else height < 0.0
+        inside = vertical_velocity <= 1e-12 if abs(height) < 1e-13 else height < 0.0
         side[3 * foot] = -1.0 if inside else 1.0
     side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
     while done < steps or leaving[0] or leaving[1]:
         counts[ROUNDS] += 1
         aloft = grounded_at + 0.25 * tau - t
-        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, carried)), aloft)
-        new = runge_kutta(walker, y, dt, hinged, locked, carried)
+        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, has_ground)), aloft)
+        new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
         g = event_values(walker, new, cells, stance, touched)
         low, high, event = 0.0, dt, -1
         for _ in range(HALVINGS):
@@ -370,7 +370,7 @@ def take_steps(walker, y, h, hinged, diary):
                 if side[i] * g[i] < 0.0 and i != SINKING:
                     if i < 6 and i // 3 == hinged:
                         continue
-                    if i == SLIDE and (side[3 * stance] > 0.0 or not carried[stance] or hinged == stance):
+                    if i == SLIDE and (side[3 * stance] > 0.0 or not has_ground[stance] or hinged == stance):
                         continue
                     if KNEES <= i < KNEES + 2 and (i - KNEES >= knees or locked[i - KNEES] or not armed[i - KNEES]):
                         continue
@@ -386,11 +386,11 @@ def take_steps(walker, y, h, hinged, diary):
             if high - low < 1e-15:
                 break
             dt = 0.5 * (low + high)
-            new = runge_kutta(walker, y, dt, hinged, locked, carried)
+            new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
             g = event_values(walker, new, cells, stance, touched)
         if event >= 0:
             dt = high
-            new = runge_kutta(walker, y, dt, hinged, locked, carried)
+            new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
         y = new
         t += dt
         for knee in range(knees):
@@ -400,7 +400,7 @@ def take_steps(walker, y, h, hinged, diary):
         if hinged >= 0:
             grounded_at = t
         for foot in range(2):
-            if side[3 * foot] < 0.0 and carried[foot]:
+            if side[3 * foot] < 0.0 and has_ground[foot]:
                 grounded_at = t
         if t - last > 10.0 * tau:
             outcome = NO_HEEL_STRIKE
@@ -421,10 +421,10 @@ def take_steps(walker, y, h, hinged, diary):
             continue
         if event == KNEES or event == KNEES + 1:
             locked[event - KNEES] = True
-            before = energy(walker, y, carried)
+            before = energy(walker, y, has_ground)
             y = struck(walker, y, hinged, locked)
             if done < steps:
-                lost[KNEE_STRIKES] += before - energy(walker, y, carried)
+                lost[KNEE_STRIKES] += before - energy(walker, y, has_ground)
                 locks[counts[LOCKS]] = t
                 counts[LOCKS] += 1
             continue
@@ -433,22 +433,22 @@ def take_steps(walker, y, h, hinged, diary):
         if event == PASSING:
             side[PASSING] = -side[PASSING]
             for foot in range(2):
-                _, height, _, climb, _ = foot_at(walker, foot, y)
+                _, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
                 # equal legs of a hinged step pass each other on the ground: rounding neither lifts a foot nor holds one
-                above = height > ROUNDING or (height > -ROUNDING and climb > 0.0)
+                above = height > ROUNDING or (height > -ROUNDING and vertical_velocity > 0.0)
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
-                    carried[foot] = (side[PASSING] > 0.0) == (foot == 1)
+                    has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
             continue
         foot, kind = event // 3, event % 3
         other = 1 - foot
         if kind > 0:
             cells[foot] += 1 if kind == 2 else -1
             if cells[foot] % 2 != 0:
-                if carried[foot] and done < steps:
+                if has_ground[foot] and done < steps:
                     lost[EDGES] += stored(walker, foot, y)
-                carried[foot] = False
+                has_ground[foot] = False
             elif side[3 * foot] > 0.0:
-                carried[foot] = True
+                has_ground[foot] = True
             else:
                 outcome = OFF_PAD
                 break
@@ -463,9 +463,9 @@ def take_steps(walker, y, h, hinged, diary):
                     counts[SLIPS] = done
                 leaving[foot] = False
             if walker.terrain == AFTER_MID_SWING and foot != stance:
-                carried[foot] = (side[PASSING] > 0.0) == (foot == 1)
+                has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
             continue
-        if not carried[foot]:
+        if not has_ground[foot]:
             continue
         if foot == stance:
             if abs(slip) > 0.25 * walker.pitch:
@@ -495,16 +495,16 @@ def take_steps(walker, y, h, hinged, diary):
         stance, last, done = foot, t, done + 1
         counts[STEPS] = done
         if done == steps:
-            end_s, end, ground = t, y.copy(), carried.copy()
+            end_s, end, ground = t, y.copy(), has_ground.copy()
         if walker.terrain == AFTER_MID_SWING and side[3 * other] > 0.0:
-            carried[other] = (side[PASSING] > 0.0) == (other == 1)
+            has_ground[other] = (side[PASSING] > 0.0) == (other == 1)
         if knees:
             if walker.release_at_touch:
                 locked[other], armed[other] = False, False
             else:
                 releasing = True
     if done < steps:
-        return outcome, t, y, carried
+        return outcome, t, y, has_ground
     return WALKED, end_s, end, ground
 
 
@@ -537,7 +537,7 @@ def start(walker, angles, rates, hinged=False):
     """The state with foot 1 just touching at the origin, at rest and rolling, or hinged at its centre."""
     n = walker.inertias.size
     y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates, [0.0, 0.0]]).astype(float)
-    x, height, slip, climb, centre = foot_at(walker, 1, y)
+    x, height, slip, vertical_velocity, centre = foot_at(walker, 1, y)
     y[0], y[1] = -x, -height
-    y[2 + n], y[3 + n] = -(centre if hinged else slip), -climb
+    y[2 + n], y[3 + n] = -(centre if hinged else slip), -vertical_velocity
     return y

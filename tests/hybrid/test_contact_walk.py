@@ -194,7 +194,7 @@ def test_single_support_agrees_with_scipys_radau_on_the_compiled_motion():
 
     samples = walked(steps=1, interval=0.02, tolerance=1e-9).samples
     chosen = samples.time_s < 0.21
-    assert samples.carried[chosen].all()
+    assert samples.has_ground[chosen].all()
     peer = solve_ivp(
         fun, (0.0, 0.2), start, method="Radau", jac=jac, rtol=1e-10, atol=1e-12, t_eval=samples.time_s[chosen]
     )

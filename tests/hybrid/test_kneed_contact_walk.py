@@ -232,7 +232,7 @@ def test_its_own_gait_is_found_on_the_section_and_is_the_one_that_a_long_walk_se
     assert gait.step.length_m == pytest.approx(walk.lengths_m[-1], abs=1e-6)
     assert gait.step.slip_m == pytest.approx(walk.slip_m[-2], abs=1e-6)
     assert gait.stable
-    assert gait.step.books_J.sum() == pytest.approx(gait.step.height_lost_J, rel=1e-6)
+    assert gait.step.dissipated_J.sum() == pytest.approx(gait.step.height_lost_J, rel=1e-6)
     # what the rigid gait's are is not far off
     assert abs(gait.multipliers[0]) == pytest.approx(abs(0.35257 + 0.55221j), abs=0.1)
 
@@ -259,4 +259,4 @@ def test_a_round_foots_start_rolls_and_stands():
     scene = scene_of(radius=0.2)
     y = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     stance = feet_motion(scene.walker, y)[1]
-    np.testing.assert_allclose((stance.slip, stance.climb, stance.height), 0.0, atol=1e-14)
+    np.testing.assert_allclose((stance.slip, stance.vertical_velocity, stance.height), 0.0, atol=1e-14)

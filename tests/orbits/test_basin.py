@@ -10,7 +10,7 @@ from walkerlab.orbits.basin import (
     CAPTURE,
     NONE,
     Attractors,
-    Cycle,
+    PeriodicAttractor,
     Window,
     arrivals,
     edge_cells,
@@ -105,7 +105,7 @@ def test_a_walk_that_reaches_nothing_ends_after_the_most_steps():
 
 
 def test_the_nearest_attractor_counts():
-    far, near = Cycle(np.array([[1.0, 0.0, 0.0]]), 0.5), Cycle(GAIT[None, :], 1e-3)
+    far, near = PeriodicAttractor(np.array([[1.0, 0.0, 0.0]]), 0.5), PeriodicAttractor(GAIT[None, :], 1e-3)
     found = arrivals(UNIT, Attractors((far, near)), GAIT[None, :], 7)
     assert (found.steps[0], found.attractor[0]) == (1, 1)
 

@@ -19,7 +19,7 @@ from walkerlab.orbits.attractors import (
 from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import Follower, Limits, Seed, Span, period_amplitude
+from walkerlab.orbits.families import BranchFollower, Limits, Seed, ValueSpan, period_amplitude
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_maps import RigidMap, multipliers_of, walk_steps
@@ -68,7 +68,7 @@ def period_three_start(follower):
 
 @cache
 def family(walker_at, least, most, at, periods):
-    follower = Follower(map_of(walker_at, most - least), Span(least, most))
+    follower = BranchFollower(map_of(walker_at, most - least), ValueSpan(least, most))
     return follower.family(seeds_at(walker_at, at), periods)
 
 
@@ -257,7 +257,7 @@ def between_the_first_flip_and_the_branch_beyond_it():
     one = next(branch for branch in compass_family() if branch.period == 1 and branch.stable_ranges)
     two = next(branch for branch in compass_family() if branch.period == 2)
     slope = 0.5 * (two.ends[0].value + two.points[0].value)
-    follower = Follower(map_of(paper_walker, 0.1 - 1e-4), Span(1e-4, 0.1), limits=Limits(points=12))
+    follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), limits=Limits(points=12))
     walked = settled(follower.step_map, one.points[-1].z, slope, 400, 2)
     return follower, Seed(walked.last, slope, 2)
 
@@ -282,7 +282,7 @@ def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to
     nearest = min(one.points, key=lambda point: abs(point.value - slope))
     there = settled(step_map, nearest.z, slope, 300, 40)
     assert there.period == 2
-    follower = Follower(step_map, Span(1e-4, 0.1))
+    follower = BranchFollower(step_map, ValueSpan(1e-4, 0.1))
     assert follower.lies_on(two, follower.solved_at(there.last, slope, 2))
 
 
@@ -299,7 +299,7 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
 
 
 def test_a_gait_of_three_steps_is_born_in_a_fold():
-    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1))
+    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1))
     start = period_three_start(follower)
     (branch,) = [b for b in follower.family([start], 3) if b.period == 3]
     (fold,) = [one for one in branch.bifurcations if one.kind == "fold"]
@@ -315,7 +315,7 @@ def test_curves_of_flips_pass_through_flips_located_for_other_masses():
 
     branch = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     (flip,) = branch.bifurcations
-    curve = curve_through(flip, 1, map_at, (Span(1e-4, 0.1), Span(9.0, 12.0)), 10.0, 40)
+    curve = curve_through(flip, 1, map_at, (ValueSpan(1e-4, 0.1), ValueSpan(9.0, 12.0)), 10.0, 40)
     index = int(np.argmax(curve.second))
     heavy = curve.second[index]
     assert heavy == 12.0
@@ -328,14 +328,14 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
     def walker_at(mass):
         return paper_walker(0.05)._replace(hip_mass=mass) if mass < 13.0 else None
 
-    follower = Follower(map_of(walker_at, 10.0), Span(8.0, 18.0))
+    follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
     assert branch.ends[1].reason == "no walker has the parameter's next value"
     assert 12.5 < branch.ends[1].value < 13.0
 
 
 def test_a_branch_that_uses_up_its_points_says_so():
-    follower = Follower(map_of(paper_walker, 0.1), Span(1e-4, 0.1), limits=Limits(points=5))
+    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), limits=Limits(points=5))
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "5 points are used up" for end in branch.ends)
 

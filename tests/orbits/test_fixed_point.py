@@ -11,7 +11,7 @@ from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, b
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.random_starts import NEW, NOWHERE, follow_starts, known_gaits
-from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.slope_branch import SlopeBranch
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton
 from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
@@ -122,7 +122,7 @@ def test_the_same_seed_draws_the_same_starts():
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
     search = Search(assembled(PAPER), SearchSettings())
     work = []
-    branch = Branch(search.looking, seeds(search.walker)[0])
+    branch = SlopeBranch(search.looking, seeds(search.walker)[0])
     correct = branch._corrected
 
     def counted(points, s):

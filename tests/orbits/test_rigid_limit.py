@@ -9,8 +9,8 @@ from walkerlab.config.loader import load
 from walkerlab.orbits.rigid_limit import (
     ALL,
     STICTION,
+    ContactFactors,
     Distance,
-    Setting,
     extrapolated,
     observed_orders,
     series_of,
@@ -22,7 +22,7 @@ from walkerlab.scene.contact import contact_scene
 def distances(periods, ratio):
     """Settings each `ratio` times as rigid as the one before."""
     return [
-        Distance(Setting("made up", ratio**i, 1.0, 1.0, 1.0), period, 0.3, 0.0, 0.0, 0.0, 0.0)
+        Distance(ContactFactors("made up", ratio**i, 1.0, 1.0, 1.0), period, 0.3, 0.0, 0.0, 0.0, 0.0)
         for i, period in enumerate(periods)
     ]
 

@@ -31,7 +31,7 @@ def test_the_walk_starts_with_the_stance_foot_just_touching_and_rolling(radius, 
     start = start_state(scene, rigid)
     swing, stance = feet_motion(scene.walker, start)
     np.testing.assert_allclose((stance.along, stance.height), 0.0, atol=1e-14)
-    np.testing.assert_allclose((stance.slip, stance.climb), 0.0, atol=1e-13)
+    np.testing.assert_allclose((stance.slip, stance.vertical_velocity), 0.0, atol=1e-13)
     assert (start[2:4], start[6:]) == (rigid[:2], rigid[2:])
     # legs of one length with their balls on the slope: symmetric to its normal, so the other ball touches too
     assert swing.height == pytest.approx(0.0, abs=1e-14)

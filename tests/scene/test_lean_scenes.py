@@ -100,8 +100,8 @@ def test_a_foot_out_of_reach_moves_as_over_no_ground(state, clearance):
     walker = walker_with()
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)
-    carried = (foot != 0, foot != 1)
-    assert derivative(OnGround(walker, carried), 0.0, y) == derivative(OnGround(walker, BOTH), 0.0, y)
+    has_ground = (foot != 0, foot != 1)
+    assert derivative(OnGround(walker, has_ground), 0.0, y) == derivative(OnGround(walker, BOTH), 0.0, y)
 
 
 @given(state=states)
@@ -123,12 +123,12 @@ def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
 
 
 def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
-    """The same steps to the last bit, where no step ends at a join of the friction law."""
+    """The same steps to the last bit, where no step ends at a switching point of the friction law."""
     ends = []
     for law in (NO_FRICTION, Frictionless()):
         scene = contact_scene(load(None, ()).config, 0.3714)
         walker = scene.walker._replace(friction=law)
-        ground = scene.ground._replace(frame=scene.frame._replace(locate_joins=False))
+        ground = scene.ground._replace(frame=scene.frame._replace(locate_switching=False))
         methods = MethodSettings(method_named("radau5"), 1e-7, 1e-9, 10**6)
         walk = walk_contact(walker, ground, None, STANCE_FOOT, start_state(scene, START), methods, 2, 0.01)
         ends.append((walk.outcome, walk.end_time_s, walk.end_state, walk.samples.states.tolist(), walk.work.tolist()))

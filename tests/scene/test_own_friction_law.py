@@ -13,7 +13,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.orbits.contact_gait import softened, why_there_is_none
+from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity
 from walkerlab.orbits.rigid_limit import STICTION, series_of, with_contact_of
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures
 from walkerlab.stages.contact_sim import tell_unresolved_slip
@@ -86,7 +86,7 @@ def test_a_result_names_the_law_that_walked(own):
 
 
 def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
-    stiff = softened(own.walker, 1.0).friction.v_0
+    stiff = with_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
     setting = series_of(STICTION)[-1]
     assert with_contact_of(own.walker, setting).friction.v_0 == pytest.approx(0.1 * setting.stiction)

@@ -18,15 +18,15 @@ DEGREE = 7
 EITHER = 0
 
 
-def finder_on(*signals, degree=DEGREE):
-    finder = new_crossing_finder(degree, len(signals))
-    for row, signal in enumerate(signals):
-        finder.values[row] = signal(finder.nodes)
+def finder_on(*event_functions, degree=DEGREE):
+    finder = new_crossing_finder(degree, len(event_functions))
+    for row, event in enumerate(event_functions):
+        finder.values[row] = event(finder.nodes)
     return finder
 
 
-def crossing(signal, direction=EITHER, after=0.0, zero_at_start=False):
-    return first_crossing(finder_on(signal), 0, direction, after, zero_at_start)
+def crossing(event, direction=EITHER, after=0.0, zero_at_start=False):
+    return first_crossing(finder_on(event), 0, direction, after, zero_at_start)
 
 
 def with_roots(*roots, sign=1.0):
@@ -38,26 +38,26 @@ def test_a_single_crossing_is_found():
 
 
 def test_a_double_crossing_inside_one_step_is_found():
-    signal = with_roots(0.4, 0.41)
-    assert signal(0.0) > 0.0
-    assert signal(1.0) > 0.0
-    assert crossing(signal) == pytest.approx(0.4, abs=1e-12)
-    assert crossing(signal, RISING) == pytest.approx(0.41, abs=1e-12)
+    event = with_roots(0.4, 0.41)
+    assert event(0.0) > 0.0
+    assert event(1.0) > 0.0
+    assert crossing(event) == pytest.approx(0.4, abs=1e-12)
+    assert crossing(event, RISING) == pytest.approx(0.41, abs=1e-12)
 
 
 def test_a_triple_crossing_inside_one_step_is_found_one_after_another():
-    signal = with_roots(0.2, 0.5, 0.50001)
-    first = crossing(signal)
-    second = crossing(signal, after=first + 1e-9)
-    third = crossing(signal, after=second + 1e-9)
+    event = with_roots(0.2, 0.5, 0.50001)
+    first = crossing(event)
+    second = crossing(event, after=first + 1e-9)
+    third = crossing(event, after=second + 1e-9)
     assert (first, second, third) == pytest.approx((0.2, 0.5, 0.50001), abs=1e-9)
-    assert crossing(signal, after=third + 1e-9) == NO_CROSSING
+    assert crossing(event, after=third + 1e-9) == NO_CROSSING
 
 
 def test_direction_chooses_among_crossings():
-    signal = with_roots(0.2, 0.6, sign=-1.0)
-    assert crossing(signal, RISING) == pytest.approx(0.2, abs=1e-13)
-    assert crossing(signal, FALLING) == pytest.approx(0.6, abs=1e-13)
+    event = with_roots(0.2, 0.6, sign=-1.0)
+    assert crossing(event, RISING) == pytest.approx(0.2, abs=1e-13)
+    assert crossing(event, FALLING) == pytest.approx(0.6, abs=1e-13)
     assert crossing(with_roots(0.5), FALLING) == NO_CROSSING
 
 
@@ -70,8 +70,8 @@ def test_a_signal_that_touches_zero_and_turns_back_does_not_cross():
 def test_a_zero_at_the_start_is_not_found_again():
     # what the event before left behind: zero but for rounding, of either sign
     for rounding in (0.0, 1e-17, -1e-17):
-        signal = with_roots(0.0, 1.5) + rounding
-        assert crossing(signal, zero_at_start=True) == NO_CROSSING
+        event = with_roots(0.0, 1.5) + rounding
+        assert crossing(event, zero_at_start=True) == NO_CROSSING
 
 
 def test_a_zero_at_the_start_does_not_hide_a_crossing_right_behind_it():
@@ -117,13 +117,13 @@ separate_roots = st.lists(st.integers(1, 999), min_size=0, max_size=DEGREE, uniq
 @given(separate_roots, st.sampled_from([-1.0, 1.0]), st.sampled_from([FALLING, RISING, EITHER]))
 def test_every_crossing_is_found_in_order(thousandths, sign, direction):
     roots = sorted(number / 1000.0 for number in thousandths)
-    signal = with_roots(*roots, sign=sign) if roots else Polynomial([sign])
-    slopes = [np.sign(signal.deriv()(root)) for root in roots]
+    event = with_roots(*roots, sign=sign) if roots else Polynomial([sign])
+    slopes = [np.sign(event.deriv()(root)) for root in roots]
     # neighbours at 0.001 make values of 1e-21: leave out what rounding decides
-    assume(all(abs(signal.deriv()(root)) > 1e-9 for root in roots))
+    assume(all(abs(event.deriv()(root)) > 1e-9 for root in roots))
     wanted = [root for root, slope in zip(roots, slopes, strict=True) if direction in (EITHER, slope)]
     found, after = [], 0.0
-    while (fraction := crossing(signal, direction, after)) <= 1.0:
+    while (fraction := crossing(event, direction, after)) <= 1.0:
         found.append(fraction)
         after = fraction + 1e-6
     assert found == pytest.approx(wanted, abs=1e-6)

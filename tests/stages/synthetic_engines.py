@@ -3,11 +3,11 @@
 import numpy as np
 
 from walkerlab.benchmarks.engines.experiments import Truth
-from walkerlab.benchmarks.engines.rows import Row, SwingRow, TuningRow
+from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages import engines
-from walkerlab.stages.engines import Findings
+from walkerlab.stages.engines import EngineFindings
 
 PERIOD, LENGTH = 0.711, 0.3608
 
@@ -16,7 +16,7 @@ def row(engine, integrator, experiment, step_s, error, wall_s, period_s, steps=1
     length = None if period_s is None else LENGTH
     tolerance = 1e-7 if engine == "walkerlab" else None
     touch = 1e-4 if experiment == "same-law" else None
-    return Row(
+    return EngineRow(
         "compass", engine, "1.0", experiment, integrator, start, step_s, tolerance, error, touch, wall_s,
         period_s, length, None if period_s is None else 1e-3, steps, outcome,
     )  # fmt: skip
@@ -71,5 +71,5 @@ def truth():
 
 
 def content(rows=ROWS):
-    found = Findings(list(rows), list(SWINGS), list(TUNING), {"compass": truth()}, [])
+    found = EngineFindings(list(rows), list(SWINGS), list(TUNING), {"compass": truth()}, [])
     return engines.content(found, {"period_s": 0.7036, "step_length_m": 0.3714})

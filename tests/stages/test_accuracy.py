@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from walkerlab.benchmarks import ladder
-from walkerlab.benchmarks.ladder import Climb, Row, Run, climb, finished, left_of, measure, row_of
+from walkerlab.benchmarks.ladder import (
+    Ascent,
+    MethodRow,
+    MethodRun,
+    ascend,
+    finished,
+    left_of,
+    measure,
+    row_of,
+)
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
@@ -29,7 +38,7 @@ def reference():
 
 
 def measured(method, rtol, reference):
-    one = Climb(TRIAL, method, LADDER, (), unfinished=False)
+    one = Ascent(TRIAL, method, LADDER, (), unfinished=False)
     return row_of(one, measure(TRIAL, method, rtol, 10**5), reference)
 
 
@@ -75,7 +84,7 @@ def test_content_is_the_same_each_time_apart_from_timings(reference, rows):
 
 
 def test_timings_are_marked_as_such(rows):
-    variables = rows_group(rows, labels_of(Row)).variables
+    variables = rows_group(rows, labels_of(MethodRow)).variables
     assert {name for name, variable in variables.items() if variable.timing} == {"wall_s", "least_wall_s", "repeats"}
 
 
@@ -90,14 +99,14 @@ def test_no_method_is_measured_by_its_own_end(rows, reference):
 def test_an_error_below_what_the_reference_is_known_to_is_marked():
     unsure = Reference(End("heyoka-taylor", np.zeros(4)), End("dop853", np.full(4, 1e-8)))
     ends = {1e-4: 2e-8, 1e-8: 1e-9}
-    climbed = Climb(TRIAL, "radau5", tuple(ends), (), unfinished=False)
-    runs = [Run(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
+    climbed = Ascent(TRIAL, "radau5", tuple(ends), (), unfinished=False)
+    runs = [MethodRun(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
     assert [row_of(climbed, run, unsure).within_reference for run in runs] == [False, True]
 
 
 def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
     monkeypatch.setattr(ladder, "BUDGET", 500)
-    one = climb(TRIAL, "radau5")
+    one = ascend(TRIAL, "radau5")
     rows = [row_of(one, run, reference) for run in one.runs]
     assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
     assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
@@ -108,12 +117,12 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
-    whole = [run.result.rhs_evaluations for run in climb(TRIAL, "scipy-dop853").runs]
+    whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853").runs]
     monkeypatch.setattr(ladder, "SHORT", whole[2] - 1)
-    short = climb(TRIAL, "scipy-dop853")
+    short = ascend(TRIAL, "scipy-dop853")
     assert short.unfinished
     assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
-    other = climb(TRIAL, "dop853")
+    other = ascend(TRIAL, "dop853")
     (end,), (made_good, same) = finished([TRIAL], [short, other], jobs)
     assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
     assert len(left_of(made_good)) == len(ladder.LIBRARY_LADDER) - 3
@@ -141,13 +150,13 @@ class SlowAtFirst:
 def test_compiling_is_not_measured(reference, monkeypatch):
     trial = SlowAtFirst()
     monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
-    rows = [row_of(one, run, reference) for one in (climb(trial, "dop853"),) for run in one.runs]
+    rows = [row_of(one, run, reference) for one in (ascend(trial, "dop853"),) for run in one.runs]
     assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
     assert {row.repeats_of_wall_s for row in rows} == {ladder.REPEATS}
 
 
 def made(method, error, wall_s):
-    return Row("rigid", method, 1e-6, "walked", error, "heyoka-taylor", False, wall_s, wall_s, 7, 100, 10, 0)
+    return MethodRow("rigid", method, 1e-6, "walked", error, "heyoka-taylor", False, wall_s, wall_s, 7, 100, 10, 0)
 
 
 MADE = [

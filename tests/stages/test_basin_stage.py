@@ -10,7 +10,7 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.stages import basin
-from walkerlab.stages.basin_pieces import Found, RigidQuestion, unpacked
+from walkerlab.stages.basin_pieces import RigidQuestion, WalkEnds, unpacked
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content
@@ -175,7 +175,7 @@ def test_a_bad_block_is_refused_in_words(setting, said):
 
 
 def test_numbers_of_cells_read_back():
-    found = Found(np.array([0, 1, 8]), np.array([-1, 3, 0]), np.array([300, 0, 12]))
+    found = WalkEnds(np.array([0, 1, 8]), np.array([-1, 3, 0]), np.array([300, 0, 12]))
     again = unpacked(np.array(found.packed()))
     assert [column.tolist() for column in (again.outcome, again.attractor, again.steps)] == [
         [0, 1, 8],

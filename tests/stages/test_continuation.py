@@ -146,7 +146,7 @@ def test_bad_questions_end_in_words(sets, said):
 def follow_coarsely(*sets):
     """With the attractor at fewer values, and without gaits of other numbers of steps than 1, 2, 4."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(continuation, "RIGID_SAMPLES", continuation.Samples(36, 500, 96, 12, 400))
+        patch.setattr(continuation, "RIGID_SAMPLES", continuation.AttractorSampling(36, 500, 96, 12, 400))
         patch.setattr(continuation, "OTHER_PERIODS", ())
         patch.setattr(continuation, "STARTS", 0)
         return follow(*sets, "periods=4").summary

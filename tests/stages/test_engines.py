@@ -7,7 +7,7 @@ from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.benchmarks.engines import registry
 from walkerlab.benchmarks.engines.experiments import TOLERANCES, same_law_rows
-from walkerlab.benchmarks.engines.process import Lost
+from walkerlab.benchmarks.engines.process import TaskLost
 from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.loader import load
@@ -48,7 +48,7 @@ def test_another_version_of_an_engine_makes_another_key(monkeypatch):
 
 @dataclass
 class LosesEverything:
-    lost: Lost
+    lost: TaskLost
     asked: int = 0
 
     def do(self, _task, _timeout_s):
@@ -58,7 +58,10 @@ class LosesEverything:
 
 @pytest.mark.parametrize(
     ("lost", "outcome", "rungs"),
-    [(Lost("the engine's process ended with code -11"), "solver-failed", 8), (Lost("", True), "budget-exhausted", 1)],
+    [
+        (TaskLost("the engine's process ended with code -11"), "solver-failed", 8),
+        (TaskLost("", True), "budget-exhausted", 1),
+    ],
     ids=["crash", "time-out"],
 )
 def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_engines import PERIOD, ROWS, content
 
-from walkerlab.benchmarks.engines.rows import Row
+from walkerlab.benchmarks.engines.rows import EngineRow
 from walkerlab.config.loader import load
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.engines import COLOURS, FIGURES, series_of
@@ -91,7 +91,7 @@ def test_every_run_has_its_row(made):
 
 
 def test_a_column_is_stored_printed_and_shown_by_the_label_of_its_field(results, made):
-    label = labels_of(Row)["step_s"]
+    label = labels_of(EngineRow)["step_s"]
     steps = [row.step_s for row in ROWS]
     stored = results["engines"]["rows"].variables["step_s"]
     assert (stored.units, stored.long_name, stored.values.tolist()) == (label.unit, label.text, steps)
@@ -104,7 +104,7 @@ def test_a_column_is_stored_printed_and_shown_by_the_label_of_its_field(results,
 
 def test_every_number_of_a_run_is_stored_with_its_gaps(results):
     group = results["engines"]["rows"]
-    for name in labels_of(Row):
+    for name in labels_of(EngineRow):
         told = [None if value != value else value for value in group[name].tolist()]
         assert told == [getattr(row, name) for row in ROWS]
     assert {name for name in group.variables if group.variables[name].timing} == {"wall_s"}

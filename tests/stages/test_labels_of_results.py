@@ -9,7 +9,7 @@ from walkerlab.stages import fixedpoint, tune_limit, walk_columns
 from walkerlab.verification.known import Known
 from walkerlab.verification.verdict import CaseResult
 
-CLASSES = (engines.Row, engines.SwingRow, engines.TuningRow, ladder.Row, CaseResult, Known)
+CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.MethodRow, CaseResult, Known)
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,

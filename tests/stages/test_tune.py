@@ -10,7 +10,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
-from walkerlab.orbits.rigid_limit import ALL, NORMAL, Distance, Extrapolation, Setting
+from walkerlab.orbits.rigid_limit import ALL, NORMAL, ContactFactors, Distance, Extrapolation
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
@@ -209,7 +209,7 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
 
 
 def at_period(period):
-    return Distance(Setting(NORMAL, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
+    return Distance(ContactFactors(NORMAL, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
 
 
 def test_of_a_compass_that_is_not_the_papers_nothing_of_the_paper_is_told():

@@ -10,9 +10,9 @@ import pytest
 import walkerlab
 from walkerlab.config.loader import template
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.engines import Engine, Order, Pool
+from walkerlab.sweeps.engines import Order, Pool, SweepEngine
 from walkerlab.sweeps.question import asked, axis_of_text
-from walkerlab.sweeps.sweep import Sweep, Work
+from walkerlab.sweeps.sweep import SweepRun, SweepWork
 
 HERE = Path(__file__).parent
 AT = "toy_sweep.sweep_pipeline:GRAPH"
@@ -24,7 +24,7 @@ def in_this_process(_order):
         yield Pool(executor, 1)
 
 
-HERE_AND_NOW = Engine(in_this_process, chunk_s=5.0)
+HERE_AND_NOW = SweepEngine(in_this_process, chunk_s=5.0)
 
 
 class Toy:
@@ -37,10 +37,10 @@ class Toy:
     def sweep(self, stage, *over, config=None, sets=(), **options):
         read = template(config, sets)
         question = asked(stage, [axis_of_text(text) for text in over], **options)
-        return Sweep(question, read, RunFolder(self.runs, read.base.run_name), self.graph)
+        return SweepRun(question, read, RunFolder(self.runs, read.base.run_name), self.graph)
 
     def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):
-        work = Work(engine, order or Order(), chunk_s, force=force, graph=AT)
+        work = SweepWork(engine, order or Order(), chunk_s, force=force, graph=AT)
         return self.sweep(stage, *over, **options).run(work, reporter)
 
 

@@ -13,7 +13,7 @@ import pytest
 from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, Engine, Order, engine_named, one_thread_each
+from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, Order, SweepEngine, engine_named, one_thread_each
 from walkerlab.sweeps.fan_out import FanOut
 
 LOCAL = ENGINES["local"]
@@ -195,7 +195,7 @@ def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
 
 
 def test_chunks_grow_with_what_was_measured_and_shrink_towards_the_end():
-    work = FanOut(Engine(None, 5.0), Order(), 5.0, iter(()), 10_000)
+    work = FanOut(SweepEngine(None, 5.0), Order(), 5.0, iter(()), 10_000)
     assert work._chunk_size(2) == 2
     work.point_s = 0.01
     assert work._chunk_size(2) == 500

@@ -14,8 +14,8 @@ from walkerlab.scene.rigid import compass, rigid_scene, rigid_walker
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.rigid_case import time_difference
 from walkerlab.verification.rigid_momentum import RigidMasses
-from walkerlab.verification.scaling import Scale, scaled, to_twin
-from walkerlab.verification.verdict import Finding, finite
+from walkerlab.verification.scaling import TwinScale, scaled, to_twin
+from walkerlab.verification.verdict import Measure, finite
 
 PAPER = config_of(next(case for case in shipped() if case.name == "paper"))
 WALKER = rigid_walker(PAPER, "corrected")
@@ -63,14 +63,14 @@ def test_energy_won_at_a_heel_strike_is_seen(walk):
 
 
 def test_what_is_no_number_fails():
-    assert not Finding("x", math.nan, 1.0).ok
-    assert not Finding("x", finite(math.inf), 1.0).ok
-    assert Finding("x", 0.0, 0.0).ok
+    assert not Measure("x", math.nan, 1.0).ok
+    assert not Measure("x", finite(math.inf), 1.0).ok
+    assert Measure("x", 0.0, 0.0).ok
 
 
 def test_a_twin_there_and_back_is_the_walker():
     by = to_twin(PAPER)
-    back = Scale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity)
+    back = TwinScale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity)
     again = scaled(scaled(PAPER, by), back)
     assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)

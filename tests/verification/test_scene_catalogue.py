@@ -20,7 +20,7 @@ from walkerlab.store.content import Content
 from walkerlab.verification.cells import CaseCell
 from walkerlab.verification.known import Known
 from walkerlab.verification.rigid_momentum import RigidMasses
-from walkerlab.verification.scaling import Scale, scaled, to_twin
+from walkerlab.verification.scaling import TwinScale, scaled, to_twin
 from walkerlab.verification.scene_catalogue import ENDS, STOPS, scene_cases
 
 RIGHT = Known("ball", "time, s", 1.0, 1.5, "closed form", 1e-6, "tolerance", 0.1)
@@ -129,7 +129,7 @@ def test_a_twin_of_any_walker_there_and_back_is_the_walker(name, sets):
     by = to_twin(config)
     twin = scaled(config, by)
     assert twin.walker.total_mass_kg == pytest.approx(by.mass * config.walker.total_mass_kg)
-    again = scaled(twin, Scale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity))
+    again = scaled(twin, TwinScale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity))
     assert numbers_of(again.walker.model_dump()) == pytest.approx(numbers_of(config.walker.model_dump()))
 
 

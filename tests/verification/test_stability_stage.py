@@ -18,10 +18,10 @@ from walkerlab.verification.cells import CaseCell, cells_of, run_cells
 from walkerlab.verification.contact_case import judge_contact
 from walkerlab.verification.contact_start import prepared
 from walkerlab.verification.known import Known
-from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, NotMeasured
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
 
 GOOD = CaseResult(
-    "good", "own", "contact", "because", ("walked",), "walked", 4, 1e-9, 100, 0.1, (Finding("x", 0.5, 1.0),)
+    "good", "own", "contact", "because", ("walked",), "walked", 4, 1e-9, 100, 0.1, (Measure("x", 0.5, 1.0),)
 )
 BAD = replace(GOOD, name="bad", outcome="fell")
 RIGHT = Known("ball", "time, s", 1.0, 1.0, "closed form", 1e-6, "tolerance", 0.1)
@@ -72,7 +72,7 @@ def test_report_says_in_red_what_failed():
 
 
 def test_the_worst_measure_is_of_what_is_right_and_not_of_work():
-    busy = replace(GOOD, findings=(Finding(BUDGET_USED, 0.9, 1.0), Finding("x", 0.25, 1.0)))
+    busy = replace(GOOD, findings=(Measure(BUDGET_USED, 0.9, 1.0), Measure("x", 0.25, 1.0)))
     table = next(block for block in report_of(summary_of([busy], [], [])).blocks if isinstance(block, Table))
     place = [column.title for column in table.columns].index("worst measure over its limit")
     assert table.bodies[0].rows[0][place].text == "0.25"

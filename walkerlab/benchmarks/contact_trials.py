@@ -6,7 +6,7 @@ from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import Ground
+from walkerlab.hybrid.contact_run import JudgedGround
 from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
@@ -44,5 +44,5 @@ def trial_of(
     scene: ContactScene, walker: ContactWalker, state: tuple[float, ...], steps: int, name: str
 ) -> ContactTrial:
     """The trial of a walker in a scene."""
-    ground = Ground(scene.terrain, scene.frame)
+    ground = JudgedGround(scene.terrain, scene.frame)
     return ContactTrial(walker, ground, start_state(scene, state), STANCE_FOOT, steps, name)

@@ -28,7 +28,7 @@ ERROR = Label("1", "largest difference of the end state from the reference, SI u
 
 
 @dataclass(frozen=True)
-class Run:
+class MethodRun:
     """One tolerance: what it gave, and the times that it took."""
 
     tolerance: float
@@ -37,7 +37,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Climb:
+class Ascent:
     """One method on its ladder.
 
     runs        so far
@@ -48,12 +48,12 @@ class Climb:
     trial: Trial
     method: str
     ladder: tuple[float, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[MethodRun, ...]
     unfinished: bool
 
 
 @dataclass(frozen=True)
-class Row:
+class MethodRow:
     """One method at one tolerance."""
 
     scene: str
@@ -76,25 +76,25 @@ class Row:
         return int(self.error is not None)
 
 
-def climb(trial: Trial, method: str) -> Climb:
+def ascend(trial: Trial, method: str) -> Ascent:
     """Run one tolerance after the other until a run takes too much."""
     own = method in METHODS and METHODS[method].compiled
     ladder, short, last = (OWN_LADDER, BUDGET, BUDGET) if own else (LIBRARY_LADDER, min(SHORT, BUDGET), LAST)
     trial.prepare(method, ladder[0], WARM_UP)()
-    runs: list[Run] = []
+    runs: list[MethodRun] = []
     for tolerance in ladder:
         run = measure(trial, method, tolerance, short)
         if run.result.outcome == "budget-exhausted" and short < BUDGET:
-            return Climb(trial, method, ladder, tuple(runs), unfinished=True)
+            return Ascent(trial, method, ladder, tuple(runs), unfinished=True)
         runs.append(run)
         if run.result.rhs_evaluations >= last:
             break
-    return Climb(trial, method, ladder, tuple(runs), unfinished=False)
+    return Ascent(trial, method, ladder, tuple(runs), unfinished=False)
 
 
 def finished(
-    trials: Sequence[Trial], climbs: Sequence[Climb], jobs: int, long_runs: bool = True
-) -> tuple[list[End | WalkEndsError], list[Climb]]:
+    trials: Sequence[Trial], climbs: Sequence[Ascent], jobs: int, long_runs: bool = True
+) -> tuple[list[End | WalkEndsError], list[Ascent]]:
     """The first ends of the references, or why there is none, and the climbs with the run that was put off.
 
     long_runs  whether what was put off is run at all
@@ -120,20 +120,20 @@ def end_or_reason(trial: Trial) -> End | WalkEndsError:
         return problem
 
 
-def long_run(trial: Trial, method: str, tolerance: float) -> Run:
+def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
     """A run that takes long, perhaps in a process of its own that has to warm up."""
     trial.prepare(method, tolerance, WARM_UP)()
     return measure(trial, method, tolerance, BUDGET)
 
 
-def measure(trial: Trial, method: str, tolerance: float, budget: int) -> Run:
+def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Run once to warm up, then as often as time allows."""
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = timed(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
     while len(walls) < REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
         walls.append(timed(walk)[0])
-    return Run(tolerance, result, tuple(walls))
+    return MethodRun(tolerance, result, tuple(walls))
 
 
 def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
@@ -143,11 +143,11 @@ def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
     return time.perf_counter() - start, result
 
 
-def row_of(one: Climb, run: Run, reference: Reference) -> Row:
+def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     """A run with its error."""
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
-    return Row(
+    return MethodRow(
         one.trial.name,
         one.method,
         run.tolerance,
@@ -164,7 +164,7 @@ def row_of(one: Climb, run: Run, reference: Reference) -> Row:
     )
 
 
-def left_of(one: Climb) -> list[dict[str, Any]]:
+def left_of(one: Ascent) -> list[dict[str, Any]]:
     """The tolerances that were not run, and why."""
     if one.unfinished:
         why = f"more than {SHORT} right-hand sides, each in Python"

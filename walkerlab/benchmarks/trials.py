@@ -22,7 +22,7 @@ from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_co
 
 if TYPE_CHECKING:
     from walkerlab.ground.walker import ContactWalker
-    from walkerlab.hybrid.contact_run import Ground
+    from walkerlab.hybrid.contact_run import JudgedGround
 
 Floats = NDArray[np.float64]
 USER_SCRIPT = "scipy-dop853-numpy"
@@ -108,7 +108,7 @@ class ContactTrial:
     """Steps on compliant ground; the end state is that at the last touch."""
 
     walker: ContactWalker
-    ground: Ground
+    ground: JudgedGround
     start: tuple[float, ...]
     stance: int
     steps: int
@@ -130,7 +130,7 @@ class ContactTrial:
         from walkerlab.hybrid.contact_run import walk_contact
 
         result = walk_contact(
-            self.walker, self.ground, None, self.stance, self.start, settings, self.steps, None, booked=False
+            self.walker, self.ground, None, self.stance, self.start, settings, self.steps, None, track_energy=False
         )
         return finished(result.outcome, np.array(result.end_state), result.work)
 

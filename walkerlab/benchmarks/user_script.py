@@ -15,7 +15,7 @@ from walkerlab.paper.appendix_a import RigidWalker, impact
 Floats = NDArray[np.float64]
 
 
-class OutOfBudgetError(Exception):
+class ScriptBudgetError(Exception):
     """Ends a run that has used up its right-hand sides."""
 
 
@@ -45,7 +45,7 @@ def walk_as_a_script(
         nonlocal used
         used += 1
         if used > budget:
-            raise OutOfBudgetError
+            raise ScriptBudgetError
         th1, th2, w1, w2 = x
         sine, cosine = np.sin(th2 - th1), np.cos(th2 - th1)
         D = np.array([[m * b**2, -m * L * b * cosine], [-m * L * b * cosine, M * L**2 + m * (L**2 + a**2)]])
@@ -69,6 +69,6 @@ def walk_as_a_script(
             if not swing.t_events[0].size:
                 return None, used
             state = np.array(impact(walker, *swing.y[:, -1].tolist()))
-    except OutOfBudgetError:
+    except ScriptBudgetError:
         return None, used
     return state, used

@@ -12,7 +12,7 @@ from walkerlab.cli.options import RUNS, AsJson, Runs, Verbose
 from walkerlab.stages.graph import Graph
 
 if TYPE_CHECKING:
-    from walkerlab.stages.runs import Difference, Pair, RunSummary
+    from walkerlab.stages.runs import Pair, RunDifference, RunSummary
 
 SAME = 1e-12
 """Relative change below which two numbers are shown as the same."""
@@ -63,7 +63,7 @@ def draw(folders: tuple[Any, Any], results: list[dict[str, Any]]) -> list[Path]:
     return paths
 
 
-def as_object(folders: tuple[Any, Any], found: Difference, figures: list[Path]) -> dict[str, Any]:
+def as_object(folders: tuple[Any, Any], found: RunDifference, figures: list[Path]) -> dict[str, Any]:
     """A difference as JSON."""
     return {
         "stage": "diff",
@@ -81,7 +81,7 @@ def as_object(folders: tuple[Any, Any], found: Difference, figures: list[Path]) 
     }
 
 
-def lines(folders: tuple[Any, Any], found: Difference, figures: list[Path], verbose: bool) -> list[str]:
+def lines(folders: tuple[Any, Any], found: RunDifference, figures: list[Path], verbose: bool) -> list[str]:
     """A difference for people: what differs, and with `verbose` what does not."""
     from walkerlab.cli.text import in_words
     from walkerlab.report.tables import aligned

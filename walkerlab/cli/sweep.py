@@ -83,7 +83,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.cli.request import Request
             from walkerlab.sweeps.engines import Order, engine_named
             from walkerlab.sweeps.question import axis_of_text
-            from walkerlab.sweeps.sweep import Sweep, Work, modules_of
+            from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
             request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
             chosen, address = engine_named(engine)
@@ -98,13 +98,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 options=options_of(engine_option or ()),
             )
             if dry_run:
-                asked = Sweep(question, template, request.folder, graph)
+                asked = SweepRun(question, template, request.folder, graph)
                 show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
                 return
             with chosen.begun(order) as begun:
-                asked = Sweep(question, template, request.folder, graph)
+                asked = SweepRun(question, template, request.folder, graph)
                 load_meanwhile("walkerlab.sweeps.drawing")
-                work = Work(begun, order, chunk_seconds, not no_wait, force, where(graph))
+                work = SweepWork(begun, order, chunk_seconds, not no_wait, force, where(graph))
                 swept = asked.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
 

@@ -14,7 +14,7 @@ SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ConfigSetting:
     """One `--set KEY=VALUE`.
 
     path      parts of the dotted key
@@ -61,7 +61,7 @@ def _refuse_two_slopes(layer: Mapping) -> None:
     raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
 
 
-def parse_settings(texts: Sequence[str]) -> list[Setting]:
+def parse_settings(texts: Sequence[str]) -> list[ConfigSetting]:
     """The `--set` options.
 
     Raises ConfigError if one is not KEY=VALUE with a YAML value.
@@ -69,7 +69,7 @@ def parse_settings(texts: Sequence[str]) -> list[Setting]:
     return [_setting(text) for text in texts]
 
 
-def _setting(text: str) -> Setting:
+def _setting(text: str) -> ConfigSetting:
     key, equals, value = text.partition("=")
     source = f"--set {shown(text)}"
     start = Position(source, 1, 1)
@@ -80,16 +80,16 @@ def _setting(text: str) -> Setting:
         raise refusal([Problem(start, f"nested deeper than {MAX_DEPTH} levels")])
     column = len(key) + 2
     node = read(value, source, column)
-    return Setting(path, node or Scalar(Position(source, 1, column), None, ""), start)
+    return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
 
 
-def strides_setting(strides: int) -> Setting:
+def strides_setting(strides: int) -> ConfigSetting:
     """The `--strides` option."""
     position = Position(f"--strides {strides}", 1, 1)
-    return Setting(("strides",), Scalar(position, strides, str(strides)), position)
+    return ConfigSetting(("strides",), Scalar(position, strides, str(strides)), position)
 
 
-def with_settings(tree: Mapping, settings: Sequence[Setting]) -> Mapping:
+def with_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
     """`tree` with each setting in its place, in order; a list or a block is replaced whole.
 
     Raises ConfigError if a setting goes into something that is no block.
@@ -102,7 +102,7 @@ def with_settings(tree: Mapping, settings: Sequence[Setting]) -> Mapping:
     return tree
 
 
-def _refuse_slopes_in_conflict(settings: Sequence[Setting]) -> None:
+def _refuse_slopes_in_conflict(settings: Sequence[ConfigSetting]) -> None:
     """Raise ConfigError if the slope is set in radians and in degrees."""
     given = {setting.path[0]: setting.position for setting in settings if setting.path[0] in SLOPE_KEYS}
     if len(given) == len(SLOPE_KEYS):
@@ -110,7 +110,7 @@ def _refuse_slopes_in_conflict(settings: Sequence[Setting]) -> None:
         raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
 
 
-def _placed(block: Mapping, setting: Setting, depth: int) -> Mapping:
+def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
     result = block.without()
     name = setting.path[depth]
     if depth == len(setting.path) - 1:

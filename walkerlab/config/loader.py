@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import Setting, parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.layers import ConfigSetting, parse_settings, stacked, strides_setting, with_settings
 from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
@@ -60,7 +60,7 @@ class Template:
     base: LoadedConfig
     tree: Mapping
 
-    def variant(self, settings: Sequence[Setting]) -> Config:
+    def variant(self, settings: Sequence[ConfigSetting]) -> Config:
         """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
         tree = with_settings(self.tree, settings)
         return on_the_slope(typed(tree), tree)[0]

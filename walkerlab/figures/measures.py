@@ -49,7 +49,7 @@ class Mass:
 
 
 @dataclass(frozen=True)
-class Upright:
+class UprightLeg:
     """One leg upright over its sole, which is at the origin; lengths in m.
 
     joints  the leg's line from the hip down, without the sole
@@ -86,7 +86,7 @@ def weighing(prefix: str, mass_kg: float, inertia_kg_m2: float) -> tuple[str, ..
     return (said(f"{prefix}mass_kg", mass_kg), *turning)
 
 
-def upright(walker: CompassWalker | StraightLegs | Kneed) -> Upright:
+def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     """What is drawn of a walker of a type."""
     if isinstance(walker, Kneed):
         return upright_kneed(walker)
@@ -103,7 +103,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> Upright:
             Measure("leg_mass_ahead_m", walker.leg_mass_ahead_m, (0.0, mass[1]), mass),
             Measure("foot_centre_ahead_m", walker.foot_centre_ahead_m, (0.0, radius), centre),
         )
-    return Upright(
+    return UprightLeg(
         (hip,),
         centre,
         radius,
@@ -116,13 +116,13 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> Upright:
     )
 
 
-def upright_kneed(walker: Kneed) -> Upright:
+def upright_kneed(walker: Kneed) -> UprightLeg:
     """A leg of thigh and shank, in line."""
     thigh, shank, radius = walker.thigh, walker.shank, walker.foot_radius_m
     hip, knee, sole, centre = (0.0, walker.leg_length_m), (0.0, shank.length_m), (0.0, 0.0), (0.0, radius)
     upper = (thigh.mass_ahead_m, hip[1] - thigh.mass_below_hip_m)
     lower = (shank.mass_ahead_m, knee[1] - shank.mass_below_knee_m)
-    return Upright(
+    return UprightLeg(
         (hip, knee),
         centre,
         radius,
@@ -149,13 +149,13 @@ def sole_radius(radius: float, centre: Point) -> Measure:
     return Measure("foot_radius_m", radius, centre, (centre[0], 0.0))
 
 
-def with_torso(leg: Upright, torso: Torso) -> Upright:
+def with_torso(leg: UprightLeg, torso: Torso) -> UprightLeg:
     """The leg's measures and masses with those of the torso above it."""
     hip = leg.joints[0]
     head = (hip[0], hip[1] + torso.above_hip_m)
     measure = Measure("torso.above_hip_m", torso.above_hip_m, head, hip)
     mass = Mass(weighing("torso.", torso.mass_kg, torso.inertia_kg_m2), head)
-    return Upright(leg.joints, leg.centre, leg.radius, (measure, *leg.measures), (mass, *leg.masses), torso)
+    return UprightLeg(leg.joints, leg.centre, leg.radius, (measure, *leg.measures), (mass, *leg.masses), torso)
 
 
 def drawn(walker: AnyWalker, name: str) -> bytes:
@@ -185,7 +185,7 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     return figure
 
 
-def bare(figure: Figure, leg: Upright) -> Axes:
+def bare(figure: Figure, leg: UprightLeg) -> Axes:
     """Axes of equal scales without ticks that fit the walker."""
     top = leg.length + (0.0 if leg.torso is None else leg.torso.above_hip_m)
     axes = figure.add_subplot()
@@ -215,7 +215,7 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
 
 
-def other_leg(axes: Axes, leg: Upright) -> None:
+def other_leg(axes: Axes, leg: UprightLeg) -> None:
     """The other leg, off the ground behind, its knee bent if it has one."""
     line, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
     for angle, above, below in zip(angles, leg.joints, leg.line[1:], strict=True):
@@ -229,7 +229,7 @@ def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 
 
-def draw_heights(axes: Axes, leg: Upright) -> None:
+def draw_heights(axes: Axes, leg: UprightLeg) -> None:
     """Measures from a point to one below it, each in the first lane that has room."""
     lanes: list[list[tuple[float, float]]] = []
     heights = [one for one in leg.measures if one.start[1] != one.end[1] and one.value > SMALL_ARC * leg.length]
@@ -247,7 +247,7 @@ def draw_heights(axes: Axes, leg: Upright) -> None:
         axes.text(*place, said(measure.key, measure.value), color=BLUE, fontsize=SMALL, va="center")
 
 
-def draw_sideways(axes: Axes, leg: Upright) -> None:
+def draw_sideways(axes: Axes, leg: UprightLeg) -> None:
     """Measures from the leg's line to a point ahead of it; those that are zero are left out."""
     for measure in leg.measures:
         if measure.start[1] != measure.end[1] or not measure.value:
@@ -257,7 +257,7 @@ def draw_sideways(axes: Axes, leg: Upright) -> None:
         axes.text(*place, said(measure.key, measure.value), color=VERMILLION, fontsize=SMALL, ha="right")
 
 
-def draw_masses(axes: Axes, leg: Upright) -> None:
+def draw_masses(axes: Axes, leg: UprightLeg) -> None:
     """Masses with their words to the left; the sole's centre if there is room."""
     for mass in leg.masses:
         axes.plot(*mass.at, marker="o", markersize=8, color=GREEN, zorder=5)

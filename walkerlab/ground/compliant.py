@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.ground.friction import FrictionLaw
-from walkerlab.ground.held import Held, IdealLock, Independent, Knees, NoKnees, always_held, no_stops
+from walkerlab.ground.held import Held, IdealLock, Knees, NoKnees, NoneHeld, always_held, no_stops
 from walkerlab.ground.merged import Unmerged, with_merged_bodies
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned
@@ -65,10 +65,10 @@ def contact_walker(
     return with_merged_bodies(walker)
 
 
-def held_bodies(assembly: Assembly) -> Held | Independent:
+def held_bodies(assembly: Assembly) -> Held | NoneHeld:
     """Which bodies follow others, always by a coupling or while a knee is locked."""
     if not assembly.knees and not assembly.couplings:
-        return Independent()
+        return NoneHeld()
     n = len(assembly.bodies)
     weights, always = np.zeros((n, n)), np.zeros(n, bool)
     for knee in assembly.knees:

@@ -35,12 +35,12 @@ def foot_elastic_energy(walker: ContactWalker, foot: int, y: State) -> float:
 
 
 @inlined
-def book_energy(walker: ContactWalker, carried: tuple[bool, bool], y: State) -> float:
-    """Mechanical energy (J) of the books: kinetic, potential from a fixed origin, elastic."""
+def total_energy(walker: ContactWalker, has_ground: tuple[bool, bool], y: State) -> float:
+    """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
     total = kinetic_energy(walker, y) + potential_energy(walker, y)
-    if carried[0]:
+    if has_ground[0]:
         total += foot_elastic_energy(walker, 0, y)
-    if carried[1]:
+    if has_ground[1]:
         total += foot_elastic_energy(walker, 1, y)
     return total
 
@@ -53,5 +53,5 @@ def dissipated_power(walker: ContactWalker, foot: int, y: State) -> tuple[float,
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
     force = foot_force(walker, motion)
-    damping = -(force.normal.force - force.normal.spring) * motion.climb
+    damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
     return damping, -force.along * motion.slip, force.normal.force

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.ground.friction import FrictionLaw
-from walkerlab.ground.held import Independent, NoKnees
+from walkerlab.ground.held import NoKnees, NoneHeld
 from walkerlab.ground.merged import Unmerged
 from walkerlab.ground.motion import OnGround, all_wrenches
 from walkerlab.ground.normal_force import NormalLaw
@@ -37,7 +37,7 @@ def from_arrays(levers: Any, numbers: Any, friction: Any, state: State, angles: 
     second = Foot(load(levers, 3, angles), load(levers, 4, angles), load(levers, 5, angles), numbers[2])
     normal = NormalLaw(numbers[3], numbers[4], numbers[5], numbers[6])
     tree = Tree(0.0, angles, angles, angles, angles)
-    straight = (Independent(), NoKnees(), LEGS, state, Unmerged())
+    straight = (NoneHeld(), NoKnees(), LEGS, state, Unmerged())
     return ContactWalker(tree, (first, second), normal, friction, 0.0, 0.0, numbers[0], *straight)
 
 
@@ -65,7 +65,7 @@ def feet_and_forces(
     state: State,
     angles: Any,
     chain: Any,
-    carried: Any,
+    has_ground: Any,
     q: Any,
     v: Any,
     feet: Any,
@@ -76,7 +76,7 @@ def feet_and_forces(
     levers ...  of `in_arrays`, of a walker whose feet's levers are from the base's point
     state       zeros, as many as the state has; angles: as many as there are bodies
     chain       (n, links) which joints lie between the base and each body; bodies that move as one share theirs
-    carried     (2,) whether there is ground under each foot
+    has_ground     (2,) whether there is ground under each foot
     q, v        (2 + links) coordinates and velocities of the other program
     feet        along (m), height (m), slip (m/s), velocity of the height (m/s)
     """
@@ -87,10 +87,10 @@ def feet_and_forces(
     for foot in range(2):
         motion = foot_motion(walker, walker.feet[foot], s, c, y)
         feet[foot, 0], feet[foot, 1] = motion.along, motion.height
-        feet[foot, 2], feet[foot, 3] = motion.slip, motion.climb
+        feet[foot, 2], feet[foot, 3] = motion.slip, motion.vertical_velocity
     if forces.size == 0:
         return
-    wrench = all_wrenches(OnGround(walker, (carried[0] != 0, carried[1] != 0)), s, c, y)
+    wrench = all_wrenches(OnGround(walker, (has_ground[0] != 0, has_ground[1] != 0)), s, c, y)
     forces[0], forces[1] = wrench[0], wrench[1]
     for j in range(chain.shape[1]):
         total = 0.0

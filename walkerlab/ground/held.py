@@ -21,7 +21,7 @@ FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
 Flags = tuple[bool, ...]
 
 
-class Independent(NamedTuple):
+class NoneHeld(NamedTuple):
     """Every body turns on its own."""
 
 
@@ -88,32 +88,32 @@ def followed(held: Any, flags: Flags, rates: Vector) -> Vector:
     """E z (n): what follows gets its share."""
 
 
-@always_held.case(Independent)
-def none_always(held: Independent) -> Flags:
+@always_held.case(NoneHeld)
+def none_always(held: NoneHeld) -> Flags:
     """None."""
     return ()
 
 
-@held_flags.case(Independent)
-def none_now(held: Independent, knees: Any, knee: Any) -> Flags:
+@held_flags.case(NoneHeld)
+def none_now(held: NoneHeld, knees: Any, knee: Any) -> Flags:
     """None."""
     return ()
 
 
-@gathered_matrix.case(Independent)
-def whole_matrix(held: Independent, flags: Flags, M: Vector) -> Vector:
+@gathered_matrix.case(NoneHeld)
+def whole_matrix(held: NoneHeld, flags: Flags, M: Vector) -> Vector:
     """All of it."""
     return M
 
 
-@gathered.case(Independent)
-def all_torques(held: Independent, flags: Flags, torques: Vector) -> Vector:
+@gathered.case(NoneHeld)
+def all_torques(held: NoneHeld, flags: Flags, torques: Vector) -> Vector:
     """All of them."""
     return torques
 
 
-@followed.case(Independent)
-def none_follows(held: Independent, flags: Flags, rates: Vector) -> Vector:
+@followed.case(NoneHeld)
+def none_follows(held: NoneHeld, flags: Flags, rates: Vector) -> Vector:
     """As they are."""
     return rates
 

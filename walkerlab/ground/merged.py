@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.held import Held, IdealLock, Independent, Knees
+from walkerlab.ground.held import Held, IdealLock, Knees, NoneHeld
 from walkerlab.ground.walker import ContactWalker, Foot
 from walkerlab.kernels import by_type, inlined
 from walkerlab.mechanics.tree import Tree, merged_tree
@@ -87,12 +87,12 @@ def with_locked(walker: ContactWalker, locked: Sequence[int]) -> Fewer:
     )
 
 
-def held_among(held: Held, kept: list[int], E: NDArray[np.float64]) -> Held | Independent:
+def held_among(held: Held, kept: list[int], E: NDArray[np.float64]) -> Held | NoneHeld:
     """Which of the bodies that are left follow others at all times."""
     n = E.shape[0]
     always = np.array(held.always)[kept]
     if not always.any():
-        return Independent()
+        return NoneHeld()
     weights = (np.array(held.weights).reshape(n, n)[kept] @ E) * always[:, None]
     return Held(numbers(weights.ravel()), tuple(bool(x) for x in always))
 

@@ -20,7 +20,7 @@ class OnGround(NamedTuple):
     """The walker while each foot either finds ground under it or does not."""
 
     walker: ContactWalker
-    carried: tuple[bool, bool]
+    has_ground: tuple[bool, bool]
     held: tuple[bool, ...] = ()  # (n) which bodies follow others now; none for a walker whose bodies are independent
     stops: tuple[bool, ...] = ()  # (2) which knees are in their stops; none for a walker without knees
 
@@ -54,9 +54,9 @@ def all_wrenches(system: OnGround, s: Vector, c: Vector, y: State) -> tuple[floa
     """Force of the ground along and normal to the slope (N), and its torques on the bodies (N m)."""
     walker = system.walker
     wrench = (0.0, 0.0, walker.tree.arm_x)
-    if system.carried[0]:
+    if system.has_ground[0]:
         wrench = ground_wrench(walker, walker.feet[0], s, c, y, wrench)
-    if system.carried[1]:
+    if system.has_ground[1]:
         wrench = ground_wrench(walker, walker.feet[1], s, c, y, wrench)
     return wrench
 
@@ -132,7 +132,7 @@ def motion_gradient(foot: Foot, s: Vector, c: Vector, y: State, j: int) -> tuple
 
 @jacobian.case(OnGround)
 def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
-    """Derivatives of the equations of motion, exact up to the joins of the force law."""
+    """Derivatives of the equations of motion, exact up to the switching points of the force law."""
     walker = system.walker
     tree = walker.tree
     n = len(tree.arm_x)
@@ -140,9 +140,9 @@ def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
         for j in range(4 + 2 * n):
             J[i, j] = 1.0 if j == i + 2 + n else 0.0
     s, c = sines_cosines(tree, y, 2, walker.slope)
-    if system.carried[0]:
+    if system.has_ground[0]:
         ground_gradients(walker, walker.feet[0], s, c, y, 2, J)
-    if system.carried[1]:
+    if system.has_ground[1]:
         ground_gradients(walker, walker.feet[1], s, c, y, 2, J)
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, 4 + n, all_wrenches(system, s, c, y)[2])

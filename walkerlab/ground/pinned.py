@@ -32,7 +32,7 @@ class Pinned(NamedTuple):
     blank: State
     held: tuple[bool, ...] = ()  # as of OnGround
     stops: tuple[bool, ...] = ()
-    carried: bool = False  # whether there is ground under the other foot
+    has_ground: bool = False  # whether there is ground under the other foot
 
 
 @blank.case(Pinned)
@@ -80,7 +80,7 @@ def rooted_state(system: Pinned, y: State) -> State:
 def outer_torques(system: Pinned, s: Vector, c: Vector, y: State) -> Vector:
     """Torques on the bodies about the hinge (N m) of gravity and of the ground under the other foot."""
     torques = gravity_torques(system, s, c)
-    if system.carried:
+    if system.has_ground:
         rooted = rooted_state(system, y)
         torques = ground_wrench(system.walker, swing_foot(system), s, c, rooted, (0.0, 0.0, torques))[2]
     return torques
@@ -115,7 +115,7 @@ def pinned_jacobian(system: Pinned, t: float, y: State, J: Any) -> None:
         forward = c[k] * tree.arm_x[k] - s[k] * tree.arm_y[k]
         upward = s[k] * tree.arm_x[k] + c[k] * tree.arm_y[k]
         J[n + k, k] = walker.gravity_down * upward - walker.gravity_along * forward
-    if system.carried:
+    if system.has_ground:
         ground_gradients(walker, swing_foot(system), s, c, rooted_state(system, y), 0, J)
     M = mass_matrix(tree, s, c)
     torques = with_centrifugal(tree, s, c, y, n, outer_torques(system, s, c, y))
@@ -132,7 +132,7 @@ def floating_state(system: Pinned, y: State) -> State:
     foot = walker.feet[system.foot]
     n = len(system.tree.arm_x)
     s, c = sines_cosines(system.tree, y, 0, walker.slope)
-    along, height, speed, climb = system.along, foot.radius, 0.0, 0.0
+    along, height, speed, vertical_velocity = system.along, foot.radius, 0.0, 0.0
     full = walker.blank
     for k in range(n):
         forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
@@ -140,10 +140,10 @@ def floating_state(system: Pinned, y: State) -> State:
         along -= forward
         height -= upward
         speed += y[n + k] * upward
-        climb -= y[n + k] * forward
+        vertical_velocity -= y[n + k] * forward
         full = put(full, 2 + k, y[k])
         full = put(full, 4 + n + k, y[n + k])
     full = put(full, 0, along)
     full = put(full, 1, height)
     full = put(full, 2 + n, speed)
-    return put(full, 3 + n, climb)
+    return put(full, 3 + n, vertical_velocity)

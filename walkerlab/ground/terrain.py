@@ -53,20 +53,20 @@ def stride_measure(terrain: Any) -> float:
 
 
 @by_type
-def starts_carried(terrain: Any, is_stance: bool) -> bool:
+def starts_with_ground(terrain: Any, is_stance: bool) -> bool:
     """Whether a foot that starts on the ground is carried by it."""
 
 
 @by_type
-def carried_in_cell(terrain: Any, cell: int) -> bool:
+def has_ground_in_cell(terrain: Any, cell: int) -> bool:
     """Whether a foot that comes into a cell from above is carried there."""
 
 
 @by_type
-def carried_in_air(terrain: Any, carried: bool, stands: bool, ahead: bool) -> bool:
+def has_ground_in_air(terrain: Any, has_ground: bool, stands: bool, ahead: bool) -> bool:
     """Whether ground would carry a foot that is above it.
 
-    carried  whether it would have until now
+    has_ground  whether it would have until now
     stands   whether it is the stance foot
     ahead    whether it is ahead of the other foot
     """
@@ -102,22 +102,22 @@ def checkerboard_measure(terrain: Checkerboard) -> float:
     return terrain.pitch
 
 
-@starts_carried.case(Checkerboard)
+@starts_with_ground.case(Checkerboard)
 def checkerboard_start(terrain: Checkerboard, is_stance: bool) -> bool:
     """Both feet start on pads."""
     return True
 
 
-@carried_in_cell.case(Checkerboard)
+@has_ground_in_cell.case(Checkerboard)
 def checkerboard_carries(terrain: Checkerboard, cell: int) -> bool:
     """Pads have even numbers."""
     return cell % 2 == 0
 
 
-@carried_in_air.case(Checkerboard)
-def checkerboard_in_air(terrain: Checkerboard, carried: bool, stands: bool, ahead: bool) -> bool:
+@has_ground_in_air.case(Checkerboard)
+def checkerboard_in_air(terrain: Checkerboard, has_ground: bool, stands: bool, ahead: bool) -> bool:
     """A pad stays where it is."""
-    return carried
+    return has_ground
 
 
 @order_matters.case(Checkerboard)
@@ -154,21 +154,21 @@ def plane_measure(terrain: Any) -> float:
     return terrain.step_length
 
 
-@starts_carried.case(AfterMidSwing)
+@starts_with_ground.case(AfterMidSwing)
 def plane_start(terrain: AfterMidSwing, is_stance: bool) -> bool:
     """The foot that is about to swing has not been ahead yet."""
     return is_stance
 
 
-@carried_in_cell.case(AfterMidSwing)
-@carried_in_cell.case(Plane)
+@has_ground_in_cell.case(AfterMidSwing)
+@has_ground_in_cell.case(Plane)
 def plane_carries(terrain: Any, cell: int) -> bool:
     """Never asked: the plane has no edges."""
     return True
 
 
-@carried_in_air.case(AfterMidSwing)
-def plane_in_air(terrain: AfterMidSwing, carried: bool, stands: bool, ahead: bool) -> bool:
+@has_ground_in_air.case(AfterMidSwing)
+def plane_in_air(terrain: AfterMidSwing, has_ground: bool, stands: bool, ahead: bool) -> bool:
     """A swing foot above the ground can touch while it is ahead; the stance foot, when it bounces, anywhere."""
     return stands or ahead
 
@@ -179,14 +179,14 @@ def plane_order(terrain: AfterMidSwing) -> bool:
     return True
 
 
-@starts_carried.case(Plane)
+@starts_with_ground.case(Plane)
 def any_start(terrain: Plane, is_stance: bool) -> bool:
     """Both are."""
     return True
 
 
-@carried_in_air.case(Plane)
-def any_in_air(terrain: Plane, carried: bool, stands: bool, ahead: bool) -> bool:
+@has_ground_in_air.case(Plane)
+def any_in_air(terrain: Plane, has_ground: bool, stands: bool, ahead: bool) -> bool:
     """Wherever it is."""
     return True
 

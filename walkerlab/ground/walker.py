@@ -46,7 +46,7 @@ class FootMotion(NamedTuple):
     along: float  # m
     height: float  # m over the slope, negative inside the ground
     slip: float  # m/s, velocity along the slope of the material point there
-    climb: float  # m/s, velocity of the height
+    vertical_velocity: float  # m/s, velocity of the height
 
 
 @inlined
@@ -54,7 +54,7 @@ def foot_motion(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: Stat
     """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
     n = len(s)
     along, height = y[0], y[1] - foot.radius
-    slip, climb = y[2 + n], y[3 + n]
+    slip, vertical_velocity = y[2 + n], y[3 + n]
     for k in range(n):
         omega = y[4 + n + k]
         forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
@@ -62,8 +62,8 @@ def foot_motion(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: Stat
         along += forward
         height += upward
         slip += omega * (foot.rolling[k] - upward)
-        climb += omega * forward
-    return FootMotion(along, height, slip, climb)
+        vertical_velocity += omega * forward
+    return FootMotion(along, height, slip, vertical_velocity)
 
 
 class FootForce(NamedTuple):
@@ -78,6 +78,6 @@ class FootForce(NamedTuple):
 @inlined
 def foot_force(walker: ContactWalker, motion: FootMotion) -> FootForce:
     """Force of the ground on a foot that is inside it."""
-    normal = impact_normal_force(-motion.height, -motion.climb, walker.normal)
+    normal = impact_normal_force(-motion.height, -motion.vertical_velocity, walker.normal)
     mu, mu_slope = friction_coefficient(walker.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)

@@ -150,7 +150,7 @@ def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
+class WalkDifference:
     """One walk less another, along time, or along steps and phases; the last axis is the leg."""
 
     angle: Array
@@ -167,7 +167,7 @@ class Difference:
         return np.asarray(np.abs(self.velocity).reshape(-1, LEGS).max(axis=0))
 
 
-def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, Difference]:
+def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
     """`walk` less `reference` at the same times: at every sample of either while both walk.
 
     Returns the times (s) and the difference.
@@ -176,10 +176,10 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, Differen
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.at(time)
     reference_angle, reference_velocity = reference.at(time)
-    return time, Difference(angle - reference_angle, velocity - reference_velocity)
+    return time, WalkDifference(angle - reference_angle, velocity - reference_velocity)
 
 
-def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> Difference:
+def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
     """`walk` less `reference` at the same phases (phases,) of the steps that both completed: (step, phase, leg).
 
     Raises ValueError if one of them completed none.
@@ -190,7 +190,7 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> Diffe
     pairs = [(walk.during(step, phases), reference.during(step, phases)) for step in range(steps)]
     angle = np.stack([ours[0] - theirs[0] for ours, theirs in pairs])
     velocity = np.stack([ours[1] - theirs[1] for ours, theirs in pairs])
-    return Difference(angle, velocity)
+    return WalkDifference(angle, velocity)
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:

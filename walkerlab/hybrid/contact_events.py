@@ -1,8 +1,9 @@
-"""The signals whose zeros are the events of a walk on compliant ground, sampled along a step.
+"""The event functions whose zeros are the events of a walk on compliant ground, sampled along a step.
 
 Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). Of these the walk knows
 on which side of zero they are, and the event is that they leave it: of events at one time none can hide another. The
-others are joins of the force law, where its derivatives jump: a step that ends there keeps the method's order.
+others are switching points of the force law, where its derivatives jump: a step that ends there keeps the method's
+order.
 """
 
 import math
@@ -30,17 +31,17 @@ from walkerlab.mechanics.tree import sines_cosines
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing
 from walkerlab.solvers.system import State
 
-# signals of each foot
+# event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 FRICTION_SWITCHES = 5  # up to four, of the friction law
-MATERIAL, CLIMB = 9, 10  # no events: where the foot's material is, and how fast its height grows
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # no events: where the foot's material is, and how fast its height grows
 PER_FOOT = 11
-# signals of the walker
+# event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
-# signals of both knees: how far beyond straight, and how fast it gets there
+# event functions of both knees: how far beyond straight, and how fast it gets there
 EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
-SIGNALS = SLIDE + 5
-NO_SIDE = 0  # of a signal that may cross zero either way
+EVENT_FUNCTIONS = SLIDE + 5
+NO_SIDE = 0  # of an event function that may cross zero either way
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 
@@ -52,7 +53,7 @@ class Frame(NamedTuple):
     pendulum_time: float  # s, sqrt(L/g)
     hip_x: tuple[float, ...]  # m, lever of the hip from the centre of mass, body by body
     hip_y: tuple[float, ...]
-    locate_joins: bool  # end steps at the joins of the force law
+    locate_switching: bool  # end steps at the switching points of the force law
 
 
 @by_type
@@ -120,7 +121,7 @@ def hip_height(walker: ContactWalker, frame: Frame, y: State) -> float:
 
 
 @inlined
-def sample_signals(
+def sample_event_functions(
     system: Any,
     walker: ContactWalker,
     terrain: Any,
@@ -132,7 +133,7 @@ def sample_signals(
     node: int,
     finder: CrossingFinder,
 ) -> None:
-    """Values of all signals at one node of a step, where the system's state is `state`."""
+    """Values of all event functions at one node of a step, where the system's state is `state`."""
     y = walker_state(system, state)
     feet = feet_motion(walker, y)
     for foot in range(2):
@@ -156,20 +157,20 @@ def farthest_slide(terrain: Any) -> float:
 def sample_foot(
     walker: ContactWalker, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
-    """One foot's signals at node j."""
+    """One foot's event functions at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
-    values[first + CLIMB, j] = motion.climb
+    values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
-    values[first + RELEASE, j] = grip(-motion.height, -motion.climb, walker.normal)
+    values[first + RELEASE, j] = grip(-motion.height, -motion.vertical_velocity, walker.normal)
     values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
     sample_switching(walker.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 
 @by_type
 def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
-    """The knees' signals at node j."""
+    """The knees' event functions at node j."""
 
 
 @sample_knees.case(NoKnees)
@@ -191,7 +192,7 @@ def sample_both_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> N
 def knee_crossing(
     knees: Any, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Fraction of the step at which a knee locks, latches or is to be released, and which signal's that is.
+    """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
 
     knee       (2,) what each knee is doing
     releasing  whether the trailing knee is released when the stance foot stops sinking in
@@ -211,7 +212,7 @@ def first_knee_crossing(
     knees: Knees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
 ) -> tuple[float, int]:
     """A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in."""
-    best, signal = NO_CROSSING, -1
+    best, event = NO_CROSSING, -1
     for k in range(2):
         at, index = NO_CROSSING, EXTENSION + k
         if knee[k] == BENT:
@@ -220,9 +221,9 @@ def first_knee_crossing(
             index = EXTENSION_RATE + k
             at = leaves_side(finder, index, 1, at_zero[index] != 0)
         if at < best:
-            best, signal = at, index
+            best, event = at, index
     at, index = end_of_sinking(releasing, stance, at_zero, finder)
-    return (at, index) if at < best else (best, signal)
+    return (at, index) if at < best else (best, event)
 
 
 @knee_crossing.case(OneBends)
@@ -247,7 +248,7 @@ def crossing_of_the_foot(
 @inlined
 def end_of_sinking(releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder) -> tuple[float, int]:
     """Fraction of the step at which the stance foot stops sinking in, if a knee is to be released then."""
-    index = stance * PER_FOOT + CLIMB
+    index = stance * PER_FOOT + VERTICAL_VELOCITY
     if not releasing:
         return NO_CROSSING, index
     return leaves_side(finder, index, -1, at_zero[index] != 0), index
@@ -259,7 +260,7 @@ def earliest_crossing(
     walker: ContactWalker,
     frame: Frame,
     watch_order: bool,
-    carried: Any,
+    has_ground: Any,
     stance: int,
     sides: Any,
     at_zero: Any,
@@ -268,18 +269,18 @@ def earliest_crossing(
     releasing: bool,
     finder: CrossingFinder,
 ) -> tuple[float, int]:
-    """Fraction of the sampled step at which the first event lies, and which signal's; NO_CROSSING if none.
+    """Fraction of the sampled step at which the first event lies, and which event function's; NO_CROSSING if none.
 
     watch_order  whether it matters that the feet pass each other
-    carried      (2,) whether there is ground under each foot
+    has_ground      (2,) whether there is ground under each foot
     stance       the stance foot, which may slide
-    sides        (signals,) on which side of zero each signal is known to be: 1, -1, or NO_SIDE
-    at_zero      (signals,) which signals the last event left at zero
+    sides        (event functions,) on which side of zero each event function is known to be: 1, -1, or NO_SIDE
+    at_zero      (event functions,) which event functions the last event left at zero
     pads         whether the ground has edges
     knee         (2,) what each knee is doing
     releasing    whether the trailing knee is released when the stance foot stops sinking in
     """
-    best, signal = NO_CROSSING, -1
+    best, event = NO_CROSSING, -1
     for foot in range(2):
         if not is_free(system, foot):
             continue
@@ -288,51 +289,51 @@ def earliest_crossing(
         lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
         for j in range(1, finder.nodes.size):
             lowest = min(lowest, finder.values[first + HEIGHT, j])
-        inside = carried[foot] != 0 and lowest < 0.0
+        inside = has_ground[foot] != 0 and lowest < 0.0
         last = RELEASE
-        if inside and frame.locate_joins:
+        if inside and frame.locate_switching:
             last = FRICTION_SWITCHES + switching_count(walker.friction)
         for index in range(first, first + last):
             if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
                 continue
             at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
-                best, signal = at, index
-        if foot == stance and sides[first + HEIGHT] < 0 and carried[foot] != 0:
+                best, event = at, index
+        if foot == stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
             at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
-                best, signal = at, SLIDE
+                best, event = at, SLIDE
     if watch_order:
         at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if at < best:
-            best, signal = at, PASSING
+            best, event = at, PASSING
     at, index = knee_crossing(walker.knees, knee, releasing, stance, at_zero, finder)
     if at < best:
-        best, signal = at, index
+        best, event = at, index
     at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
     if at < best:
-        best, signal = at, FALL
-    return best, signal
+        best, event = at, FALL
+    return best, event
 
 
 @inlined
-def leaves_side(finder: CrossingFinder, signal: int, side: int, zero_at_start: bool) -> float:
-    """Fraction at which a signal crosses to the other side of zero than it is known to be on.
+def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
+    """Fraction at which an event function crosses to the other side of zero than it is known to be on.
 
     At once if it is there already: the step before, which ended for another event, went past its zero, or on it.
     """
-    zero_at_start = zero_at_start or finder.values[signal, 0] == 0.0
+    zero_at_start = zero_at_start or finder.values[event, 0] == 0.0
     if side != NO_SIDE:
-        beyond = zero_at_start or side * finder.values[signal, 0] < 0.0
+        beyond = zero_at_start or side * finder.values[event, 0] < 0.0
         if zero_at_start:
             for j in range(1, finder.nodes.size):
-                beyond = beyond and side * finder.values[signal, j] < 0.0
+                beyond = beyond and side * finder.values[event, j] < 0.0
         if beyond:
             return 0.0
-    return first_crossing(finder, signal, -side, 0.0, zero_at_start)
+    return first_crossing(finder, event, -side, 0.0, zero_at_start)
 
 
 @inlined
-def is_join(signal: int) -> bool:
-    """Whether an event is a mere join of the force law."""
-    return signal < 2 * PER_FOOT and RELEASE <= signal % PER_FOOT < MATERIAL
+def is_switching(event: int) -> bool:
+    """Whether an event is a mere switching point of the force law."""
+    return event < 2 * PER_FOOT and RELEASE <= event % PER_FOOT < MATERIAL

@@ -5,7 +5,7 @@ from typing import Any
 from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, divide_by_held_mass, knee_energy, turned_by
 from walkerlab.ground.motion import OnGround, motion_gradient
 from walkerlab.ground.pinned import Pinned
-from walkerlab.hybrid.contact_events import CLIMB, EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT
+from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
 from walkerlab.hybrid.contact_rules import catches
 from walkerlab.hybrid.contact_tangent import Tangent, jump
@@ -18,34 +18,32 @@ from walkerlab.solvers.system import State
 
 
 @by_type
-def cross_knee(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, signal: int) -> State:
+def cross_knee(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, event: int) -> State:
     """The state after an event that led from one mode to another; what it cost is noted, and the tangent jumps."""
 
 
 @cross_knee.case(NoKnees)
 @cross_knee.case(OneBends)
 @cross_knee.case(NoneBends)
-def cross_nothing(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, signal: int) -> State:
+def cross_nothing(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, event: int) -> State:
     """As it was."""
     return end_state(method, before)
 
 
 @cross_knee.case(Knees)
-def cross_some_knee(
-    knees: Knees, observer: ContactObserver, method: Any, before: Any, after: Any, signal: int
-) -> State:
+def cross_some_knee(knees: Knees, observer: ContactObserver, method: Any, before: Any, after: Any, event: int) -> State:
     """A lock is a plastic impact; what a latch holds in its spring is lost; a release changes no velocity."""
     y = end_state(method, before)
     new, locks = y, False
-    if signal >= EXTENSION:
-        locks = signal >= EXTENSION_RATE or catches(knees.stop)
+    if event >= EXTENSION:
+        locks = event >= EXTENSION_RATE or catches(knees.stop)
         if locks:
             new, lost = locked(after, y)
-            observer.books[KNEE_STRIKES] += lost
-        if signal >= EXTENSION_RATE:
-            observer.books[KNEE_STOP] += knee_energy(knees, before.stops, y, angles_of(before))
+            observer.dissipated[KNEE_STRIKES] += lost
+        if event >= EXTENSION_RATE:
+            observer.dissipated[KNEE_STOP] += knee_energy(knees, before.stops, y, angles_of(before))
     if observer.tangent.Phi.shape[1] > 0:
-        carry_over(knees, observer.tangent, method.clock[T], before, after, signal, y, new, locks)
+        carry_over(knees, observer.tangent, method.clock[T], before, after, event, y, new, locks)
     return new
 
 
@@ -116,32 +114,32 @@ def locked(system: Any, y: State) -> tuple[State, float]:
 
 
 @by_type
-def event_gradient(system: Any, knees: Knees, signal: int, y: State, gradient: Any) -> bool:
+def event_gradient(system: Any, knees: Knees, event: int, y: State, gradient: Any) -> bool:
     """Write the derivative of an event function by the state into `gradient`; whether the event changes the motion."""
 
 
 @event_gradient.case(Pinned)
-def hinged_gradient(system: Pinned, knees: Knees, signal: int, y: State, gradient: Any) -> bool:
+def hinged_gradient(system: Pinned, knees: Knees, event: int, y: State, gradient: Any) -> bool:
     """The tangent is carried from section to section, where nothing is hinged."""
     return False
 
 
 @event_gradient.case(OnGround)
-def free_gradient(system: OnGround, knees: Knees, signal: int, y: State, gradient: Any) -> bool:
+def free_gradient(system: OnGround, knees: Knees, event: int, y: State, gradient: Any) -> bool:
     """Of knees: extension or its rate; of feet: height or its rate."""
     n = len(system.walker.tree.arm_x)
     for j in range(len(y)):
         gradient[j] = 0.0
-    if signal >= EXTENSION:
-        knee = (signal - EXTENSION) % 2
-        first = 4 + n if signal >= EXTENSION_RATE else 2
+    if event >= EXTENSION:
+        knee = (event - EXTENSION) % 2
+        first = 4 + n if event >= EXTENSION_RATE else 2
         gradient[first + knees.shanks[knee]] = 1.0
         gradient[first + knees.thighs[knee]] = -1.0
         return True
-    kind = signal % PER_FOOT
-    if signal >= 2 * PER_FOOT or (kind != HEIGHT and kind != CLIMB):
+    kind = event % PER_FOOT
+    if event >= 2 * PER_FOOT or (kind != HEIGHT and kind != VERTICAL_VELOCITY):
         return False
-    foot = system.walker.feet[signal // PER_FOOT]
+    foot = system.walker.feet[event // PER_FOOT]
     s, c = sines_cosines(system.walker.tree, y, 2, system.walker.slope)
     for j in range(len(y)):
         deeper, deeper_rate, _ = motion_gradient(foot, s, c, y, j)
@@ -156,14 +154,14 @@ def carry_over(
     t: float,
     before: Any,
     after: Any,
-    signal: int,
+    event: int,
     y: State,
     new: State,
     locks: bool,
 ) -> None:
     """The tangent after an event: by the reset's derivative, and by how the event's time shifts."""
     size = len(y)
-    if not event_gradient(before, knees, signal, y, tangent.rates[2 * size :]):
+    if not event_gradient(before, knees, event, y, tangent.rates[2 * size :]):
         return
     reset = tangent.stages[3]
     for i in range(size):

@@ -1,12 +1,12 @@
-"""What is recorded of a walk on compliant ground besides its steps: samples, energy books, the tangent."""
+"""What is recorded of a walk on compliant ground besides its steps: samples, energy balance, the tangent."""
 
 from typing import Any, NamedTuple
 
-from walkerlab.ground.energy import book_energy, dissipated_power, foot_elastic_energy
+from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
 from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, knee_energy, knee_power
 from walkerlab.ground.merged import store_whole
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import CLIMB, HEIGHT, PER_FOOT, feet_motion, walker_state
+from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, VERTICAL_VELOCITY, feet_motion, walker_state
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
@@ -14,8 +14,8 @@ from walkerlab.solvers.in_tuples import end_state, interpolate
 from walkerlab.solvers.stepping import T_OLD, T
 from walkerlab.solvers.system import State
 
-# indices into `books`
-DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, BOOKS = 0, 1, 2, 3, 4, 5
+# indices into `dissipated`
+DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, CHANNEL_COUNT = 0, 1, 2, 3, 4, 5
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY = 0, 1, 2
 # nodes and weights of the Radau quadrature on a step: exact to the order of the method of that name
@@ -24,17 +24,17 @@ WEIGHTS = (0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
 
 
 class ContactObserver(NamedTuple):
-    """Samples, books and tangent of a walk; what is not wanted has no room and costs a look."""
+    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
 
-    booked: bool  # whether to keep the books
+    track_energy: bool  # whether to keep the energy balance
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 4 + 2 n) of the whole walker
-    carried: Any  # (samples, 2)
+    has_ground: Any  # (samples, 2)
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
-    sampled_books: Any  # (samples, 5) J dissipated so far, by channel
+    sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
     recorded: Any  # (1,)
-    books: Any  # (5,) J dissipated so far
+    dissipated: Any  # (5,) J dissipated so far
     extremes: Any  # (3,) deepest penetration m, largest residual of the energy balance J, energy at the start J
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
     merged: Any  # tangents of the walker with one and with both knees locked; () if it keeps its bodies
@@ -47,15 +47,15 @@ def observe(
     system: Any,
     walker: ContactWalker,
     finder: CrossingFinder,
-    carried: Any,
+    has_ground: Any,
     knee: Any,
     stance: int,
 ) -> None:
-    """Take note of the last step, which stands and whose signals are sampled: samples, books, tangent."""
-    mode = (carried[0] != 0, carried[1] != 0)
+    """Take note of the last step, which stands and whose event functions are sampled."""
+    mode = (has_ground[0] != 0, has_ground[1] != 0)
     record_samples(observer, method, system, walker, mode, knee, stance)
-    if observer.booked:
-        keep_books(observer, method, system, walker, mode)
+    if observer.track_energy:
+        add_dissipation(observer, method, system, walker, mode)
         for foot in range(2):
             if mode[foot]:
                 note_depth(observer, method, system, walker, finder, foot)
@@ -81,32 +81,32 @@ def record_samples(
         y = walker_state(system, interpolate(method, system, fraction))
         store_whole(walker.merging, y, observer.states[index])
         damping, friction, stops = work_until(method, system, walker, mode, fraction)
-        for channel in range(BOOKS):
-            observer.sampled_books[index, channel] = observer.books[channel]
-        observer.sampled_books[index, DAMPING] += damping
-        observer.sampled_books[index, FRICTION] += friction
-        observer.sampled_books[index, KNEE_STOP] += stops
+        for channel in range(CHANNEL_COUNT):
+            observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
+        observer.sampled_dissipation[index, DAMPING] += damping
+        observer.sampled_dissipation[index, FRICTION] += friction
+        observer.sampled_dissipation[index, KNEE_STOP] += stops
         observer.knees[index, 0], observer.knees[index, 1] = knee[0], knee[1]
-        observer.carried[index, 0], observer.carried[index, 1] = mode
+        observer.has_ground[index, 0], observer.has_ground[index, 1] = mode
         observer.stance[index] = stance
         index += 1
     observer.recorded[0] = index
 
 
 @inlined
-def keep_books(
+def add_dissipation(
     observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, mode: tuple[bool, bool]
 ) -> None:
     """What the last step dissipated, and how well the energy balances at its end."""
     damping, friction, stops = work_until(method, system, walker, mode, 1.0)
-    observer.books[DAMPING] += damping
-    observer.books[FRICTION] += friction
-    observer.books[KNEE_STOP] += stops
+    observer.dissipated[DAMPING] += damping
+    observer.dissipated[FRICTION] += friction
+    observer.dissipated[KNEE_STOP] += stops
     end = walker_state(system, end_state(method, system))
     lost = 0.0
-    for channel in range(BOOKS):
-        lost += observer.books[channel]
-    held = book_energy(walker, mode, end) + knee_energy(walker.knees, system.stops, end, 2)
+    for channel in range(CHANNEL_COUNT):
+        lost += observer.dissipated[channel]
+    held = total_energy(walker, mode, end) + knee_energy(walker.knees, system.stops, end, 2)
     residual = held + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
 
@@ -118,28 +118,28 @@ def note_depth(
     """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
-    if finder.values[first + CLIMB, 0] < 0.0 < finder.values[first + CLIMB, end]:
-        at = first_crossing(finder, first + CLIMB, RISING, 0.0, False)
+    if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
+        at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
         lowest = feet_motion(walker, walker_state(system, interpolate(method, system, min(at, 1.0))))
         deepest = max(deepest, -lowest[foot].height)
     observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
 
 
 @inlined
-def observe_edge(observer: ContactObserver, walker: ContactWalker, foot: int, carried: bool, y: State) -> None:
+def observe_edge(observer: ContactObserver, walker: ContactWalker, foot: int, has_ground: bool, y: State) -> None:
     """A foot left its pad: the spring under it is gone, and what it held with it."""
-    if carried and observer.booked:
-        observer.books[EDGES] += foot_elastic_energy(walker, foot, y)
+    if has_ground and observer.track_energy:
+        observer.dissipated[EDGES] += foot_elastic_energy(walker, foot, y)
 
 
 @inlined
 def work_until(
-    method: Any, system: Any, walker: ContactWalker, carried: tuple[bool, bool], fraction: float
+    method: Any, system: Any, walker: ContactWalker, has_ground: tuple[bool, bool], fraction: float
 ) -> tuple[float, float, float]:
     """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step."""
     damping, friction = 0.0, 0.0
     for foot in range(2):
-        if carried[foot]:
+        if has_ground[foot]:
             lost = foot_work(method, system, walker, foot, fraction)
             damping += lost[0]
             friction += lost[1]

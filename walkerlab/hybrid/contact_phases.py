@@ -13,10 +13,10 @@ from walkerlab.ground.held import LOCKED, NoneBends, OneBends, always_held, no_s
 from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, merged_state, place_of, store_whole
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import CLIMB, EXTENSION, HEIGHT, PER_FOOT, Frame
+from walkerlab.hybrid.contact_events import EXTENSION, HEIGHT, PER_FOOT, VERTICAL_VELOCITY, Frame
 from walkerlab.hybrid.contact_knee import carry_over, locked
 from walkerlab.hybrid.contact_observer import KNEE_STRIKES, ContactObserver
-from walkerlab.hybrid.contact_rules import GOES_ON, STANCE, Ledger
+from walkerlab.hybrid.contact_rules import GOES_ON, STANCE, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent
 from walkerlab.hybrid.contact_walk import walk_part
 from walkerlab.kernels import by_type, inlined
@@ -62,7 +62,7 @@ def walk_by_knees(
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     t: float,
     y: State,
     stop_passing_after: int,
@@ -79,14 +79,14 @@ def walk_with_all_bodies(
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     t: float,
     y: State,
     stop_passing_after: int,
 ) -> int:
     """As it is."""
-    system = free(walker, ledger, always_held(walker.held))
-    return walk_part(system, walker, terrain, frame, method, finder, observer, ledger, t, y, stop_passing_after)
+    system = free(walker, walk_state, always_held(walker.held))
+    return walk_part(system, walker, terrain, frame, method, finder, observer, walk_state, t, y, stop_passing_after)
 
 
 @walk_by_knees.case(ByKnees)
@@ -98,7 +98,7 @@ def walk_with_fewer_bodies(
     method: MethodByKnees,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     t: float,
     y: State,
     stop_passing_after: int,
@@ -108,19 +108,29 @@ def walk_with_fewer_bodies(
     store_whole(merging, y, method.y)
     released, outcome = False, GOES_ON
     while outcome == GOES_ON:
-        if ledger.knee[0] == LOCKED and ledger.knee[1] == LOCKED:
+        if walk_state.knee[0] == LOCKED and walk_state.knee[1] == LOCKED:
             fewer = merging.both
             straight = as_fewer(walker, fewer, fewer.held, NoneBends(walker.knees.release_at_touch))
             seen = seen_by(observer, observer.merged[1], fewer.onto)
             outcome = walk_merged(
-                straight, terrain, frame, method, method.both, finder, seen, ledger, stop_passing_after
+                straight, terrain, frame, method, method.both, finder, seen, walk_state, stop_passing_after
             )
             hand_back(observer, seen, fewer.onto)
             released = True
         else:
-            swing = 1 if ledger.knee[0] == LOCKED else 0
+            swing = 1 if walk_state.knee[0] == LOCKED else 0
             outcome = walk_bending(
-                merging, swing, released, walker, terrain, frame, method, finder, observer, ledger, stop_passing_after
+                merging,
+                swing,
+                released,
+                walker,
+                terrain,
+                frame,
+                method,
+                finder,
+                observer,
+                walk_state,
+                stop_passing_after,
             )
             released = False
     return outcome
@@ -137,7 +147,7 @@ def walk_bending(
     method: MethodByKnees,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     stop_passing_after: int,
 ) -> int:
     """Walk while the knee of leg `swing` can bend; from its release, or from where the walk starts, to its lock."""
@@ -147,30 +157,30 @@ def walk_bending(
     locking = as_fewer(walker, fewer, merging.locking[1 - swing], knees)
     seen = seen_by(observer, observer.merged[0], fewer.onto)
     if released and seen.tangent.Phi.shape[1] > 0:
-        cross_release(locking, swing, seen.tangent, ledger, method)
-    outcome = walk_merged(bending, terrain, frame, method, method.one, finder, seen, ledger, stop_passing_after)
+        cross_release(locking, swing, seen.tangent, walk_state, method)
+    outcome = walk_merged(bending, terrain, frame, method, method.one, finder, seen, walk_state, stop_passing_after)
     if outcome == GOES_ON:
-        cross_lock(locking, swing, seen, ledger, method)
+        cross_lock(locking, swing, seen, walk_state, method)
     hand_back(observer, seen, fewer.onto)
     return outcome
 
 
 @inlined
-def free(walker: ContactWalker, ledger: Ledger, held: Any) -> OnGround:
+def free(walker: ContactWalker, walk_state: WalkState, held: Any) -> OnGround:
     """The walker with both feet free, some of its bodies held and nothing in a stop."""
-    carried = (ledger.carried[0] != 0, ledger.carried[1] != 0)
-    return OnGround(walker, carried, held, no_stops(walker.knees))
+    has_ground = (walk_state.has_ground[0] != 0, walk_state.has_ground[1] != 0)
+    return OnGround(walker, has_ground, held, no_stops(walker.knees))
 
 
 @inlined
 def cross_lock(
-    walker: ContactWalker, swing: int, observer: ContactObserver, ledger: Ledger, method: MethodByKnees
+    walker: ContactWalker, swing: int, observer: ContactObserver, walk_state: WalkState, method: MethodByKnees
 ) -> None:
     """The knee of leg `swing` has locked: a plastic impact."""
     y = merged_state(walker.merging.onto, method.y, walker.blank)
-    bent, straight = lock_modes(walker, swing, ledger)
+    bent, straight = lock_modes(walker, swing, walk_state)
     new, lost = locked(straight, y)
-    observer.books[KNEE_STRIKES] += lost
+    observer.dissipated[KNEE_STRIKES] += lost
     if observer.tangent.Phi.shape[1] > 0:
         t = method.clock[T]
         carry_over(walker.knees, observer.tangent, t, bent, straight, EXTENSION + swing, y, new, True)
@@ -178,21 +188,23 @@ def cross_lock(
 
 
 @inlined
-def cross_release(walker: ContactWalker, swing: int, tangent: Tangent, ledger: Ledger, method: MethodByKnees) -> None:
+def cross_release(
+    walker: ContactWalker, swing: int, tangent: Tangent, walk_state: WalkState, method: MethodByKnees
+) -> None:
     """The knee of leg `swing` is released: no velocity jumps, but accelerations do."""
     y = merged_state(walker.merging.onto, method.y, walker.blank)
-    bent, straight = lock_modes(walker, swing, ledger)
-    kind = HEIGHT if walker.knees.release_at_touch else CLIMB
-    signal = ledger.feet[STANCE] * PER_FOOT + kind
-    carry_over(walker.knees, tangent, method.clock[T], straight, bent, signal, y, y, False)
+    bent, straight = lock_modes(walker, swing, walk_state)
+    kind = HEIGHT if walker.knees.release_at_touch else VERTICAL_VELOCITY
+    event = walk_state.feet[STANCE] * PER_FOOT + kind
+    carry_over(walker.knees, tangent, method.clock[T], straight, bent, event, y, y, False)
 
 
 @inlined
-def lock_modes(walker: ContactWalker, swing: int, ledger: Ledger) -> tuple[OnGround, OnGround]:
+def lock_modes(walker: ContactWalker, swing: int, walk_state: WalkState) -> tuple[OnGround, OnGround]:
     """The walker while the knee of leg `swing` can bend, and while it is locked."""
     always = walker.held.always
     straight = put(always, walker.knees.shanks[swing], True)
-    return free(walker, ledger, always), free(walker, ledger, straight)
+    return free(walker, walk_state, always), free(walker, walk_state, straight)
 
 
 @inlined
@@ -204,17 +216,17 @@ def walk_merged(
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     stop_passing_after: int,
 ) -> int:
     """Walk with these bodies from where `whole` stands, until other knees are locked or the walk ends."""
     onto = walker.merging.onto
     hip_x = merged_levers(onto, frame.hip_x, walker.tree.arm_x)
     hip_y = merged_levers(onto, frame.hip_y, walker.tree.arm_x)
-    own = Frame(frame.leg_length, frame.pendulum_time, hip_x, hip_y, frame.locate_joins)
+    own = Frame(frame.leg_length, frame.pendulum_time, hip_x, hip_y, frame.locate_switching)
     t, y = whole.clock[T], merged_state(onto, whole.y, walker.blank)
-    system = free(walker, ledger, always_held(walker.held))
-    outcome = walk_part(system, walker, terrain, own, method, finder, observer, ledger, t, y, stop_passing_after)
+    system = free(walker, walk_state, always_held(walker.held))
+    outcome = walk_part(system, walker, terrain, own, method, finder, observer, walk_state, t, y, stop_passing_after)
     store_whole(walker.merging, end_state(method, system), whole.y)
     return outcome
 
@@ -227,15 +239,15 @@ def seen_by(observer: ContactObserver, tangent: Tangent, onto: tuple[int, ...]) 
         for direction in range(whole.shape[1]):
             tangent.Phi[place_of(onto, i, size), direction] = whole[i, direction]
     return ContactObserver(
-        observer.booked,
+        observer.track_energy,
         observer.times,
         observer.states,
-        observer.carried,
+        observer.has_ground,
         observer.stance,
         observer.knees,
-        observer.sampled_books,
+        observer.sampled_dissipation,
         observer.recorded,
-        observer.books,
+        observer.dissipated,
         observer.extremes,
         tangent,
         (),

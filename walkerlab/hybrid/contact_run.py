@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.energy import book_energy, kinetic_energy, potential_energy
+from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.held import (
     BENT,
     FLEXED,
@@ -21,9 +21,10 @@ from walkerlab.ground.held import (
 )
 from walkerlab.ground.merged import ByKnees
 from walkerlab.ground.pinned import Pinned, floating_state
-from walkerlab.ground.terrain import carried_in_cell, cell_at, starts_carried
+from walkerlab.ground.terrain import cell_at, has_ground_in_cell, starts_with_ground
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import (
+    EVENT_FUNCTIONS,
     FALL,
     FALLEN_HIP,
     HEIGHT,
@@ -31,16 +32,15 @@ from walkerlab.hybrid.contact_events import (
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
-    SIGNALS,
     SLIDE,
     Frame,
     feet_motion,
     hip_height,
     material_along,
 )
-from walkerlab.hybrid.contact_observer import BOOKS, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.hybrid.contact_observer import CHANNEL_COUNT, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
 from walkerlab.hybrid.contact_phases import method_by_knees, walk_by_knees
-from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, Ledger, steps_with_lift
+from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, WalkState, steps_with_lift
 from walkerlab.hybrid.contact_tangent import Tangent, new_tangent
 from walkerlab.hybrid.contact_walk import AT_LIFT, walk_part
 from walkerlab.hybrid.outcome import Outcome
@@ -94,7 +94,7 @@ class Stopped:
     work: NDArray[np.int64]
 
 
-class Ground(NamedTuple):
+class JudgedGround(NamedTuple):
     """What a walk happens on and is judged by."""
 
     terrain: Any  # Checkerboard, AfterMidSwing or Plane
@@ -104,55 +104,55 @@ class Ground(NamedTuple):
 @kernel
 def walk_free(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     t: float,
     y: State,
     stop_passing_after: int,
 ) -> int:
-    """Walk with both feet free from state y at t (s) until the ledger is full or the walk ends.
+    """Walk with both feet free from state y at t (s) until the walk state is full or the walk ends.
 
     With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other; with
-    AT_LIFT a walk whose ledger is full goes on until the foot that carried its last step has lifted.
+    AT_LIFT a walk whose walk state is full goes on until the foot that carried its last step has lifted.
     """
     terrain, frame = ground.terrain, ground.frame
     return walk_by_knees(
-        walker.merging, walker, terrain, frame, method, finder, observer, ledger, t, y, stop_passing_after
+        walker.merging, walker, terrain, frame, method, finder, observer, walk_state, t, y, stop_passing_after
     )
 
 
 @kernel
 def walk_hinged(
     pinned: Pinned,
-    ground: Ground,
+    ground: JudgedGround,
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
     y: State,
 ) -> int:
     """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
     return walk_part(
-        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, ledger, 0.0, y, NEVER
+        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, walk_state, 0.0, y, NEVER
     )
 
 
 @kernel
-def sampled_energies(walker: ContactWalker, states: Any, carried: Any, knees: Any, energies: Any) -> None:
-    """Kinetic, potential and book energy (J) of every sampled state into energies (samples, 3)."""
+def sampled_energies(walker: ContactWalker, states: Any, has_ground: Any, knees: Any, energies: Any) -> None:
+    """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
         energies[i, 0] = kinetic_energy(walker, y)
         energies[i, 1] = potential_energy(walker, y)
-        energies[i, 2] = book_energy(walker, (carried[i, 0] != 0, carried[i, 1] != 0), y)
+        energies[i, 2] = total_energy(walker, (has_ground[i, 0] != 0, has_ground[i, 1] != 0), y)
         energies[i, 2] += knee_energy(walker.knees, stop_flags(walker.knees, knees[i]), y, 2)
 
 
 @kernel
-def sampled_feet(walker: ContactWalker, states: Any, carried: Any, feet: Any) -> None:
+def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, feet: Any) -> None:
     """Position along, height (m), normal force, friction (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
     for i in range(states.shape[0]):
         y = load(states, i, walker.blank)
@@ -161,7 +161,7 @@ def sampled_feet(walker: ContactWalker, states: Any, carried: Any, feet: Any) ->
             motion = motions[foot]
             feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = motion.along, motion.height, motion.slip
             feet[i, foot, 2], feet[i, foot, 3] = 0.0, 0.0
-            if carried[i, foot] != 0 and motion.height < 0.0:
+            if has_ground[i, foot] != 0 and motion.height < 0.0:
                 force = foot_force(walker, motion)
                 feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
 
@@ -172,7 +172,7 @@ class ContactSamples:
 
     time_s: Floats  # (samples,)
     states: Floats  # (samples, 4 + 2 n)
-    carried: NDArray[np.int8]  # (samples, 2)
+    has_ground: NDArray[np.int8]  # (samples, 2)
     stance: NDArray[np.int64]  # (samples,)
     knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
     dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
@@ -219,21 +219,21 @@ class ContactWalkResult:
         return np.diff(self.touch_along_m, prepend=0.0)
 
 
-def new_ledger(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: State) -> Ledger:
-    """The ledger of a walk of `steps` steps that starts from y with both feet on the ground."""
+def new_walk_state(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: State) -> WalkState:
+    """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
     feet = feet_motion(walker, y)
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
-    carried = np.zeros(2, np.int8)
+    has_ground = np.zeros(2, np.int8)
     for foot in range(2):
-        on_pad = carried_in_cell(terrain, int(cells[foot]))
-        carried[foot] = on_pad and starts_carried(terrain, foot == stance)
+        on_pad = has_ground_in_cell(terrain, int(cells[foot]))
+        has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
     sides, at_zero = known_sides(walker, feet, stance, y)
-    return Ledger(
+    return WalkState(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
         slip=np.zeros(steps),
         rolling=np.zeros(steps),
-        carried=carried,
+        has_ground=has_ground,
         cells=cells,
         left_cells=cells.copy(),
         foothold=np.array([motion.along for motion in feet]),
@@ -263,12 +263,12 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
 def known_sides(
     walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """On which side of zero every signal is at the start, and which are at zero, by rounding at most.
+    """On which side of zero every event function is at the start, and which are at zero, by rounding at most.
 
     Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
     foot is the one ahead.
     """
-    sides, at_zero = np.zeros(SIGNALS, np.int8), np.zeros(SIGNALS, np.int8)
+    sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE]] = 1
     n = len(walker.tree.arm_x)
     size = max(abs(float(x)) for x in (*walker.feet[0].lever_x, *walker.feet[0].lever_y))
@@ -276,7 +276,7 @@ def known_sides(
     for foot in range(2):
         first = foot * PER_FOOT
         sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
-        signs = (feet[foot].height, feet[foot].climb)
+        signs = (feet[foot].height, feet[foot].vertical_velocity)
         sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
     rates = [feet[k].slip - sum(r * w for r, w in zip(walker.feet[k].rolling, y[4 + n :], strict=True)) for k in (0, 1)]
     order = (feet[1].along - feet[0].along, rates[1] - rates[0])
@@ -294,31 +294,31 @@ def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], ot
 
 def new_observer(
     walker: ContactWalker,
-    ledger: Ledger,
+    walk_state: WalkState,
     y: State,
     interval_s: float = 1.0,
     samples: int = 0,
-    booked: bool = True,
+    track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
     """An observer of a walk from state y.
 
     interval_s, samples  time between samples, and how many there is room for
-    booked               whether to keep the energy's books, by which a walk is judged; ladders of methods do without
+    track_energy         whether to keep the energy balance, by which a walk is judged; ladders of methods do not
     directions           how many directions of the start to carry along as the tangent
     """
     extremes = np.zeros(3)
-    extremes[START_ENERGY] = book_energy(walker, (bool(ledger.carried[0]), bool(ledger.carried[1])), y)
+    extremes[START_ENERGY] = total_energy(walker, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1])), y)
     return ContactObserver(
-        booked,
+        track_energy,
         interval_s * np.arange(samples),
         np.zeros((samples, len(walker.blank))),
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
-        np.zeros((samples, BOOKS)),
+        np.zeros((samples, CHANNEL_COUNT)),
         np.zeros(1, np.int64),
-        np.zeros(BOOKS),
+        np.zeros(CHANNEL_COUNT),
         extremes,
         new_tangent(len(walker.blank), directions),
         merged_tangents(walker, directions),
@@ -335,14 +335,14 @@ def merged_tangents(walker: ContactWalker, directions: int) -> tuple[Tangent, ..
 
 def walk_contact(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     pinned: Pinned | None,
     stance: int,
     start: State,
     methods: MethodSettings,
     steps: int,
     interval_s: float | None,
-    booked: bool = True,
+    track_energy: bool = True,
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
@@ -351,33 +351,33 @@ def walk_contact(
     start       state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
     methods     how to integrate
     interval_s  time between samples, or None for none
-    booked      whether to keep the energy's books, by which the walk is judged; ladders of methods do without
+    track_energy      whether to keep the energy balance, by which the walk is judged; ladders of methods do without
 
     The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
     """
     frame = ground.frame
     if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
-        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
         here = Stopped(0.0, start, np.zeros(4, np.int64))
-        return gather(Outcome.REJECTED, here, ledger, new_observer(walker, ledger, start), walker, methods)
+        return gather(Outcome.REJECTED, here, walk_state, new_observer(walker, walk_state, start), walker, methods)
     room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
     while True:
-        ledger = new_ledger(walker, ground.terrain, stance, steps, start)
-        observer = new_observer(walker, ledger, start, interval_s or 1.0, room, booked)
-        outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, ledger)
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        observer = new_observer(walker, walk_state, start, interval_s or 1.0, room, track_energy)
+        outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, walk_state)
         if room == 0 or observer.recorded[0] < room:
-            return gather(outcome, stopped, ledger, observer, walker, methods)
+            return gather(outcome, stopped, walk_state, observer, walker, methods)
         room *= 2
 
 
 def run_parts(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     pinned: Pinned | None,
     start: State,
     methods: MethodSettings,
     observer: ContactObserver,
-    ledger: Ledger,
+    walk_state: WalkState,
 ) -> tuple[Outcome, Stopped]:
     """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped.
 
@@ -390,37 +390,39 @@ def run_parts(
         angles = len(pinned.tree.arm_x)
         hinged = (*start[2 : 2 + angles], *start[4 + angles :])
         hinged_walk = walk_hinged if methods.method.compiled else uncompiled(walk_hinged)
-        outcome = Outcome(hinged_walk(pinned, ground, method, finder_for(method, SIGNALS), observer, ledger, hinged))
+        outcome = Outcome(
+            hinged_walk(pinned, ground, method, finder_for(method, EVENT_FUNCTIONS), observer, walk_state, hinged)
+        )
         t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
         spent += method.counts[:4]
-        release_hinge(walker, pinned.foot, ledger, y)
+        release_hinge(walker, pinned.foot, walk_state, y)
         if outcome is not Outcome.WALKED:
             return outcome, Stopped(t, y, spent)
     method = methods.of(walker)
-    ledger.times[AIRBORNE_SINCE] = t
+    walk_state.times[AIRBORNE_SINCE] = t
     free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
-    finder = finder_for(method, SIGNALS)
-    outcome = Outcome(free_walk(walker, ground, method, finder, observer, ledger, t, y, NEVER))
+    finder = finder_for(method, EVENT_FUNCTIONS)
+    outcome = Outcome(free_walk(walker, ground, method, finder, observer, walk_state, t, y, NEVER))
     stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
     if outcome is Outcome.WALKED:
-        unseen = new_observer(walker, ledger, stopped.state, booked=False)
-        free_walk(walker, ground, method, finder, unseen, ledger, stopped.time_s, stopped.state, AT_LIFT)
+        unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
+        free_walk(walker, ground, method, finder, unseen, walk_state, stopped.time_s, stopped.state, AT_LIFT)
     return outcome, stopped
 
 
-def by_channel(walker: ContactWalker, books: Floats) -> dict[str, float]:
+def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     """What was dissipated (J), by name; the knees' channels only where there are knees."""
     count = len(CHANNELS) if isinstance(walker.knees, Knees) else OF_STRAIGHT_LEGS
-    return dict(zip(CHANNELS[:count], books[:count].tolist(), strict=True))
+    return dict(zip(CHANNELS[:count], dissipated[:count].tolist(), strict=True))
 
 
-def release_hinge(walker: ContactWalker, foot: int, ledger: Ledger, y: State) -> None:
+def release_hinge(walker: ContactWalker, foot: int, walk_state: WalkState, y: State) -> None:
     """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
-    steps = ledger.feet[STEPS]
-    ledger.slip[:steps], ledger.rolling[:steps] = 0.0, 0.0
-    ledger.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
-    ledger.stood[foot] = 0.0
-    ledger.at_zero[foot * PER_FOOT + HEIGHT] = 1
+    steps = walk_state.feet[STEPS]
+    walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
+    walk_state.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
+    walk_state.stood[foot] = 0.0
+    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
 def explained_residual(observer: ContactObserver, methods: MethodSettings) -> float:
@@ -429,7 +431,7 @@ def explained_residual(observer: ContactObserver, methods: MethodSettings) -> fl
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the first foothold, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[START_ENERGY] + np.abs(observer.books).sum()
+    exchanged = observer.extremes[START_ENERGY] + np.abs(observer.dissipated).sum()
     return float(UNEXPLAINED * max(methods.rtol, FINEST) * exchanged)
 
 
@@ -445,36 +447,36 @@ def balanced(ended: int, observer: ContactObserver, methods: MethodSettings) -> 
 def gather(
     outcome: Outcome,
     stopped: Stopped,
-    ledger: Ledger,
+    walk_state: WalkState,
     observer: ContactObserver,
     walker: ContactWalker,
     methods: MethodSettings,
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
-    done, lifted, seen = int(ledger.feet[STEPS]), steps_with_lift(ledger), int(observer.recorded[0])
+    done, lifted, seen = int(walk_state.feet[STEPS]), steps_with_lift(walk_state), int(observer.recorded[0])
     samples = None
     if observer.times.size:
         samples = ContactSamples(
             observer.times[:seen],
             observer.states[:seen],
-            observer.carried[:seen],
+            observer.has_ground[:seen],
             observer.stance[:seen],
             observer.knees[:seen],
-            observer.sampled_books[:seen],
+            observer.sampled_dissipation[:seen],
         )
     return ContactWalkResult(
         balanced(outcome, observer, methods),
-        ledger.touch_time[:done],
-        ledger.touch_along[:done],
-        ledger.slip[:lifted],
-        ledger.rolling[:lifted],
+        walk_state.touch_time[:done],
+        walk_state.touch_along[:done],
+        walk_state.slip[:lifted],
+        walk_state.rolling[:lifted],
         stopped.time_s,
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),
         float(observer.extremes[RESIDUAL]),
         explained_residual(observer, methods),
-        observer.books.copy(),
-        ledger.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
+        observer.dissipated.copy(),
+        walk_state.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
         stopped.work,
         samples,
     )

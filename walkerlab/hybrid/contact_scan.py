@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from walkerlab.ground.terrain import has_pads
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_signals
+from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_event_functions
 from walkerlab.kernels import by_type, inlined, kernel
 from walkerlab.solvers.dop853 import Dop853
 from walkerlab.solvers.events import CrossingFinder
@@ -27,10 +27,10 @@ class Scene(NamedTuple):
 class Feet(NamedTuple):
     """What the search must know of the feet."""
 
-    carried: Any  # (2,) whether there is ground under each
+    has_ground: Any  # (2,) whether there is ground under each
     cells: Any  # (2,) which cell of its lane each is over
-    sides: Any  # (signals,) on which side of zero each signal is known to be
-    at_zero: Any  # (signals,) which signals the last event left at zero
+    sides: Any  # (event functions,) on which side of zero each event function is known to be
+    at_zero: Any  # (event functions,) which event functions the last event left at zero
     touched: Any  # (2,) m, where the material of each was when it touched
     order: Any  # (2,) the stance foot, and how many steps it is
     knee: Any  # (2,) what each knee is doing
@@ -39,10 +39,12 @@ class Feet(NamedTuple):
 
 @inlined
 def sample(system: Any, scene: Scene, feet: Feet, state: State, node: int, finder: CrossingFinder) -> None:
-    """All signals at one node of the step."""
+    """All event functions at one node of the step."""
     stance = feet.order[0]
     touched = feet.touched[stance]
-    sample_signals(system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, touched, state, node, finder)
+    sample_event_functions(
+        system, scene.walker, scene.terrain, scene.frame, feet.cells, stance, touched, state, node, finder
+    )
 
 
 @inlined
@@ -53,7 +55,7 @@ def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tup
         scene.walker,
         scene.frame,
         scene.watch_order,
-        feet.carried,
+        feet.has_ground,
         feet.order[0],
         feet.sides,
         feet.at_zero,
@@ -66,9 +68,9 @@ def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tup
 
 @by_type
 def scan(method: Any, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
-    """Fraction of a method's last step at which the first event lies, and which signal's; its dense output is ready.
+    """Fraction of a method's last step at which the first event lies, and which it is; its dense output is ready.
 
-    The signals stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
+    The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
     """
 
 
@@ -92,5 +94,5 @@ def scan_states(system: Any, scene: Scene, feet: Feet, states: Any, finder: Cros
 @scan.case(ScipyMethod)
 def scan_scipy(method: ScipyMethod, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
     """A walk in Python hands the step's states to compiled code at once."""
-    fraction, signal = scan_states(system, scene, feet, method.states_at(finder.nodes), finder)
-    return fraction, signal
+    fraction, event = scan_states(system, scene, feet, method.states_at(finder.nodes), finder)
+    return fraction, event

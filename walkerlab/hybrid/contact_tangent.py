@@ -2,8 +2,8 @@
 
 On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
 method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
-is continuous at its joins and at touch and lift, so no jump enters there; where a knee locks or is released one does. A
-foot that leaves its pad under load would need one, and a gait has none.
+is continuous at its switching points and at touch and lift, so no jump enters there; where a knee locks or is released
+one does. A foot that leaves its pad under load would need one, and a gait has none.
 """
 
 from typing import Any, NamedTuple
@@ -73,7 +73,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any, t: float, h: float) -> None:
     """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
 
-    A step that ends at a join of the force law ends on either side of it, and the Jacobian jumps there.
+    A step that ends at a switching point of the force law ends on either side of it, and the Jacobian jumps there.
     """
     near = min(0.25, THIS_SIDE / h)
     for i in range(2):

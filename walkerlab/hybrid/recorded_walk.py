@@ -40,7 +40,7 @@ CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel stri
 Array = NDArray[np.float64]
 
 
-class Work(NamedTuple):
+class WalkWork(NamedTuple):
     """What a walk cost."""
 
     rhs_evaluations: int
@@ -76,7 +76,7 @@ class RecordedWalk:
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean, from the stance foot
     samples: Samples | None
-    work: Work
+    work: WalkWork
 
     @property
     def steps(self) -> int:
@@ -234,7 +234,7 @@ class Recorder:
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
             samples=joined(self.pieces) if self.pieces else None,
-            work=Work(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
+            work=WalkWork(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
         )
 
 

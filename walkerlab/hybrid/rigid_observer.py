@@ -128,7 +128,7 @@ def vertex(before: float, at: float, after: float) -> float:
 
 
 @inlined
-def climb_to_worst(
+def ascend_to_worst(
     observer: Observer, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
     """Follow a measure of `assumptions` to its maximum near `middle` of the step, by parabolas that close in.
@@ -162,7 +162,7 @@ def record(observer: Observer, method: Any, mode: Mode, fraction: float, step: i
         mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
-                climb_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
+                ascend_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before, at = at, after
     observer.energy[INTEGRAL] += mean_energy * fraction * h
     observer.energy[DURATION] += fraction * h

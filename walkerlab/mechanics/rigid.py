@@ -16,7 +16,7 @@ ALIKE = 1e-12  # relative difference up to which two legs are alike
 
 
 @dataclass(frozen=True)
-class Places:
+class BodyPlaces:
     """Which bodies of an assembly make up each body of the rigid model, whose stance leg stays straight."""
 
     names: tuple[str, ...]  # of the angles, without their 'theta_'
@@ -84,7 +84,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     )
 
 
-def places_of(assembly: Assembly) -> Places:
+def places_of(assembly: Assembly) -> BodyPlaces:
     """Swing leg (thigh), straight stance leg, what else swings, and what belongs to both legs."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
@@ -95,7 +95,7 @@ def places_of(assembly: Assembly) -> Places:
             members[assembly.index(name), place] = 1.0
     more = len(swinging) - 1
     knee_of = {knee.shank: knee.thigh for knee in assembly.knees}
-    return Places(
+    return BodyPlaces(
         names=("1", "2", *(f"1_{name.split()[0]}" for name in swinging[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
@@ -109,7 +109,7 @@ def place_of(groups: list[tuple[str, ...]], name: str) -> int:
     return next(place for place, group in enumerate(groups) if name in group)
 
 
-def torso_rows(assembly: Assembly, places: Places) -> dict[int, Floats]:
+def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
     """Weights by which coupled places follow others."""
     rows = {}
     for coupling in assembly.couplings:
@@ -120,7 +120,7 @@ def torso_rows(assembly: Assembly, places: Places) -> dict[int, Floats]:
     return rows
 
 
-def knee_rows(places: Places) -> dict[int, Floats]:
+def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
     """Weights by which the parts of a straight swing leg follow its thigh."""
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 

@@ -63,7 +63,7 @@ def may_part(exponents: Sequence[Lyapunov], value: float) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Attractors:
+class AttractorBranch:
     """The attractor over values of the parameter, up to where it is lost.
 
     lost_at, reason  the first value at which the walk did not go on, and how it ended; None if it always did
@@ -101,7 +101,7 @@ def swept(
     transient: int,
     kept: int,
     advance: Callable[[], None] = lambda: None,
-) -> Attractors:
+) -> AttractorBranch:
     """The attractor that contains z at the first value, followed from value to value.
 
     Where a walk from one value's attractor does not settle at the next, it is led there in smaller steps.
@@ -113,10 +113,10 @@ def swept(
             here = led(step_map, found[-1], float(value), transient, kept)
         advance()
         if isinstance(here, Outcome):
-            return Attractors(tuple(found), float(value), here.label)
+            return AttractorBranch(tuple(found), float(value), here.label)
         found.append(here)
         z = here.last
-    return Attractors(tuple(found), None, "")
+    return AttractorBranch(tuple(found), None, "")
 
 
 def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) -> Attractor | Outcome:

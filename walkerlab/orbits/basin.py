@@ -81,7 +81,7 @@ def captured(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Cycle:
+class PeriodicAttractor:
     """An attractor that repeats itself.
 
     points  (period, 3) of the section, as one walk meets them, the one with the smallest angle first
@@ -105,7 +105,7 @@ class Attractors:
     aperiodic  whether walks also go on for ever without repeating themselves
     """
 
-    cycles: tuple[Cycle, ...] = ()
+    cycles: tuple[PeriodicAttractor, ...] = ()
     aperiodic: bool = False
 
     def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
@@ -189,9 +189,9 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     seed    of the starts around attractors
     """
 
-    def with_reaches(cycles: Sequence[Floats]) -> tuple[Cycle, ...]:
+    def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
-        return tuple(Cycle(points, reach_of(walker, points, cycles, generator)) for points in cycles)
+        return tuple(PeriodicAttractor(points, reach_of(walker, points, cycles, generator)) for points in cycles)
 
     cycles, aperiodic = settled_cycles(walker, starts[:FIRST], Attractors())
     reached = with_reaches(cycles)
@@ -262,7 +262,7 @@ def reach_of(walker: Walker, points: Floats, cycles: Sequence[Floats], generator
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     for _ in range(NARROWINGS):
         around = np.repeat(points, AROUND, axis=0) + reach * ways
-        back = arrivals(walker, Attractors((Cycle(points, reach),)), around, COMING_BACK, share=0.1)
+        back = arrivals(walker, Attractors((PeriodicAttractor(points, reach),)), around, COMING_BACK, share=0.1)
         if (back.attractor == 0).all():
             return reach
         reach *= NEARER

@@ -20,14 +20,14 @@ from walkerlab.orbits.bifurcations import Bifurcation, Kind, critical_value
 from walkerlab.orbits.continuation import (
     Evaluated,
     Floats,
-    Lost,
+    NotConverged,
     Solved,
     StepControl,
     corrected,
     stepped,
 )
-from walkerlab.orbits.families import BranchEnd, Span, why_lost
-from walkerlab.orbits.step_maps import Cycle, StepMap, walk_steps
+from walkerlab.orbits.families import BranchEnd, ValueSpan, why_lost
+from walkerlab.orbits.step_maps import IteratedMap, StepMap, walk_steps
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
 CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
@@ -49,7 +49,7 @@ class CriticalGaits:
         self._map_at = lru_cache(MAPS)(map_at)
         self.kind, self.period, self.scales = kind, period, scales
 
-    def cycle(self, x: Floats) -> Cycle | None:
+    def cycle(self, x: Floats) -> IteratedMap | None:
         """The steps from x; None where there is no walker or the walk ends."""
         step_map = self._map_at(float(x[-1]) * self.scales[1])
         if step_map is None:
@@ -57,7 +57,7 @@ class CriticalGaits:
         cycle = walk_steps(step_map, x[:-2], float(x[-2]) * self.scales[0], self.period)
         return cycle if cycle.outcome is Outcome.WALKED else None
 
-    def at(self, x: Floats) -> Evaluated[Cycle | None]:
+    def at(self, x: Floats) -> Evaluated[IteratedMap | None]:
         """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
         d = x.size - 2
         here = self.cycle(x)
@@ -98,7 +98,7 @@ def curve_through(
     bifurcation: Bifurcation,
     period: int,
     map_at: MapAt,
-    spans: tuple[Span, Span],
+    spans: tuple[ValueSpan, ValueSpan],
     second: float,
     points: int,
     advance: Callable[[], None] = lambda: None,
@@ -115,7 +115,7 @@ def curve_through(
     x[-2] = bifurcation.value / scales[0]
     at_second = np.append(np.zeros(x.size - 1), 1.0)
     start = corrected(equations, x, at_second, control.tolerance)
-    if isinstance(start, Lost):
+    if isinstance(start, NotConverged):
         return None
     halves = [
         traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance, control)
@@ -126,7 +126,7 @@ def curve_through(
 
 
 def traced(
-    equations: CriticalGaits, start: Solved[Cycle | None], spans: tuple[Span, Span], points: int,
+    equations: CriticalGaits, start: Solved[IteratedMap | None], spans: tuple[ValueSpan, ValueSpan], points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
@@ -134,7 +134,7 @@ def traced(
     values, before, last, length = [start.x[-2:] * scales], None, start, control.first
     while len(values) < points:
         following = stepped(equations, last, length, control, before=before)
-        if isinstance(following, Lost):
+        if isinstance(following, NotConverged):
             return np.array(values), BranchEnd(float(values[-1][1]), why_lost(following))
         solved, _, length = following
         value = solved.x[-2:] * scales
@@ -147,7 +147,7 @@ def traced(
     return np.array(values), BranchEnd(float(values[-1][1]), f"{points} points are used up")
 
 
-def clipped(inside: Floats, outside: Floats, spans: tuple[Span, Span]) -> Floats:
+def clipped(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan]) -> Floats:
     """The last point on the way out of the plane."""
     share = 1.0
     for k, span in enumerate(spans):

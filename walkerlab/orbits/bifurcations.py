@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.continuation import Evaluated, Floats, Segment, Solved, root_along
-from walkerlab.orbits.step_maps import Cycle, StepMap, multipliers_of, walk_steps
+from walkerlab.orbits.step_maps import IteratedMap, StepMap, multipliers_of, walk_steps
 
 Kind = Literal["fold", "flip", "torus"]
 KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
@@ -37,7 +37,7 @@ class GaitEquations:
         """Gaits of `period` steps; `scale` makes the parameter of magnitude one."""
         self.step_map, self.period, self.scale = step_map, period, scale
 
-    def at(self, x: Floats) -> Evaluated[Cycle]:
+    def at(self, x: Floats) -> Evaluated[IteratedMap]:
         """Residual and its derivative at x (d + 1,)."""
         z = x[:-1]
         cycle = walk_steps(self.step_map, z, self.value(x), self.period)
@@ -78,10 +78,10 @@ class Bifurcation:
     kind: Kind
     value: float  # of the parameter
     multiplier: complex
-    point: Solved[Cycle]
+    point: Solved[IteratedMap]
 
 
-def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
+def bifurcation_in(segment: Segment[IteratedMap], kind: Kind, scale: float) -> Bifurcation | None:
     """The bifurcation of a kind between two neighbours of a branch; None if there is none."""
     tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
     if tests[0] * tests[1] >= 0.0:
@@ -133,7 +133,7 @@ def eigenvector(A: Floats, value: float) -> Floats:
     return np.asarray(rows[-1])
 
 
-def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[Cycle]) -> FlipForm | None:
+def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[IteratedMap]) -> FlipForm | None:
     """The normal form at a flip, by differences of exact maps and derivatives; None if a probe cannot be walked.
 
     segment  the part of the branch that the flip lies on
@@ -156,7 +156,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[Cycl
     return form
 
 
-def _growth_rate(flip: Bifurcation, segment: Segment[Cycle], v: Floats, w: Floats) -> float | None:
+def _growth_rate(flip: Bifurcation, segment: Segment[IteratedMap], v: Floats, w: Floats) -> float | None:
     """How fast the multiplier passes -1 along the branch."""
     s = float(segment.first.tangent @ (flip.point.x - segment.first.x))
     gap = 1e-3 * segment.length

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.terrain import stride_measure
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, SIGNALS
+from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING
 from walkerlab.hybrid.contact_rules import STANCE, STEPS
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
 from walkerlab.solvers.registry import finder_for
@@ -43,7 +43,7 @@ class GaitAnswer:
     advice: str = ""
 
 
-def find_gait_from(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:
+def find_gait_from(walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State) -> GaitAnswer:
     """The contact gait near a start with both feet on the ground (state of the free walker, 8 numbers).
 
     Never raises for want of a gait: the answer says why there is none and what to try.
@@ -84,24 +84,24 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
 
 
 def section_points(
-    walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State
+    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State
 ) -> Iterator[tuple[int, Floats]]:
     """Points of the section that walks from the start pass through, and after how many steps each."""
     for steps in WARM_UP:
-        ledger = new_ledger(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
-        observer = new_observer(walker, ledger, start)
+        walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
+        observer = new_observer(walker, walk_state, start)
         method = replace(methods, budget=(steps + 1) * methods.budget).of(walker)
-        finder = finder_for(method, SIGNALS)
-        ended = walk_free(walker, ground, method, finder, observer, ledger, 0.0, start, steps)
+        finder = finder_for(method, EVENT_FUNCTIONS)
+        ended = walk_free(walker, ground, method, finder, observer, walk_state, 0.0, start, steps)
         outcome = balanced(ended, observer, methods)
-        if outcome == Outcome.WALKED and ledger.at_zero[PASSING]:
-            yield steps, coordinates_of(walker, method.y, int(ledger.feet[STANCE]))
-        elif ledger.feet[STEPS] > steps:
+        if outcome == Outcome.WALKED and walk_state.at_zero[PASSING]:
+            yield steps, coordinates_of(walker, method.y, int(walk_state.feet[STANCE]))
+        elif walk_state.feet[STEPS] > steps:
             return
 
 
 def gait_near(
-    walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float
+    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, z: Floats, pitch_m: float
 ) -> ContactGait | str:
     """Newton's method from section coordinates z (6,): the gait, or what came in its way."""
     try:
@@ -115,7 +115,7 @@ def gait_near(
     return found
 
 
-def softened(walker: ContactWalker, rigidity: float) -> ContactWalker:
+def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid.
 
     The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
@@ -130,11 +130,11 @@ def softened(walker: ContactWalker, rigidity: float) -> ContactWalker:
     return walker._replace(normal=harder, friction=walker.friction.with_creep(1.0 / stickier))
 
 
-def follow_from_rigid(walker: ContactWalker, ground: Ground, methods: MethodSettings, start: State) -> GaitAnswer:
+def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State) -> GaitAnswer:
     """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
     pitch, last = stride_measure(ground.terrain), None
-    for _steps, z in section_points(softened(walker, 1.0), ground, methods, start):
-        found = gait_near(softened(walker, 1.0), ground, methods, z, pitch)
+    for _steps, z in section_points(with_rigidity(walker, 1.0), ground, methods, start):
+        found = gait_near(with_rigidity(walker, 1.0), ground, methods, z, pitch)
         if isinstance(found, ContactGait):
             last = found
             break
@@ -150,7 +150,7 @@ def follow_from_rigid(walker: ContactWalker, ground: Ground, methods: MethodSett
         guess = last.z
         if before is not None:
             guess = last.z + (last.z - before[1]) * (ahead - rigidity) / (rigidity - before[0])
-        found = gait_near(softened(walker, ahead), ground, methods, guess, last.step.length_m)
+        found = gait_near(with_rigidity(walker, ahead), ground, methods, guess, last.step.length_m)
         if isinstance(found, ContactGait):
             before, last, rigidity, stride = (rigidity, last.z), found, ahead, 1.5 * stride
             if rigidity == 0.0:

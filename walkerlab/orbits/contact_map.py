@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import Ground, MethodSettings
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import Floats, SectionStep, angled_bodies, step_from_section, turning_bodies
 from walkerlab.orbits.step_maps import (
@@ -31,7 +31,7 @@ class WalkerOnGround:
     """A walker at one value of the parameter, and the ground it walks on."""
 
     walker: ContactWalker
-    ground: Ground
+    ground: JudgedGround
 
 
 class ContactMap:
@@ -93,7 +93,9 @@ class ContactMap:
     def _walk(self, here: WalkerOnGround, z: Floats, terrain: Any) -> SectionStep:
         units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
         measure = terrain.pitch if isinstance(terrain, Checkerboard) else self._measure
-        return step_from_section(here.walker, Ground(terrain, here.ground.frame), self._methods, z * units, measure)
+        return step_from_section(
+            here.walker, JudgedGround(terrain, here.ground.frame), self._methods, z * units, measure
+        )
 
     def _terrain(self, here: WalkerOnGround) -> Any:
         terrain = here.ground.terrain

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Held, IdealLock, Knees, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.terrain import Checkerboard, carried_in_air
+from walkerlab.ground.terrain import Checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, SIGNALS, feet_motion, material_along
+from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
-from walkerlab.hybrid.contact_rules import Ledger
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_rules import WalkState
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import finder_for
 from walkerlab.solvers.scipy_methods import right_hand_side
@@ -51,7 +51,7 @@ class SectionStep:
     length_m: float  # how far the walker went
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
     rolling_m: float  # likewise
-    books_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
+    dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
     height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     touch_s: float  # from the section to the touch
@@ -150,18 +150,18 @@ def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
     return along
 
 
-def pads_for(ground: Ground, walker: ContactWalker, state: State, stance: int, pitch_m: float) -> Ground:
+def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: int, pitch_m: float) -> JudgedGround:
     """The ground with its pads laid for steps of `pitch_m`, the standing foot in the middle of one."""
     if not isinstance(ground.terrain, Checkerboard):
         return ground
     foothold = feet_motion(walker, state)[stance].along
     ahead = foothold + pitch_m
     lanes = (ahead, foothold) if stance == 1 else (foothold, ahead)
-    return Ground(Checkerboard(pitch_m, lanes), ground.frame)
+    return JudgedGround(Checkerboard(pitch_m, lanes), ground.frame)
 
 
 def step_from_section(
-    walker: ContactWalker, ground: Ground, methods: MethodSettings, z: Floats, pitch_m: float
+    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, z: Floats, pitch_m: float
 ) -> SectionStep:
     """Walk from the section to the section.
 
@@ -171,16 +171,16 @@ def step_from_section(
     stance = STANCE_FOOT
     start = state_on_section(walker, z, stance)
     laid = pads_for(ground, walker, start, stance, pitch_m)
-    ledger = new_ledger(walker, laid.terrain, stance, 2, start)
-    stand_on_section(ledger, walker, laid, start, stance)
-    observer = new_observer(walker, ledger, start, directions=z.size)
+    walk_state = new_walk_state(walker, laid.terrain, stance, 2, start)
+    stand_on_section(walk_state, walker, laid, start, stance)
+    observer = new_observer(walker, walk_state, start, directions=z.size)
     observer.tangent.Phi[:, :] = directions(walker, start, stance)
     method = methods.of(walker)
-    finder = finder_for(method, SIGNALS)
-    ended = walk_free(walker, laid, method, finder, observer, ledger, 0.0, start, 1)
+    finder = finder_for(method, EVENT_FUNCTIONS)
+    ended = walk_free(walker, laid, method, finder, observer, walk_state, 0.0, start, 1)
     end = method.y.copy()
-    slipped, rolled = since_touch(walker, ledger, tuple(end.tolist()), 1 - stance)
-    DP = section_derivative(walker, ledger, observer, end, 1 - stance)
+    slipped, rolled = since_touch(walker, walk_state, tuple(end.tolist()), 1 - stance)
+    DP = section_derivative(walker, walk_state, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
@@ -189,43 +189,47 @@ def step_from_section(
         DP,
         float(method.clock[T]),
         float(end[ALONG] - start[ALONG]),
-        float(ledger.slip[0] + slipped),
-        float(ledger.rolling[0] + rolled),
-        observer.books.copy(),
+        float(walk_state.slip[0] + slipped),
+        float(walk_state.rolling[0] + rolled),
+        observer.dissipated.copy(),
         float(lost),
         method.counts[:4].copy(),
-        float(ledger.touch_time[0]),
-        float(ledger.touch_along[0] - ledger.foothold[stance] - ledger.slip[0]),
+        float(walk_state.touch_time[0]),
+        float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
     )
 
 
-def since_touch(walker: ContactWalker, ledger: Ledger, y: State, foot: int) -> tuple[float, float]:
+def since_touch(walker: ContactWalker, walk_state: WalkState, y: State, foot: int) -> tuple[float, float]:
     """How far a foot has slipped and rolled since its touch (m)."""
     along = feet_motion(walker, y)[foot].along
-    slipped = material_along(walker, foot, along, y) - float(ledger.touched[foot])
-    return slipped, along - float(ledger.foothold[foot]) - slipped
+    slipped = material_along(walker, foot, along, y) - float(walk_state.touched[foot])
+    return slipped, along - float(walk_state.foothold[foot]) - slipped
 
 
-def stand_on_section(ledger: Ledger, walker: ContactWalker, ground: Ground, start: State, stance: int) -> None:
-    """Correct a ledger made for a start with both feet down: here one stands and the other swings past it."""
+def stand_on_section(
+    walk_state: WalkState, walker: ContactWalker, ground: JudgedGround, start: State, stance: int
+) -> None:
+    """Correct a walk state made for a start with both feet down: here one stands and the other swings past it."""
     swing = 1 - stance
     feet = feet_motion(walker, start)
-    ledger.at_zero[:] = 0
-    ledger.at_zero[PASSING] = 1
-    ledger.sides[PASSING] = 1 if swing == 1 else -1
+    walk_state.at_zero[:] = 0
+    walk_state.at_zero[PASSING] = 1
+    walk_state.sides[PASSING] = 1 if swing == 1 else -1
     above = feet[swing].height > 0.0
-    ledger.carried[swing] = above and carried_in_air(ground.terrain, bool(ledger.carried[swing]), False, True)
-    ledger.left_cells[swing] = ledger.cells[swing] - 1
-    ledger.foothold[swing] = feet[stance].along - ground.frame.leg_length
+    walk_state.has_ground[swing] = above and has_ground_in_air(
+        ground.terrain, bool(walk_state.has_ground[swing]), False, True
+    )
+    walk_state.left_cells[swing] = walk_state.cells[swing] - 1
+    walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
 
 
 def section_derivative(
-    walker: ContactWalker, ledger: Ledger, observer: ContactObserver, end: Floats, stance: int
+    walker: ContactWalker, walk_state: WalkState, observer: ContactObserver, end: Floats, stance: int
 ) -> Floats:
     """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
-    carried = (bool(ledger.carried[0]), bool(ledger.carried[1]))
-    held = held_flags(walker.held, walker.knees, ledger.knee)
-    system = OnGround(walker, carried, held, stop_flags(walker.knees, ledger.knee))
+    has_ground = (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1]))
+    held = held_flags(walker.held, walker.knees, walk_state.knee)
+    system = OnGround(walker, has_ground, held, stop_flags(walker.knees, walk_state.knee))
     rate = np.zeros(end.size)
     right_hand_side(system, 0.0, end, rate)
     gradient, n = np.zeros(end.size), len(walker.tree.arm_x)
@@ -253,7 +257,7 @@ class ContactGait:
 
 def find_contact_gait(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     methods: MethodSettings,
     z: Any,
     pitch_m: float,
@@ -284,7 +288,7 @@ def find_contact_gait(
 
 def damped(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     methods: MethodSettings,
     z: Floats,
     move: Floats,

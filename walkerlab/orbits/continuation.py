@@ -61,7 +61,7 @@ class Solved(Generic[D]):
 
 
 @dataclass(frozen=True)
-class Lost:
+class NotConverged:
     """Why Newton's method found nothing."""
 
     outcome: Outcome  # WALKED if it could be evaluated and did not converge
@@ -78,27 +78,27 @@ def tangent_of(jacobian: Floats, along: Floats) -> Floats:
 
 def corrected(
     equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MOST_CORRECTIONS
-) -> Solved[D] | Lost:
+) -> Solved[D] | NotConverged:
     """Newton's method from `guess` on the plane through it with that normal."""
     x, best = guess, np.inf
     for correction in range(most):
         here = equations.at(x)
         if here.outcome is not Outcome.WALKED:
-            return Lost(here.outcome)
+            return NotConverged(here.outcome)
         residual = float(np.max(np.abs(here.value)))
         rounding = residual >= 0.5 * best and residual <= SLACK * tolerance
         if residual <= tolerance or rounding:
             try:
                 return Solved(x, tangent_of(here.jacobian, normal), here, correction)
             except np.linalg.LinAlgError:
-                return Lost(Outcome.WALKED)
+                return NotConverged(Outcome.WALKED)
         best = min(best, residual)
         try:
             move = np.linalg.solve(np.vstack((here.jacobian, normal)), np.append(-here.value, normal @ (guess - x)))
         except np.linalg.LinAlgError:
-            return Lost(Outcome.WALKED)
+            return NotConverged(Outcome.WALKED)
         x = x + move
-    return Lost(Outcome.WALKED)
+    return NotConverged(Outcome.WALKED)
 
 
 @dataclass(frozen=True)
@@ -124,13 +124,13 @@ def stepped(
     control: StepControl,
     acceptable: Callable[[Solved[D]], bool] = lambda _: True,
     before: Solved[D] | None = None,
-) -> tuple[Solved[D], float, float] | Lost:
+) -> tuple[Solved[D], float, float] | NotConverged:
     """The next point of a curve after `last`, how far it was sought, and how far to look for the one after it.
 
     acceptable  a caller's own wish for smaller steps
     before      the point before the last, if there is one: it tells how the curve bends
     """
-    lost = Lost(Outcome.WALKED)
+    lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x) if before is None else bend_between(before, last)
     while length >= control.shortest:
         guess = last.x + length * last.tangent + 0.5 * length**2 * bend
@@ -165,7 +165,7 @@ class Segment(Generic[D]):
         """Distance of the second point along the first one's tangent."""
         return float(self.first.tangent @ (self.second.x - self.first.x))
 
-    def at(self, s: float) -> Solved[D] | Lost:
+    def at(self, s: float) -> Solved[D] | NotConverged:
         """The point at distance s, which may lie a little outside."""
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
@@ -187,7 +187,7 @@ def root_along(segment: Segment[D], measure: Callable[[Solved[D]], float]) -> So
     def at(s: float) -> float:
         if s not in found:
             point = segment.at(s)
-            if isinstance(point, Lost):
+            if isinstance(point, NotConverged):
                 raise _OffTheCurve
             found[s] = point
         return measure(found[s])

@@ -28,14 +28,14 @@ from walkerlab.orbits.bifurcations import (
 )
 from walkerlab.orbits.continuation import (
     Floats,
-    Lost,
+    NotConverged,
     Segment,
     Solved,
     StepControl,
     corrected,
     stepped,
 )
-from walkerlab.orbits.step_maps import Cycle, Monitor, StepMap, multipliers_of
+from walkerlab.orbits.step_maps import IteratedMap, Monitor, StepMap, multipliers_of
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
@@ -45,7 +45,7 @@ SHORTEST_STEP_S = 1e-3
 
 
 @dataclass(frozen=True)
-class Span:
+class ValueSpan:
     """The values of the parameter that are asked for."""
 
     least: float
@@ -93,7 +93,7 @@ class GaitPoint:
     lengths_m: Floats
     angles: Floats
     monitors: Floats
-    solved: Solved[Cycle]
+    solved: Solved[IteratedMap]
 
     @property
     def stable(self) -> bool:
@@ -118,7 +118,7 @@ class Crossing:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class GaitBranch:
     """Gaits of one number of steps along a curve."""
 
     period: int
@@ -126,7 +126,7 @@ class Branch:
     ends: tuple[BranchEnd, BranchEnd]
     bifurcations: tuple[Bifurcation, ...]
     crossings: tuple[Crossing, ...]
-    segments: tuple[tuple[Bifurcation, Segment[Cycle]], ...] = field(repr=False, default=())
+    segments: tuple[tuple[Bifurcation, Segment[IteratedMap]], ...] = field(repr=False, default=())
 
     @cached_property
     def values(self) -> Floats:
@@ -175,13 +175,13 @@ class Seed(NamedTuple):
     period: int = 1
 
 
-class Follower:
+class BranchFollower:
     """Follows branches of one model over one span."""
 
     def __init__(
         self,
         step_map: StepMap,
-        span: Span,
+        span: ValueSpan,
         control: StepControl = CONTROL,
         limits: Limits = LIMITS,
         advance: Callable[[], None] = lambda: None,
@@ -189,7 +189,7 @@ class Follower:
         """Nothing is followed yet; `advance` is told of each point."""
         self.step_map, self.span, self.control, self.limits, self.advance = step_map, span, control, limits, advance
 
-    def family(self, seeds: Iterable[Seed], periods: int, known: tuple[Branch, ...] = ()) -> tuple[Branch, ...]:
+    def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
         """Every branch that the seeds lie on, and the cascades beyond their flips, after those that are known.
 
         periods  steps of the longest gaits wanted
@@ -215,17 +215,17 @@ class Follower:
         """Of gaits of so many steps."""
         return GaitEquations(self.step_map, period, self.span.size)
 
-    def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
+    def solved_at(self, z: Floats, value: float, period: int) -> Solved[IteratedMap] | None:
         """The gait near z at a value of the parameter; None if Newton's method finds none."""
         fixed = np.append(np.zeros(z.size), 1.0)
         found = corrected(
             self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, 20
         )
-        if isinstance(found, Lost) or found.evaluated.data.period_s < SHORTEST_STEP_S:
+        if isinstance(found, NotConverged) or found.evaluated.data.period_s < SHORTEST_STEP_S:
             return None
         return found
 
-    def lies_on(self, branch: Branch, gait: Solved[Cycle]) -> bool:
+    def lies_on(self, branch: GaitBranch, gait: Solved[IteratedMap]) -> bool:
         """Whether a gait is on a branch already, at whichever of its steps it is looked at."""
         value = float(gait.x[-1]) * self.span.size
         starts = [gait.x[:-1], *(step.z for step in gait.evaluated.data.steps)]
@@ -239,16 +239,16 @@ class Follower:
                 return True
         return False
 
-    def both_ways(self, start: Solved[Cycle], period: int) -> Branch:
+    def both_ways(self, start: Solved[IteratedMap], period: int) -> GaitBranch:
         """The branch through a gait, in the order in which the parameter rises at it."""
         rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
         ahead = self.trace(rising, period)
         behind = self.trace(replace(rising, tangent=-rising.tangent), period)
         return joined(behind, ahead)
 
-    def doubled(self, parent: Branch, known: Iterable[Branch]) -> list[Branch]:
+    def doubled(self, parent: GaitBranch, known: Iterable[GaitBranch]) -> list[GaitBranch]:
         """The branches of twice the period that begin at the flips of a branch."""
-        found: list[Branch] = []
+        found: list[GaitBranch] = []
         equations = self.equations(parent.period)
         for flip, segment in parent.segments:
             if flip.kind != "flip" or any(ends_at(branch, flip, 2 * parent.period) for branch in (*known, *found)):
@@ -261,7 +261,7 @@ class Follower:
                 found.append(replace(branch, ends=(first, branch.ends[1])))
         return found
 
-    def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[Cycle] | None:
+    def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[IteratedMap] | None:
         """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away."""
         doubled = self.equations(2 * period)
         for halving in range(HALVINGS):
@@ -271,14 +271,14 @@ class Follower:
                 return self.pointing_apart(found, period)
         return None
 
-    def pointing_apart(self, start: Solved[Cycle], period: int) -> Solved[Cycle]:
+    def pointing_apart(self, start: Solved[IteratedMap], period: int) -> Solved[IteratedMap]:
         """A gait of twice `period` steps with its tangent turned so that the halves of its cycle part further."""
         equations = self.equations(period)
         half = equations.at(start.x)
         parting = half.value @ (half.jacobian @ start.tangent)
         return start if parting > 0.0 else replace(start, tangent=-start.tangent)
 
-    def trace(self, start: Solved[Cycle], period: int) -> Branch:
+    def trace(self, start: Solved[IteratedMap], period: int) -> GaitBranch:
         """The branch from a gait along its tangent until it ends."""
         equations = self.equations(period)
         points, bifurcations, segments = [self.point(start, period)], [], []
@@ -290,7 +290,7 @@ class Follower:
                 end = BranchEnd(points[-1].value, f"{self.limits.points} points are used up")
                 break
             following = stepped(equations, last, step, self.control, self.near_enough(last), before)
-            if isinstance(following, Lost):
+            if isinstance(following, NotConverged):
                 end = BranchEnd(points[-1].value, why_lost(following))
                 break
             solved, _, step = following
@@ -311,13 +311,13 @@ class Follower:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {self.limits.growth:g}-fold a cycle")
             before, last = last, solved
         first = BranchEnd(points[0].value, "start")
-        return Branch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
+        return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
 
-    def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
+    def near_enough(self, last: Solved[IteratedMap]) -> Callable[[Solved[IteratedMap]], bool]:
         """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
         before = multipliers_of(last.evaluated.data.DP)
 
-        def near(found: Solved[Cycle]) -> bool:
+        def near(found: Solved[IteratedMap]) -> bool:
             after = multipliers_of(found.evaluated.data.DP)
             critical = [one for one in before if 1.0 / NEAR_CIRCLE < abs(one) < NEAR_CIRCLE]
             return all(min(abs(one - other) for other in after) < TURN_OF_MULTIPLIERS for one in critical)
@@ -325,8 +325,8 @@ class Follower:
         return near
 
     def within(
-        self, equations: GaitEquations, last: Solved[Cycle], solved: Solved[Cycle]
-    ) -> tuple[BranchEnd | None, Solved[Cycle]]:
+        self, equations: GaitEquations, last: Solved[IteratedMap], solved: Solved[IteratedMap]
+    ) -> tuple[BranchEnd | None, Solved[IteratedMap]]:
         """A point that has left the span is brought back to its end, where the branch ends."""
         value = equations.value(solved.x)
         if value in self.span:
@@ -336,12 +336,12 @@ class Follower:
         guess = last.x + share * (solved.x - last.x)
         guess[-1] = edge / self.span.size
         at_edge = corrected(equations, guess, np.append(np.zeros(guess.size - 1), 1.0), self.control.tolerance)
-        if isinstance(at_edge, Lost):
+        if isinstance(at_edge, NotConverged):
             return BranchEnd(value, "end of the span"), solved
         along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent
         return BranchEnd(edge, "end of the span"), replace(at_edge, tangent=along)
 
-    def point(self, solved: Solved[Cycle], period: int) -> GaitPoint:
+    def point(self, solved: Solved[IteratedMap], period: int) -> GaitPoint:
         """What is kept of a gait."""
         self.advance()
         cycle, value, z = solved.evaluated.data, float(solved.x[-1]) * self.span.size, solved.x[:-1]
@@ -357,7 +357,7 @@ class Follower:
         )
 
 
-def strike_to_strike(cycle: Cycle) -> Floats:
+def strike_to_strike(cycle: IteratedMap) -> Floats:
     """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
     waits = [step.period_s - step.strike_s for step in cycle.steps]
     return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(cycle.steps)])
@@ -368,28 +368,28 @@ def steps_word(n: int) -> str:
     return "step" if n == 1 else "steps"
 
 
-def repeats_sooner(solved: Solved[Cycle], period: int) -> bool:
+def repeats_sooner(solved: Solved[IteratedMap], period: int) -> bool:
     """Whether a gait of `period` steps is one of fewer."""
     steps = solved.evaluated.data.steps[: period - 1]
     return any(float(np.max(np.abs(step.z - solved.x[:-1]))) < SAME for step in steps)
 
 
-def apart(solved: Solved[Cycle], period: int) -> Floats:
+def apart(solved: Solved[IteratedMap], period: int) -> Floats:
     """From a gait's first state to that half a cycle on: zero where it is a gait of half as many steps."""
     return np.asarray(solved.evaluated.data.steps[period // 2 - 1].z - solved.x[:-1])
 
 
-def period_amplitude(solved: Solved[Cycle], period: int) -> float:
+def period_amplitude(solved: Solved[IteratedMap], period: int) -> float:
     """How far apart the halves of a cycle are; no bound for one step."""
     return float(np.linalg.norm(apart(solved, period))) if period > 1 else np.inf
 
 
-def closes(last: Solved[Cycle], solved: Solved[Cycle], period: int) -> bool:
+def closes(last: Solved[IteratedMap], solved: Solved[IteratedMap], period: int) -> bool:
     """Whether between two neighbours the halves of the cycle changed places: the branch met its parent."""
     return period % 2 == 0 and float(apart(last, period) @ apart(solved, period)) < 0.0
 
 
-def ends_at(branch: Branch, flip: Bifurcation, period: int) -> bool:
+def ends_at(branch: GaitBranch, flip: Bifurcation, period: int) -> bool:
     """Whether a branch of this period closes on this flip, at either end."""
     if branch.period != period:
         return False
@@ -401,7 +401,7 @@ def ends_at(branch: Branch, flip: Bifurcation, period: int) -> bool:
     return False
 
 
-def why_lost(lost: Lost) -> str:
+def why_lost(lost: NotConverged) -> str:
     """Why a branch goes no further, in words."""
     if lost.outcome is Outcome.WALKED:
         return "Newton's method finds no further gait"
@@ -433,9 +433,9 @@ def crossings_between(monitors: Iterable[Monitor], one: GaitPoint, other: GaitPo
     return found
 
 
-def joined(behind: Branch, ahead: Branch) -> Branch:
+def joined(behind: GaitBranch, ahead: GaitBranch) -> GaitBranch:
     """Two halves of a branch that begin at one gait."""
-    return Branch(
+    return GaitBranch(
         ahead.period,
         (*reversed(behind.points[1:]), *ahead.points),
         (behind.ends[1], ahead.ends[1]),

@@ -23,7 +23,7 @@ from walkerlab.orbits.random_starts import (
     known_gaits,
 )
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.slope_branch import Branch
+from walkerlab.orbits.slope_branch import SlopeBranch
 from walkerlab.orbits.small_slope import Vector, seeds
 from walkerlab.orbits.step_map import Shooting, new_shooting, newton, variation_size
 from walkerlab.solvers.dop853 import new_dop853
@@ -112,14 +112,14 @@ def shooting(walker: Standing, rtol: float, atol: float, budget: int) -> Shootin
 
 
 @lru_cache(maxsize=16)
-def branches(walker: Standing, settings: SearchSettings) -> tuple[Branch, ...]:
+def branches(walker: Standing, settings: SearchSettings) -> tuple[SlopeBranch, ...]:
     """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
     looking = shooting(walker, settings.rtol, settings.atol, settings.budget)
-    return tuple(Branch(looking, seed) for seed in seeds(walker))
+    return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
 @dataclass
-class Found:
+class FoundGait:
     """A gait with what led to it."""
 
     z: Vector
@@ -135,7 +135,7 @@ class Search:
         """Nothing is found yet."""
         self.walker, self.units = unit_walker(walker)
         self.settings = settings
-        self.found: list[Found] = []
+        self.found: list[FoundGait] = []
         self.lost: list[str] = []
         self.drawn = 0
         rtol, atol = settings.solved_rtol, settings.solved_atol
@@ -188,7 +188,7 @@ class Search:
         gait = measured(self.walker, self.units, self.method, z, self.solving.DP)
         if gait is None or gait.residual > self.settings.residual:
             return False
-        self.found.append(Found(z, self.solving.DP.copy(), gait, [by]))
+        self.found.append(FoundGait(z, self.solving.DP.copy(), gait, [by]))
         return True
 
     def known(self, z: Vector, by: str) -> bool:

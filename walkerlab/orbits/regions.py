@@ -20,7 +20,7 @@ from walkerlab.orbits.attractors import settled
 from walkerlab.orbits.bifurcation_curves import MapAt
 from walkerlab.orbits.bifurcations import eigenvector
 from walkerlab.orbits.continuation import Floats
-from walkerlab.orbits.families import Branch, Follower, Span
+from walkerlab.orbits.families import BranchFollower, GaitBranch, ValueSpan
 from walkerlab.orbits.step_maps import StepMap, multipliers_of
 
 CELLS = (72, 36)
@@ -42,7 +42,7 @@ class Regions:
     period: NDArray[np.int64]
 
 
-class Gait(NamedTuple):
+class CellGait(NamedTuple):
     """A gait of one step at a cell."""
 
     z: Floats
@@ -50,12 +50,16 @@ class Gait(NamedTuple):
     away: Floats  # (d,) a start beside it, towards what grows
 
 
-Row = list[Gait | None]
+Row = list[CellGait | None]
 Points = list[Floats | None]
 
 
 def regions_of(
-    branches: Sequence[Branch], map_at: MapAt, spans: tuple[Span, Span], own: float, advance: Callable[[], None]
+    branches: Sequence[GaitBranch],
+    map_at: MapAt,
+    spans: tuple[ValueSpan, ValueSpan],
+    own: float,
+    advance: Callable[[], None],
 ) -> Regions:
     """The regions of the plane around branches that were followed at the value `own` of the second parameter."""
     first, second = (middles(span, cells) for span, cells in zip(spans, CELLS, strict=True))
@@ -68,18 +72,18 @@ def regions_of(
         for row in order:
             step_map = map_at(float(second[row]))
             if step_map is not None:
-                gaits = corrected_row(Follower(step_map, spans[0]), first, gaits)
+                gaits = corrected_row(BranchFollower(step_map, spans[0]), first, gaits)
                 period[:, row], points = settled_row(step_map, first, gaits, points)
             advance()
     return Regions(first, second, period)
 
 
-def middles(span: Span, cells: int) -> Floats:
+def middles(span: ValueSpan, cells: int) -> Floats:
     """Middles of equal cells of a span."""
     return span.least + span.size * (np.arange(cells) + 0.5) / cells
 
 
-def known_gaits(branches: Sequence[Branch], values: Floats) -> Row:
+def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Row:
     """Near each value a gait of one step from the branches, a stable one if there is one."""
     found: Row = [None] * len(values)
     for branch in branches:
@@ -92,11 +96,11 @@ def known_gaits(branches: Sequence[Branch], values: Floats) -> Row:
                 z = one.z + share * (other.z - one.z)
                 present = found[place]
                 if present is None or (one.stable and not present.stable):
-                    found[place] = Gait(z, one.stable, z)
+                    found[place] = CellGait(z, one.stable, z)
     return found
 
 
-def corrected_row(follower: Follower, values: Floats, before: Row) -> Row:
+def corrected_row(follower: BranchFollower, values: Floats, before: Row) -> Row:
     """The gaits at the cells of a row, from those of the row before and from neighbours in the row itself."""
     row: Row = [None] * len(values)
     forwards, backwards = range(len(values)), range(len(values) - 1, -1, -1)
@@ -116,14 +120,14 @@ def corrected_row(follower: Follower, values: Floats, before: Row) -> Row:
     return row
 
 
-def gait_near(follower: Follower, z: Floats, value: float) -> Gait | None:
+def gait_near(follower: BranchFollower, z: Floats, value: float) -> CellGait | None:
     """The gait of one step that Newton's method finds from z."""
     solved = follower.solved_at(z, value, 1)
     if solved is None:
         return None
     DP, gait = solved.evaluated.data.DP, solved.x[:-1]
     largest = multipliers_of(DP)[0]
-    return Gait(gait, bool(abs(largest) < 1.0), gait + KICK * eigenvector(DP, largest.real))
+    return CellGait(gait, bool(abs(largest) < 1.0), gait + KICK * eigenvector(DP, largest.real))
 
 
 def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[NDArray[np.int64], Points]:
@@ -147,7 +151,7 @@ def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -
     return periods, points
 
 
-def starts_at(place: int, gait: Gait | None, points: Points, before: Points) -> Iterator[Floats]:
+def starts_at(place: int, gait: CellGait | None, points: Points, before: Points) -> Iterator[Floats]:
     """Where walks begin at a cell: on the attractors of its neighbours, and beside its unstable gait."""
     candidates = (points[place - 1] if place else None, before[place], None if gait is None else gait.away)
     yield from (start for start in candidates if start is not None)

@@ -25,7 +25,7 @@ from walkerlab.hybrid.comparison import (
     difference_in_time,
     sampled_at_strikes,
 )
-from walkerlab.hybrid.contact_run import ContactWalkResult, Ground, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, MethodSettings, walk_contact
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
@@ -37,7 +37,7 @@ ABSOLUTE = 0.01  # absolute tolerance in relative ones
 REPEATS = 3
 
 
-class Setting(NamedTuple):
+class ContactFactors(NamedTuple):
     """A contact: by which factors its numbers differ from the config's."""
 
     series: str
@@ -52,7 +52,7 @@ STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "dampin
 HALF_DECADES = math.sqrt(10.0)
 
 
-def series_of(name: str, every: int = 1) -> list[Setting]:
+def series_of(name: str, every: int = 1) -> list[ContactFactors]:
     """The settings of a series, from the config's contact towards the limit; of these every first, second or so on."""
     steps = {ALL: 9, ALL_POINT: 9, STICTION: 15, STIFFNESS: 6, DAMPING: 6, NORMAL: 9}[name]
     ratio = 2.0 if name == STICTION else HALF_DECADES
@@ -62,11 +62,11 @@ def series_of(name: str, every: int = 1) -> list[Setting]:
         stiffness = factor if name in (ALL, ALL_POINT, STIFFNESS, NORMAL) else 1.0
         damping = factor if name == DAMPING else math.sqrt(factor) if name in (ALL, ALL_POINT, NORMAL) else 1.0
         stiction = 1.0 / factor if name in (ALL, ALL_POINT, STICTION) else 1.0
-        found.append(Setting(name, factor, stiffness, damping, stiction))
+        found.append(ContactFactors(name, factor, stiffness, damping, stiction))
     return found[::every]
 
 
-def with_contact_of(walker: ContactWalker, setting: Setting) -> ContactWalker:
+def with_contact_of(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
     """The walker on another ground."""
     normal = walker.normal
     normal = normal._replace(
@@ -89,7 +89,7 @@ class Distance:
     What is of walks is None where no walk is compared.
     """
 
-    setting: Setting
+    setting: ContactFactors
     period: float
     length: float
     slip: float
@@ -118,7 +118,7 @@ class RigidGait:
 class Limit:
     """A scene and its rigid counterpart."""
 
-    ground: Ground
+    ground: JudgedGround
     rigid: RigidGait
     steps: int
     sampling: float  # s
@@ -152,7 +152,7 @@ class Limit:
             return None
         return found if isinstance(found, ContactGait) else None
 
-    def distance(self, setting: Setting, gait: ContactGait, check: ContactGait | None) -> Distance:
+    def distance(self, setting: ContactFactors, gait: ContactGait, check: ContactGait | None) -> Distance:
         """Of the gaits alone."""
         step = gait.step
         return Distance(

@@ -15,9 +15,9 @@ import numpy as np
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import SIGNALS
+from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS
 from walkerlab.hybrid.contact_rules import STEPS
-from walkerlab.hybrid.contact_run import Ground, MethodSettings, balanced, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import finder_for, method_named
 from walkerlab.solvers.system import State
@@ -31,7 +31,7 @@ HALVINGS = 14
 ZOOMS, ZOOM_CELLS = 4, 4  # grids ever finer around the best start, each so many cells to either side
 
 
-class Trial(NamedTuple):
+class StartTrial(NamedTuple):
     """How a walk from a scaled start went."""
 
     outcome: int
@@ -45,7 +45,7 @@ class Trial(NamedTuple):
         return self.outcome == Outcome.WALKED and self.settled
 
 
-class Walk(NamedTuple):
+class ScaledWalk(NamedTuple):
     """A walk's end and its touches."""
 
     outcome: int
@@ -59,7 +59,7 @@ class ScaledStarts:
     """One scene, walked from its start with scaled velocities."""
 
     walker: ContactWalker
-    ground: Ground
+    ground: JudgedGround
     place: State  # (2 + n) position and angles of the start
     by_swing: State  # (2 + n) velocities that the swing leg's angular velocity brings along
     by_stance: State  # (2 + n) and the stance leg's
@@ -74,23 +74,25 @@ class ScaledStarts:
         rates = (swing * a + stance * b for a, b in zip(self.by_swing, self.by_stance, strict=True))
         return (*self.place, *rates)
 
-    def walk(self, swing: float, stance: float) -> Trial:
+    def walk(self, swing: float, stance: float) -> StartTrial:
         """Walk from a scaled start."""
         walk = self.walked_from(self.start(swing, stance))
         settled = walk.outcome == Outcome.WALKED and self.is_settled(walk.touch_time, walk.touch_along)
-        return Trial(walk.outcome, walk.touch_time.size, bool(settled), walk.evaluations)
+        return StartTrial(walk.outcome, walk.touch_time.size, bool(settled), walk.evaluations)
 
-    def walked_from(self, start: State) -> Walk:
+    def walked_from(self, start: State) -> ScaledWalk:
         """Walk from a state of the free walker."""
-        ledger = new_ledger(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
-        observer = new_observer(self.walker, ledger, start)
+        walk_state = new_walk_state(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
+        observer = new_observer(self.walker, walk_state, start)
         methods = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget)
         method = methods.of(self.walker)
-        finder = finder_for(method, SIGNALS)
-        ended = walk_free(self.walker, self.ground, method, finder, observer, ledger, 0.0, start, NEVER)
+        finder = finder_for(method, EVENT_FUNCTIONS)
+        ended = walk_free(self.walker, self.ground, method, finder, observer, walk_state, 0.0, start, NEVER)
         outcome = balanced(ended, observer, methods)
-        steps = int(ledger.feet[STEPS])
-        return Walk(int(outcome), ledger.touch_time[:steps], ledger.touch_along[:steps], int(method.counts[0]))
+        steps = int(walk_state.feet[STEPS])
+        return ScaledWalk(
+            int(outcome), walk_state.touch_time[:steps], walk_state.touch_along[:steps], int(method.counts[0])
+        )
 
     def is_settled(self, touch_time: np.ndarray, touch_along: np.ndarray) -> bool:
         """Whether the last of a walk's steps is the gait's."""
@@ -105,13 +107,13 @@ class ScaledStarts:
 
     def coarser(self, rtol: float, atol: float, budget: int) -> ScaledStarts:
         """The same with other tolerances and no joins located: what a map can afford."""
-        quick = Ground(self.ground.terrain, self.ground.frame._replace(locate_joins=False))
+        quick = JudgedGround(self.ground.terrain, self.ground.frame._replace(locate_switching=False))
         return replace(self, ground=quick, rtol=rtol, atol=atol, budget=budget)
 
 
 def scaled_starts(
     walker: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     start_of: Callable[[float, float], State],
     steps: int,
     gait: tuple[float, float] | None,
@@ -131,7 +133,7 @@ class Margin:
 
     name: str  # which velocities are scaled, and whether down or up
     factor: float  # the last that walks
-    fails: Trial | None  # what happens beyond; None if nothing fails up to the limit
+    fails: StartTrial | None  # what happens beyond; None if nothing fails up to the limit
 
 
 DIRECTIONS = (
@@ -144,27 +146,29 @@ DIRECTIONS = (
 )
 
 
-class Search(NamedTuple):
+class MarginSearch(NamedTuple):
     """How margins are searched: how far apart factors are tried until one fails, and up to which factor."""
 
     step: float = MARGIN_STEP
     largest: float = LARGEST_FACTOR
 
 
-FINE = Search()
+FINE = MarginSearch()
 
 
-def margins(starts: ScaledStarts, around: tuple[float, float] = (1.0, 1.0), search: Search = FINE) -> list[Margin]:
+def margins(
+    starts: ScaledStarts, around: tuple[float, float] = (1.0, 1.0), search: MarginSearch = FINE
+) -> list[Margin]:
     """How far the velocities of a start that walks may be scaled before it fails, alone and together."""
     return [margin(starts, around, name, (swing, stance), search) for name, swing, stance in DIRECTIONS]
 
 
 def margin(
-    starts: ScaledStarts, around: tuple[float, float], name: str, way: tuple[float, float], search: Search = FINE
+    starts: ScaledStarts, around: tuple[float, float], name: str, way: tuple[float, float], search: MarginSearch = FINE
 ) -> Margin:
     """Walk ever farther one way until it fails, then halve the last interval."""
 
-    def trial(change: float) -> Trial:
+    def trial(change: float) -> StartTrial:
         return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
 
     up = max(way) > 0.0
@@ -179,7 +183,9 @@ def margin(
     return Margin(name, 1.0 + (good if up else -good), None)
 
 
-def halved(trial: Callable[[float], Trial], name: str, good: float, bad: float, failure: Trial, sign: float) -> Margin:
+def halved(
+    trial: Callable[[float], StartTrial], name: str, good: float, bad: float, failure: StartTrial, sign: float
+) -> Margin:
     """The edge between a change that walks and one that fails."""
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
@@ -197,7 +203,7 @@ class Adjustment:
 
     swing: float
     stance: float
-    trial: Trial
+    trial: StartTrial
 
     @property
     def distance(self) -> float:

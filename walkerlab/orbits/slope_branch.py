@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.standing import on_slope
-from walkerlab.orbits.small_slope import Seed, Vector
+from walkerlab.orbits.small_slope import SmallSlopeSeed, Vector
 from walkerlab.orbits.step_map import Shooting, newton
 
 WIDEST_STRIDE, NARROWEST_STRIDE = 1.6, 1.001  # from one slope to the next, as ratio of cube roots
@@ -34,14 +34,14 @@ class Way(NamedTuple):
     points: Points
 
 
-class Branch:
+class SlopeBranch:
     """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
 
     In s^2 both gaits of the small-slope theory are smooth, and polynomials through the last points foretell the next.
     The way to a slope begins as the way to any steeper one does; that part of it is walked once and remembered.
     """
 
-    def __init__(self, shooting: Shooting, seed: Seed) -> None:
+    def __init__(self, shooting: Shooting, seed: SmallSlopeSeed) -> None:
         """Start from a seed; `shooting` is for the seed's walker, on whatever slope."""
         self.shooting = shooting
         self.seed = seed

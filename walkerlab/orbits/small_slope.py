@@ -49,7 +49,7 @@ FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
 THETA_2 = np.array([1.0, 0.0, 0.0])
 
 
-class Seed(NamedTuple):
+class SmallSlopeSeed(NamedTuple):
     """An approximate gait at a small slope."""
 
     name: str
@@ -99,7 +99,7 @@ def has_small_gaits(walker: Standing) -> bool:
     return not walker.kneed and walker.lean == 0.0 and not walker.arm_x.any()
 
 
-def seeds(walker: Standing) -> tuple[Seed, ...]:
+def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
     """The small-slope gaits that `walker` has; its own slope plays no part."""
     modes = linear_modes(walker) if has_small_gaits(walker) else None
     try:
@@ -112,7 +112,7 @@ def seeds(walker: Standing) -> tuple[Seed, ...]:
     return (long,) if short is None else (long, short)
 
 
-def long_period_seed(walker: Standing, modes: Modes) -> Seed | None:
+def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
     """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MOST_GROWTH:
@@ -127,7 +127,7 @@ def long_period_seed(walker: Standing, modes: Modes) -> Seed | None:
     return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
 
 
-def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float) -> Seed:
+def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float) -> SmallSlopeSeed:
     """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
 
     per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
@@ -136,7 +136,7 @@ def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float
     kappa = loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
-    return Seed(name, slope, z, period, per_angle / np.cbrt(kappa))
+    return SmallSlopeSeed(name, slope, z, period, per_angle / np.cbrt(kappa))
 
 
 @np.errstate(divide="raise", invalid="raise")
@@ -182,7 +182,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
     return first_root(mismatch, 2.0 * math.pi / modes.swing)
 
 
-def short_period_seed(walker: Standing, modes: Modes, longest: float) -> Seed | None:
+def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSlopeSeed | None:
     """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
     try:
         step = LinearStep(walker, modes)
@@ -196,7 +196,7 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> Seed | 
     per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
     if loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
         return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
-    return Seed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
+    return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
 class LinearStep:

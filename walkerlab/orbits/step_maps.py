@@ -247,7 +247,7 @@ def no_step(outcome: Outcome, d: int) -> MappedStep:
 
 
 @dataclass(frozen=True)
-class Cycle:
+class IteratedMap:
     """Some steps in a row.
 
     outcome  of the last step
@@ -268,7 +268,7 @@ class Cycle:
         return math.fsum(step.period_s for step in self.steps)
 
 
-def walk_steps(step_map: StepMap, z: Floats, p: float, n: int) -> Cycle:
+def walk_steps(step_map: StepMap, z: Floats, p: float, n: int) -> IteratedMap:
     """n steps from z (d,) at p, by the chain rule."""
     steps: list[MappedStep] = []
     DP, Dp = np.eye(z.size), np.zeros(z.size)
@@ -281,7 +281,7 @@ def walk_steps(step_map: StepMap, z: Floats, p: float, n: int) -> Cycle:
         DP, Dp = step.DP @ DP, step.DP @ Dp + step.Dp
         z = step.z
         steps.append(step)
-    return Cycle(outcome, tuple(steps), z, DP, Dp)
+    return IteratedMap(outcome, tuple(steps), z, DP, Dp)
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:

@@ -151,7 +151,7 @@ def forces_of(
     samples = walk.samples
     if samples is None:
         raise ValueError("the walk was not sampled")
-    feet, books = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
-    sampled_feet(walker, samples.states, samples.carried, feet)
-    sampled_energies(walker, samples.states, samples.carried, samples.knees, books)
-    return samples.time_s, feet[:, :, 2], books[:, 0] + books[:, 1]
+    feet, dissipated = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
+    sampled_feet(walker, samples.states, samples.has_ground, feet)
+    sampled_energies(walker, samples.states, samples.has_ground, samples.knees, dissipated)
+    return samples.time_s, feet[:, :, 2], dissipated[:, 0] + dissipated[:, 1]

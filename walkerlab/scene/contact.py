@@ -23,7 +23,7 @@ from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import AfterMidSwing, Checkerboard, Plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
-from walkerlab.hybrid.contact_run import Ground, MethodSettings
+from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
 from walkerlab.mechanics.parts import Assembly, Position
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
@@ -52,9 +52,9 @@ class ContactScene:
     assembly: Assembly
 
     @property
-    def ground(self) -> Ground:
+    def ground(self) -> JudgedGround:
         """What a walk happens on and is judged by."""
-        return Ground(self.terrain, self.frame)
+        return JudgedGround(self.terrain, self.frame)
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
@@ -112,7 +112,7 @@ def assembled_scene(
         pendulum_time=math.sqrt(leg_length_m / gravity),
         hip_x=tuple(float(x) for x in hip[:, 0]),
         hip_y=tuple(float(x) for x in hip[:, 1]),
-        locate_joins=True,
+        locate_switching=True,
     )
     pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
     return ContactScene(walker, TERRAINS[contact.terrain](pitch_m), frame, pinned, pitch_m, assembly)

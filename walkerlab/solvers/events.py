@@ -1,12 +1,12 @@
-"""Where a signal crosses zero within a step: every crossing, also two or three between the step's ends.
+"""Where an event function crosses zero within a step: every crossing, also two or three between the step's ends.
 
-A signal is known on a step by its values along the dense output, as a polynomial. In Bernstein form a polynomial lies
-in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and halving isolates those
-there are. A sign check at the ends of a step misses double crossings.
+An event function is known on a step by its values along the dense output, as a polynomial. In Bernstein form a
+polynomial lies in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and halving
+isolates those there are. A sign check at the ends of a step misses double crossings.
 
-Definitions. A crossing is a change of sign; a signal that touches zero and turns back does not cross. A zero exactly
-at the start, where the event before left the signal, is divided out, so that it is neither found again nor hides a
-crossing right behind it. Of several signals that cross in one step, the caller takes the earliest.
+Definitions. A crossing is a change of sign; an event function that touches zero and turns back does not cross. A zero
+exactly at the start, where the event before left the event function, is divided out, so that it is neither found again
+nor hides a crossing right behind it. Of several event functions that cross in one step, the caller takes the earliest.
 
 Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012), sections 3.4 and 5.
 """
@@ -27,20 +27,22 @@ DEPTH = 64
 
 
 class CrossingFinder(NamedTuple):
-    """Memory and matrices for signals sampled at `nodes` (fractions of a step)."""
+    """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
 
     nodes: Any  # (degree + 1,)
     to_bernstein: Any  # (degree + 1, degree + 1), from values at the nodes to Bernstein coefficients
-    values: Any  # (signals, degree + 1), filled by the caller
+    values: Any  # (event functions, degree + 1), filled by the caller
     stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
     ends: Any  # (DEPTH, 2) where those pieces begin and end
 
 
-def new_crossing_finder(degree: int, signals: int = 1) -> CrossingFinder:
-    """A finder for `signals` signals on steps whose dense output has degree `degree`."""
+def new_crossing_finder(degree: int, event_functions: int = 1) -> CrossingFinder:
+    """A finder for `event_functions` event functions on steps whose dense output has degree `degree`."""
     nodes, to_bernstein = sampling(degree)
     size = degree + 1
-    return CrossingFinder(nodes, to_bernstein, np.zeros((signals, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2)))
+    return CrossingFinder(
+        nodes, to_bernstein, np.zeros((event_functions, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2))
+    )
 
 
 @lru_cache
@@ -60,19 +62,19 @@ def sampling(degree: int) -> tuple[Any, Any]:
 
 
 @inlined
-def first_crossing(finder: CrossingFinder, signal: int, direction: int, after: float, zero_at_start: bool) -> float:
-    """Fraction of the step at which a signal first changes sign.
+def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
+    """Fraction of the step at which an event function first changes sign.
 
-    signal         row of `finder.values`
+    event         row of `finder.values`
     direction      FALLING, RISING, or 0 for both
     after          fraction of the step before which crossings are passed over
-    zero_at_start  the signal is zero at the step's start: divide that zero out
+    zero_at_start  the event function is zero at the step's start: divide that zero out
 
     Returns NO_CROSSING if there is none.
     """
-    if not spans_zero(finder, signal):
+    if not spans_zero(finder, event):
         return NO_CROSSING
-    return crossing_of_piece(finder, set_root_piece(finder, signal, zero_at_start), direction, after)
+    return crossing_of_piece(finder, set_root_piece(finder, event, zero_at_start), direction, after)
 
 
 @inlined
@@ -103,30 +105,30 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
 
 
 @inlined
-def value_at(finder: CrossingFinder, signal: int, fraction: float) -> float:
-    """Value of a sampled signal at a fraction of the step."""
-    return evaluate(finder.stack, 0, set_root_piece(finder, signal, False), fraction)
+def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
+    """Value of a sampled event function at a fraction of the step."""
+    return evaluate(finder.stack, 0, set_root_piece(finder, event, False), fraction)
 
 
 @inlined
-def spans_zero(finder: CrossingFinder, signal: int) -> bool:
-    """Whether a signal could cross: false where it stays further from zero than its own variation could carry it."""
-    smallest, largest = finder.values[signal, 0], finder.values[signal, 0]
+def spans_zero(finder: CrossingFinder, event: int) -> bool:
+    """Whether an event function could cross: false where it stays further from zero than it varies."""
+    smallest, largest = finder.values[event, 0], finder.values[event, 0]
     for i in range(1, finder.nodes.size):
-        smallest = min(smallest, finder.values[signal, i])
-        largest = max(largest, finder.values[signal, i])
+        smallest = min(smallest, finder.values[event, i])
+        largest = max(largest, finder.values[event, i])
     room = 8.0 * (largest - smallest)
     return smallest <= room and largest >= -room
 
 
 @inlined
-def set_root_piece(finder: CrossingFinder, signal: int, zero_at_start: bool) -> int:
+def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
     """Coefficients of the whole step into the first place of the stack; returns how many there are."""
     stack, size = finder.stack, finder.nodes.size
     for i in range(size):
         total = 0.0
         for j in range(size):
-            total += finder.to_bernstein[i, j] * finder.values[signal, j]
+            total += finder.to_bernstein[i, j] * finder.values[event, j]
         stack[0, i] = total
     return without_zero_at_start(stack, size) if zero_at_start else size
 

@@ -86,7 +86,7 @@ def _number(kind: Any) -> bool:
 def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
     """Have a function of numbers work on lanes; `build` gets the builder and the arguments, all of them lanes."""
 
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
         key = function
 
         def generic(self, given: Any, named: Any) -> Any:
@@ -94,7 +94,7 @@ def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: 
                 return None
             return signature(LANES, *(LANES for _ in given))
 
-    infer_global(function)(Template)
+    infer_global(function)(LaneTemplate)
 
     def generate(_context: Any, builder: Any, _signature: Any, lanes: Any) -> Any:
         return build(builder, *lanes)

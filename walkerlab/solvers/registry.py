@@ -59,9 +59,9 @@ def sharing(method: Any, clock: Any, counts: Any) -> Any:
     return method._replace(clock=clock, counts=counts)
 
 
-def finder_for(method: Any, signals: int) -> CrossingFinder:
+def finder_for(method: Any, event_functions: int) -> CrossingFinder:
     """A crossing finder that fits a method's dense output."""
-    return new_crossing_finder(dense_degree(method), signals)
+    return new_crossing_finder(dense_degree(method), event_functions)
 
 
 __all__ = ["METHODS", "Method", "ScipyMethod", "finder_for", "method_named", "sharing"]

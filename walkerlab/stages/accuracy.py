@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Climb, Row, climb, finished, left_of, row_of
+from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Ascent, MethodRow, ascend, finished, left_of, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.config.reads import ContactConfig, SceneConfig
@@ -38,7 +38,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     """
     trials: list[Trial] = []
     seconds: list[End] = []
-    climbs: list[Climb] = []
+    climbs: list[Ascent] = []
     compass = is_plain_compass(config.walker)
     left_out = hinge_left_out(config) + ([] if compass or config.contact is None else list(LESS))
     for trial in scenes(config, inputs):
@@ -50,7 +50,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             continue
         trials.append(trial)
         for method in trial.methods:
-            climbs.append(climb(trial, method))
+            climbs.append(ascend(trial, method))
             progress.advance()
     progress.start("accuracy: long runs")
     firsts, climbs = finished(trials, climbs, jobs, long_runs=compass)
@@ -65,7 +65,8 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     not_run = [entry for one in climbs for entry in left_of(one)]
     summary = {**summary_of(rows, not_run, references, jobs), "left_out": left_out}
     groups = {
-        f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(Row)) for scene in references
+        f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(MethodRow))
+        for scene in references
     }
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
 
@@ -104,7 +105,7 @@ def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial
 
 
 def summary_of(
-    rows: Sequence[Row], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
+    rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
     """What the command prints."""
     return {
@@ -133,9 +134,9 @@ def summary_of(
     }
 
 
-def good_enough(rows: Sequence[Row], scene: str, level: float) -> dict[str, Row]:
+def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> dict[str, MethodRow]:
     """For each method that reaches an error of `level` on a scene, its fastest run that does."""
-    best: dict[str, Row] = {}
+    best: dict[str, MethodRow] = {}
     for row in rows:
         if row.scene != scene or row.error is None or row.error > level:
             continue
@@ -144,7 +145,7 @@ def good_enough(rows: Sequence[Row], scene: str, level: float) -> dict[str, Row]
     return best
 
 
-def best_methods(rows: Sequence[Row], scene: str) -> dict[str, str]:
+def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
     """The fastest method for each level of error that some method reaches."""
     found = {}
     for level in LEVELS:
@@ -154,7 +155,7 @@ def best_methods(rows: Sequence[Row], scene: str) -> dict[str, str]:
     return found
 
 
-def conclusion(rows: Sequence[Row], scene: str) -> str:
+def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
     """One sentence: which method is fastest at which error, and by how much over the best library's."""
     parts = []
     for level in LEVELS:

@@ -26,10 +26,10 @@ from walkerlab.scene.contact import contact_gait, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.basin_pieces import (
     ContactQuestion,
-    Found,
     Piece,
     Question,
     RigidQuestion,
+    WalkEnds,
     cells_of,
     edges_of,
     unpacked,
@@ -179,7 +179,7 @@ def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
     return rows
 
 
-def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> Group:
+def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) -> Group:
     """The grid."""
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
@@ -204,7 +204,7 @@ def group_of(settings: Basin, window: Window, found: Found, walking: Floats) -> 
 
 
 def summary(
-    settings: Basin, window: Window, found: Found, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
+    settings: Basin, window: Window, found: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
     """What the command prints."""
     numbers, counts = np.unique(found.outcome, return_counts=True)
@@ -242,7 +242,7 @@ def gaussian(window: Window) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def margin_of(config: RigidConfig, window: Window, found: Found, gait: Mapping[str, Any]) -> dict[str, Any]:
+def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
     """Distance from a stable gait to the nearest cell that does not walk: a measure that no window enters.
 
     In rad and sqrt(g/L). Left out if the gait is unstable, or the window holds no such cell.

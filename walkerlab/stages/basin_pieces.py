@@ -23,7 +23,7 @@ SETTLED: Final = 0.02  # of the gait's period and step length: a contact walk wh
 
 
 @dataclass(frozen=True)
-class Found:
+class WalkEnds:
     """How walks ended: (n,) each; `attractor` is NONE where none was reached, else `steps` says after how many."""
 
     outcome: Integers
@@ -36,11 +36,11 @@ class Found:
         return [float(number) for number in code]
 
 
-def unpacked(numbers: Floats) -> Found:
+def unpacked(numbers: Floats) -> WalkEnds:
     """What `packed` made numbers of."""
     rest, outcome = np.divmod(numbers.astype(np.int64), OUTCOMES)
     steps, attractor = np.divmod(rest, ATTRACTORS)
-    return Found(outcome, attractor + NONE, steps)
+    return WalkEnds(outcome, attractor + NONE, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,10 @@ class RigidQuestion:
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # walks that take longer than starting another process
 
-    def walked(self, z: Floats) -> Found:
+    def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         found = arrivals(self.walker, self.attractors, z * np.array(self.scale), self.steps)
-        return Found(found.outcome, found.attractor, found.steps)
+        return WalkEnds(found.outcome, found.attractor, found.steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +76,10 @@ class ContactQuestion:
     edges_at_once: int = 10
     shared_from: int = 500
 
-    def walked(self, z: Floats) -> Found:
+    def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
-        return Found(*np.array(rows, np.int64).reshape(-1, 3).T)
+        return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
         """Outcome, attractor and steps of one walk."""

@@ -13,8 +13,8 @@ from walkerlab.hybrid.comparison import (
     IMPACT_PHASE,
     PHASES,
     Array,
-    Difference,
     Motion,
+    WalkDifference,
     between_impacts,
     difference_in_phase,
     difference_in_time,
@@ -86,7 +86,7 @@ def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
     orbit = orbit_distances(contact, rigid)
     groups["orbit"] = orbit_group(orbit)
     last = slice(-LAST_STRIDE, None)
-    settled = part(Difference(aligned.angle[last], aligned.velocity[last]), smooth[last])
+    settled = part(WalkDifference(aligned.angle[last], aligned.velocity[last]), smooth[last])
     return Comparison(
         Errors(errors.raw, errors.aligned, errors.between_impacts, of_legs(settled), tuple(orbit.tolist())), groups
     )
@@ -97,17 +97,17 @@ def without(what: str, needed: str) -> dict[str, str]:
     return {"what": what, "why": f"no {needed} was completed by both models"}
 
 
-def part(difference: Difference, where: NDArray[np.bool_]) -> Difference:
+def part(difference: WalkDifference, where: NDArray[np.bool_]) -> WalkDifference:
     """A difference at some of its steps and phases."""
-    return Difference(difference.angle[where], difference.velocity[where])
+    return WalkDifference(difference.angle[where], difference.velocity[where])
 
 
-def of_legs(difference: Difference) -> LegErrors:
+def of_legs(difference: WalkDifference) -> LegErrors:
     """The largest differences."""
     return LegErrors(tuple(difference.largest_angle.tolist()), tuple(difference.largest_velocity.tolist()))
 
 
-def in_time(time: Array, raw: Difference) -> Group:
+def in_time(time: Array, raw: WalkDifference) -> Group:
     """Differences at the same time."""
     dims = (TIME, LEG)
     return Group(
@@ -120,7 +120,7 @@ def in_time(time: Array, raw: Difference) -> Group:
     )
 
 
-def in_phase(phases: Array, aligned: Difference) -> Group:
+def in_phase(phases: Array, aligned: WalkDifference) -> Group:
     """Differences at the same phase of each step."""
     dims = (STEP, PHASE, LEG)
     return Group(

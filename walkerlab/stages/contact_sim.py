@@ -227,13 +227,13 @@ def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: Con
         "stance_leg": Variable(samples.stance, (TIME,), "1", "leg of the last step's touch"),
     }
     feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.carried, feet)
+    sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples, feet)
     if "energies" in config.outputs:
         variables |= energy_variables(scene, samples, feet)
     if "forces" in config.outputs:
-        depth = np.where(samples.carried > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
+        depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
         variables |= {
             "penetration_m": Variable(depth, per_leg, "m", "depth of the foot in the ground that carries it"),
             "normal_force_N": at_samples(feet[:, :, 2], NORMAL_FORCE),
@@ -293,9 +293,9 @@ def torso_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
 
 
 def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
-    """Energies as the paper plots them, from the current stance foot, and the books from a fixed origin."""
+    """Energies as the paper plots them, from the current stance foot, and the energy balance from a fixed origin."""
     energies = np.zeros((samples.time_s.size, 3))
-    sampled_energies(scene.walker, samples.states, samples.carried, samples.knees, energies)
+    sampled_energies(scene.walker, samples.states, samples.has_ground, samples.knees, energies)
     walker = scene.walker
     row = np.arange(samples.time_s.size)
     foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]

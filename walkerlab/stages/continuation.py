@@ -16,7 +16,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
     Attractor,
-    Attractors,
+    AttractorBranch,
     Lyapunov,
     close_returns,
     largest_exponent,
@@ -27,7 +27,7 @@ from walkerlab.orbits.attractors import (
 from walkerlab.orbits.bifurcation_curves import CONTROL as CURVE_CONTROL
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve, curve_through
 from walkerlab.orbits.continuation import Floats, StepControl
-from walkerlab.orbits.families import Branch, Follower, Limits, Seed, Span
+from walkerlab.orbits.families import BranchFollower, GaitBranch, Limits, Seed, ValueSpan
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.regions import Regions, regions_of
 from walkerlab.orbits.similarity import unit_walker
@@ -56,7 +56,7 @@ CONTROLS: Final = {
 
 
 @dataclass(frozen=True)
-class Samples:
+class AttractorSampling:
     """How finely attractors are looked at.
 
     values     of the parameter
@@ -72,17 +72,17 @@ class Samples:
     averaged: int
 
 
-RIGID_SAMPLES = Samples(240, 500, 96, 16, 1500)
-CONTACT_SAMPLES = Samples(24, 40, 16, 4, 100)
+RIGID_SAMPLES = AttractorSampling(240, 500, 96, 16, 1500)
+CONTACT_SAMPLES = AttractorSampling(24, 40, 16, 4, 100)
 
 
 @dataclass(frozen=True)
-class Question:
+class FamilyQuestion:
     """What is followed: a parameter of a config over a span."""
 
     config: ContinuationConfig
     parameter: Parameter
-    span: Span
+    span: ValueSpan
     periods: int
     points: int
 
@@ -93,7 +93,7 @@ class Question:
         return [*([own] if own in self.span else []), *(float(one) for one in spread)]
 
 
-NO_ATTRACTORS = Attractors()
+NO_ATTRACTORS = AttractorBranch()
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +107,9 @@ class Followed:
 
     model: str
     step_map: StepMap | None
-    branches: tuple[Branch, ...]
+    branches: tuple[GaitBranch, ...]
     map_of: Callable[[ContactConfig], StepMap] | None = None
-    attractors: Attractors = NO_ATTRACTORS
+    attractors: AttractorBranch = NO_ATTRACTORS
     exponents: tuple[Lyapunov, ...] = ()
     curves: tuple[BifurcationCurve, ...] = ()
     regions: Regions | None = None
@@ -122,7 +122,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     """
     block = config.continuation
     parameter = parameter_of(block.over, config)
-    asked = Question(config, parameter, Span(block.least, block.most), block.periods, block.points)
+    asked = FamilyQuestion(config, parameter, ValueSpan(block.least, block.most), block.periods, block.points)
     found = []
     for model in models_of(block, config, asked):
         followed = FOLLOW[model](asked, progress)
@@ -145,7 +145,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     return content
 
 
-def left_out(found: Sequence[Followed], asked: Question) -> list[dict[str, str]]:
+def left_out(found: Sequence[Followed], asked: FamilyQuestion) -> list[dict[str, str]]:
     """What was not followed, and why."""
     followed = {one.model: one for one in found}
     entries = []
@@ -172,7 +172,7 @@ def wanted_models(block: Continuation) -> tuple[str, ...]:
     return (RIGID, CONTACT) if block.model == "both" else (block.model,)
 
 
-def models_of(block: Continuation, config: ContinuationConfig, asked: Question) -> tuple[str, ...]:
+def models_of(block: Continuation, config: ContinuationConfig, asked: FamilyQuestion) -> tuple[str, ...]:
     """The models that are followed; ConfigError for one that the key does not touch or that the config has not."""
     if block.model != RIGID and config.contact is None:
         raise without_contact("the contact model", config.walker, "Use --model rigid.")
@@ -188,7 +188,7 @@ def models_of(block: Continuation, config: ContinuationConfig, asked: Question) 
     return touched
 
 
-def refuse_values(asked: Question) -> None:
+def refuse_values(asked: FamilyQuestion) -> None:
     """Raise ConfigError if the schema refuses an end of the span."""
     for name, value in (("from", asked.span.least), ("to", asked.span.most)):
         if asked.parameter.config_at(asked.config, value) is None:
@@ -198,7 +198,7 @@ def refuse_values(asked: Question) -> None:
             )
 
 
-def refuse_second(asked: Question) -> None:
+def refuse_second(asked: FamilyQuestion) -> None:
     """Raise ConfigError if the second key is no number or no other one, if it changes nothing, or starts elsewhere."""
     block = asked.config.continuation.second
     if block is None:
@@ -222,15 +222,15 @@ def refuse_second(asked: Question) -> None:
         )
 
 
-def second_question(asked: Question) -> Question:
+def second_question(asked: FamilyQuestion) -> FamilyQuestion:
     """The same over the second key."""
     block = asked.config.continuation.second
     assert block is not None, "a second key is asked for"
     parameter = parameter_of(block.over, asked.config)
-    return replace(asked, parameter=parameter, span=Span(block.least, block.most))
+    return replace(asked, parameter=parameter, span=ValueSpan(block.least, block.most))
 
 
-def touches(asked: Question, model: str) -> bool:
+def touches(asked: FamilyQuestion, model: str) -> bool:
     """Whether a model changes over the span."""
     walker_at: Callable[[float], object] = (
         rigid_walkers(asked.config, asked.parameter)
@@ -240,7 +240,7 @@ def touches(asked: Question, model: str) -> bool:
     return walker_at(asked.span.least) != walker_at(asked.span.most)
 
 
-def over_plane(followed: Followed, asked: Question, progress: Progress) -> Followed:
+def over_plane(followed: Followed, asked: FamilyQuestion, progress: Progress) -> Followed:
     """What was found of a model, with curves and regions of the plane if a second key is asked for that touches it."""
     map_of = followed.map_of
     if map_of is None or asked.config.continuation.second is None:
@@ -271,20 +271,20 @@ def over_plane(followed: Followed, asked: Question, progress: Progress) -> Follo
     return replace(followed, curves=tuple(curve for curve in curves if curve is not None), regions=regions)
 
 
-def follow_rigid(asked: Question, progress: Progress) -> Followed:
+def follow_rigid(asked: FamilyQuestion, progress: Progress) -> Followed:
     """All of the rigid model: branches, cascades, attractor, exponents, and gaits of other numbers of steps."""
     followed, follower = rigid_branches(asked, progress)
     return with_others(beyond_flips(followed, follower, asked, RIGID_SAMPLES, progress), asked, follower, progress)
 
 
-def rigid_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower]:
+def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed, BranchFollower]:
     """Every branch of the rigid model's gaits of one step, and the cascades beyond their flips."""
     config, parameter, span = asked.config, asked.parameter, asked.span
     walker_at = rigid_walkers(config, parameter)
     map_of = partial(rigid_map, parameter=parameter, scale=span.size)
     step_map = map_of(config)
     progress.start("continuation: branches of the rigid model")
-    follower = Follower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
+    follower = BranchFollower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
     seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
     branches = follower.family(seeds, asked.periods)
     return Followed(RIGID, step_map, branches, map_of), follower
@@ -300,14 +300,14 @@ def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
     return [Seed(section * in_units, value) for section in sections]
 
 
-def follow_contact(asked: Question, progress: Progress) -> Followed:
+def follow_contact(asked: FamilyQuestion, progress: Progress) -> Followed:
     """All of the contact model: its branch, its cascade, its attractor and exponents."""
     asked = replace(asked, periods=min(asked.periods, CONTACT_PERIODS))
     followed, follower = contact_branches(asked, progress)
     return followed if follower is None else beyond_flips(followed, follower, asked, CONTACT_SAMPLES, progress)
 
 
-def contact_branches(asked: Question, progress: Progress) -> tuple[Followed, Follower | None]:
+def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed, BranchFollower | None]:
     """The branch of the contact model's gait, and the cascade beyond its flips."""
     from walkerlab.scene.contact import contact_gait
 
@@ -330,14 +330,14 @@ def contact_branches(asked: Question, progress: Progress) -> tuple[Followed, Fol
         step_map = map_of(asked.config)
         progress.start("continuation: branches of the contact model")
         control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
-        follower = Follower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
+        follower = BranchFollower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
         seed = Seed(step_map.of_section(found.gait.z, value), value)
         return Followed(CONTACT, step_map, follower.family([seed], asked.periods), map_of), follower
     return Followed(CONTACT, None, ()), None
 
 
 def beyond_flips(
-    followed: Followed, follower: Follower, asked: Question, samples: Samples, progress: Progress
+    followed: Followed, follower: BranchFollower, asked: FamilyQuestion, samples: AttractorSampling, progress: Progress
 ) -> Followed:
     """The attractor beyond the first flip of a stable branch, and the exponents along it.
 
@@ -376,7 +376,7 @@ def beyond_flips(
 
 
 def doubled_outside(
-    followed: Followed, follower: Follower, asked: Question, samples: Samples, progress: Progress
+    followed: Followed, follower: BranchFollower, asked: FamilyQuestion, samples: AttractorSampling, progress: Progress
 ) -> tuple[Followed, Attractor | None]:
     """Gaits of 2, 4, 8, ... steps where all of a branch lies beyond a flip outside the span, and where walks settle.
 
@@ -398,7 +398,7 @@ def doubled_outside(
     return replace(followed, branches=branches), min(found, key=lambda one: one.value)
 
 
-def with_others(followed: Followed, asked: Question, follower: Follower, progress: Progress) -> Followed:
+def with_others(followed: Followed, asked: FamilyQuestion, follower: BranchFollower, progress: Progress) -> Followed:
     """Gaits of other numbers of steps: near returns of chaotic walks, and where scattered starts settle."""
     if followed.step_map is None or not followed.attractors.found:
         return followed
@@ -418,7 +418,7 @@ def with_others(followed: Followed, asked: Question, follower: Follower, progres
     return replace(followed, branches=follower.family(seeds, asked.periods, followed.branches))
 
 
-def first_flip(branches: tuple[Branch, ...]) -> tuple[float, Floats] | None:
+def first_flip(branches: tuple[GaitBranch, ...]) -> tuple[float, Floats] | None:
     """The least value at which a gait of one step flips, and the stable gait nearest to it."""
     flips = [
         (one.value, branch) for branch in branches if branch.period == 1
@@ -431,4 +431,7 @@ def first_flip(branches: tuple[Branch, ...]) -> tuple[float, Floats] | None:
     return None
 
 
-FOLLOW: Final[Mapping[str, Callable[[Question, Progress], Followed]]] = {RIGID: follow_rigid, CONTACT: follow_contact}
+FOLLOW: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Followed]]] = {
+    RIGID: follow_rigid,
+    CONTACT: follow_contact,
+}

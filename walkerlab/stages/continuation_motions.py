@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.hybrid.recorded_walk import Samples, take_walk
 from walkerlab.mechanics.rigid import knee_of
-from walkerlab.orbits.families import Branch, GaitPoint
+from walkerlab.orbits.families import GaitBranch, GaitPoint
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.parameter import Parameter
@@ -29,7 +29,7 @@ RTOL, ATOL = 1e-9, 1e-11
 EVERY = 3  # which samples are kept beside those at heel strikes
 
 
-def motions(branches: Sequence[Branch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
+def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
     """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
     return {
         f"branch_{number}/motion_{place}": group

@@ -15,9 +15,9 @@ from walkerlab.labels import Label
 from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.bifurcations import Bifurcation
-from walkerlab.orbits.families import Branch, ends_at, strike_to_strike
+from walkerlab.orbits.families import GaitBranch, ends_at, strike_to_strike
 from walkerlab.orbits.regions import Regions
-from walkerlab.orbits.step_maps import Cycle, Monitor
+from walkerlab.orbits.step_maps import IteratedMap, Monitor
 from walkerlab.scene.parameter import Parameter
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
@@ -64,7 +64,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
     }
 
 
-def branch_summary(model: str, branch: Branch) -> dict[str, Any]:
+def branch_summary(model: str, branch: GaitBranch) -> dict[str, Any]:
     """One branch: between which values, how far it is stable, and why it ends."""
     ranges = branch.stable_ranges
     widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
@@ -94,7 +94,7 @@ def bifurcation_rows(followed: Followed) -> Iterator[dict[str, Any]]:
             }
 
 
-def first_doubling(branches: Sequence[Branch]) -> float | None:
+def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
     """The least flip at which a gait of one step ceases to be stable; None if there is none.
 
     branches  of one model; one that is unstable on both sides of a flip does not count
@@ -134,7 +134,7 @@ def cascade_rows(followed: Followed) -> Iterator[dict[str, Any]]:
             yield {"model": followed.model, "period": first.period, "flips": flips, "ratios": ratios, **ends}
 
 
-def chain(branch: Branch, branches: Sequence[Branch]) -> list[float]:
+def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
     """Flips of a branch, of the branch born there, and so on, wherever a branch is stable before it."""
     flips = [one for one in branch.bifurcations if one.kind == "flip"]
     for flip in flips:
@@ -144,7 +144,7 @@ def chain(branch: Branch, branches: Sequence[Branch]) -> list[float]:
     return [flip.value for flip in flips[:1]]
 
 
-def is_born_in(child: Branch, flip: Bifurcation, parent: Branch) -> bool:
+def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool:
     """Whether a branch begins at a flip of another one, at either of its ends."""
     if flip.kind != "flip" or child.period != 2 * parent.period:
         return False
@@ -262,10 +262,10 @@ class Mark(NamedTuple):
     after: int
     kind: str
     value: float
-    cycle: Cycle
+    cycle: IteratedMap
 
 
-def marks_on(branch: Branch) -> list[Mark]:
+def marks_on(branch: GaitBranch) -> list[Mark]:
     """The bifurcations of a branch in their order along it."""
     found = []
     for one, segment in branch.segments:
@@ -276,7 +276,7 @@ def marks_on(branch: Branch) -> list[Mark]:
     return sorted(found, key=lambda mark: mark.after)
 
 
-def birth_of(branch: Branch, branches: Sequence[Branch]) -> list[Mark]:
+def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
     """The flip that a branch begins at: its parent's gait, twice."""
     for parent in branches:
         for one in parent.bifurcations:
@@ -303,7 +303,7 @@ def mark_variables(marks: Sequence[Mark], parameter: Parameter) -> dict[str, Var
     }
 
 
-def branch_group(branch: Branch, marks: Sequence[Mark], monitors: Sequence[Monitor], parameter: Parameter) -> Group:
+def branch_group(branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[Monitor], parameter: Parameter) -> Group:
     """The gaits of a branch in their order along it."""
     points = branch.points
     multipliers = [point.multipliers for point in points]

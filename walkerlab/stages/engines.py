@@ -30,7 +30,7 @@ from walkerlab.benchmarks.engines.experiments import (
 )
 from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
-from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, Row, SwingRow, TuningRow
+from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.errors import NoAnswer
@@ -44,16 +44,16 @@ THREE_DIGITS = 5e-4  # relative
 
 
 @dataclass
-class Findings:
+class EngineFindings:
     """All that the stage found, growing row by row."""
 
-    rows: list[Row] = field(default_factory=list)
+    rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
     tuning: list[TuningRow] = field(default_factory=list)
     truths: dict[str, Truth] = field(default_factory=dict)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
-    def add(self, other: Findings) -> None:
+    def add(self, other: EngineFindings) -> None:
         """Take in what was found elsewhere."""
         self.rows += other.rows
         self.swings += other.swings
@@ -64,7 +64,7 @@ class Findings:
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
     engines = installed()
-    found = Findings(left_out=[*not_installed(), *hinge_left_out(config)])
+    found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config)])
     if not engines:
         raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
@@ -89,7 +89,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     return content(found, rigid)
 
 
-def side_by_side(engines: Sequence[Engine], scene: EngineScene, truth: Truth, jobs: int) -> Iterator[Findings]:
+def side_by_side(engines: Sequence[Engine], scene: EngineScene, truth: Truth, jobs: int) -> Iterator[EngineFindings]:
     """What is found of each engine, `jobs` of them at a time; who stops waiting ends those that run."""
     processes = [OwnProcess() for _ in engines]
     with ThreadPoolExecutor(max(1, jobs)) as pool:
@@ -117,9 +117,9 @@ def hinge_left_out(config: ContactConfig) -> list[dict[str, str]]:
     return [{"what": "hinged first step", "why": "engines are measured on a walk that is free from its start"}]
 
 
-def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Truth) -> Findings:
+def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Truth) -> EngineFindings:
     """All experiments of one engine on one scene, in a process of its own."""
-    found = Findings()
+    found = EngineFindings()
     version, target = engine.version, target_of(scene)
     with process:
         found.swings, lost = swing_rows(engine, scene, process)
@@ -139,14 +139,14 @@ def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Trut
     return found
 
 
-def content(found: Findings, rigid: Mapping[str, Any] | None) -> Content:
+def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
     """What is stored and printed."""
-    stored = (("rows", Row, found.rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
+    stored = (("rows", EngineRow, found.rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
     groups = {name: rows_group(rows, labels_of(kind)) for name, kind, rows in stored if rows}
     return Content(groups, summary(found, rigid), timed=("ratios", "conclusions", "environment"))
 
 
-def summary(found: Findings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
+def summary(found: EngineFindings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
     """What the command prints."""
     rows = found.rows
     engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
@@ -187,14 +187,14 @@ def summary(found: Findings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
     }
 
 
-def of(rows: Sequence[Row], scene: str, experiment: str) -> Iterator[Row]:
+def of(rows: Sequence[EngineRow], scene: str, experiment: str) -> Iterator[EngineRow]:
     """The engines' rows of one experiment, from the gait."""
     for row in rows:
         if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
             yield row
 
 
-def ratios(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
+def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
     """How many times longer each engine takes than this project, for each error that it reaches on the same law."""
     ours = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     found: dict[str, dict[str, float]] = {}
@@ -207,7 +207,7 @@ def ratios(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
     return found
 
 
-def closest(rows: Sequence[Row], scene: str) -> dict[str, Any] | None:
+def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
     """The contact whose walk at its smallest step comes closest to ADAMS's law; None if none walks to the end."""
     finest = finest_rows(rows, scene)
     reached = [row for row in finest if row.error is not None and row.steps == OWN_TOUCHES]
@@ -217,20 +217,20 @@ def closest(rows: Sequence[Row], scene: str) -> dict[str, Any] | None:
     return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
 
 
-def series_of(rows: Sequence[Row], scene: str, experiment: str) -> dict[str, list[Row]]:
+def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
     """The rows of each integrator or contact, from coarse to fine, by its engine's name and its own."""
-    series: dict[str, list[Row]] = {}
+    series: dict[str, list[EngineRow]] = {}
     for row in of(rows, scene, experiment):
         series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
     return series
 
 
-def finest_rows(rows: Sequence[Row], scene: str) -> list[Row]:
+def finest_rows(rows: Sequence[EngineRow], scene: str) -> list[EngineRow]:
     """Each contact's finest walk."""
     return [mine[-1] for mine in series_of(rows, scene, OWN_LAW).values()]
 
 
-def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
+def three_digits(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
     """The largest step (s) from which on an engine's last period has three correct digits, by experiment and name.
 
     On the same law they are digits of the reference; on an engine's own, of what it gives at its finest.
@@ -246,7 +246,7 @@ def three_digits(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, dic
     return found
 
 
-def largest_good_step(mine: Sequence[Row], experiment: str, wanted: float | None) -> float | None:
+def largest_good_step(mine: Sequence[EngineRow], experiment: str, wanted: float | None) -> float | None:
     """The largest step, going up from the finest, with three correct digits; None if the finest has not."""
     good = None
     if wanted is None:
@@ -259,7 +259,7 @@ def largest_good_step(mine: Sequence[Row], experiment: str, wanted: float | None
     return None if finest_only else good
 
 
-def convergence(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
+def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
     """What the last refinement does, by experiment and name.
 
     On the same law, what it divides the error by; on an engine's own, what it changes the period by (s).
@@ -276,12 +276,12 @@ def convergence(rows: Sequence[Row], scene: str) -> dict[str, dict[str, float]]:
     return found
 
 
-def conclusions(rows: Sequence[Row], scene: str, truth: Truth) -> dict[str, str]:
+def conclusions(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, str]:
     """What was found, a paragraph for each experiment."""
     return {SAME_LAW: same_law_in_words(rows, scene, truth), OWN_LAW: own_law_in_words(rows, scene, truth)}
 
 
-def same_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
+def same_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str:
     """What the integrators cost."""
     sentences = []
     shares = ratios(rows, scene)
@@ -323,7 +323,7 @@ def steps_in_words(steps: Mapping[str, float]) -> str:
     )
 
 
-def own_law_in_words(rows: Sequence[Row], scene: str, truth: Truth) -> str:
+def own_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str:
     """Which contact comes closest to ADAMS's, what became of the others, and how far this hangs on the step."""
     best = closest(rows, scene)
     period = float(truth.walk.periods_s[-1])

@@ -31,7 +31,7 @@ from walkerlab.stages.plan import (
 from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.runs import claim, refuse_another_config
-from walkerlab.stages.task import Task, kernels_told_of, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.stages.task import StageTask, kernels_told_of, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
@@ -41,11 +41,11 @@ from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
 
-__all__ = ["Done", "StageReport", "execute", "plan", "preview"]
+__all__ = ["StageDone", "StageReport", "execute", "plan", "preview"]
 
 
 @dataclass(frozen=True)
-class Done:
+class StageDone:
     """What was done with one stage: `action` as in `plan.Step`, `wall_s` the time it ran."""
 
     stage: str
@@ -76,7 +76,7 @@ class StageReport:
     wall_s: float
     left_out: tuple[LeftOut, ...]
     summary: dict[str, Any]
-    steps: tuple[Done, ...]
+    steps: tuple[StageDone, ...]
     no_answer: NoAnswer | None = None
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
@@ -109,12 +109,12 @@ def execute(
     stages = asked_for(target, config, graph, full)
     planner = Planner(config, folder, graph, force)
     steps = planner.plan(stages)
-    run = Run(planner, reporter or Silent(), jobs)
+    run = Execution(planner, reporter or Silent(), jobs)
     if writes(steps):
         with folder.locked(wait, run.reporter.note):
             claim(folder, config)
             # Decided anew, stage by stage: another process may have worked here until now.
-            run = Run(Planner(config, folder, graph, force), run.reporter, jobs)
+            run = Execution(Planner(config, folder, graph, force), run.reporter, jobs)
             run.carry_out(stages, [step.stage for step in steps if step.action == "run"])
     else:
         for step in steps:
@@ -138,7 +138,7 @@ def preview(
     started = time.perf_counter()
     refuse_unsuited(graph[target], config)
     planner = Planner(config, folder, graph, force)
-    run = Run(planner, Silent(), jobs=1)
+    run = Execution(planner, Silent(), jobs=1)
     steps = planner.plan(asked_for(target, config, graph, full))
     if writes(steps):
         refuse_another_config(folder, config)
@@ -169,13 +169,13 @@ class Begun:
     """A stage that runs."""
 
     step: Step
-    task: Task
+    task: StageTask
     provenance: Provenance
     reporter: StageReporter
     started: float
 
 
-class Run:
+class Execution:
     """One execution: what is known of the results, and what was done so far."""
 
     def __init__(self, planner: Planner, reporter: Reporter, jobs: int) -> None:
@@ -184,7 +184,7 @@ class Run:
         self.folder = planner.folder
         self.reporter = reporter
         self.jobs = jobs
-        self.done: list[Done] = []
+        self.done: list[StageDone] = []
         self.waiting: list[Stage] = []
         self.running: dict[Future[Any] | None, Begun] = {}
         self.working: set[Future[Any]] = set()
@@ -209,7 +209,7 @@ class Run:
 
     def skip(self, step: Step) -> None:
         """Take note of a stage that does not run."""
-        done = Done(step.stage.name, step.action, step.reason)
+        done = StageDone(step.stage.name, step.action, step.reason)
         self.done.append(done)
         self.reporter.note(said_of(done))
 
@@ -335,7 +335,7 @@ class Run:
             Parts(self.folder.parts(stage.name), identity.key).forget()
         self.planner.settle(stage, result)
         reason = begun.step.reason if result.complete else f"no answer: {no_answer(result)}"
-        done = Done(stage.name, "run", reason, time.perf_counter() - begun.started)
+        done = StageDone(stage.name, "run", reason, time.perf_counter() - begun.started)
         self.done.append(done)
         self.left = [name for name in self.left if name != stage.name]
         answered = [] if result.complete else ["no answer"]
@@ -441,7 +441,7 @@ def unanswered(error: NoAnswer) -> Content:
     return replace(partial, summary={**partial.summary, "no_answer": said})
 
 
-def said_of(done: Done) -> str:
+def said_of(done: StageDone) -> str:
     """One line about what was done with a stage; why there is no answer is told once, in the end."""
     why = "no answer" if done.reason.startswith("no answer: ") else done.reason.partition(": no answer: ")[0]
     match done.action:

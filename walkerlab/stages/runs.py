@@ -210,7 +210,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Difference:
+class RunDifference:
     """How two runs differ.
 
     config       keys with both values, as JSON
@@ -226,10 +226,10 @@ class Difference:
 
 def difference(
     first: Mapping[str, Stored], second: Mapping[str, Stored], configs: Sequence[Config | None]
-) -> Difference:
+) -> RunDifference:
     """How the results of two runs differ, and the configs of both."""
     both = [name for name in first if name in second]
-    return Difference(
+    return RunDifference(
         config_difference(*configs),
         {name: pairs(first[name].summary, second[name].summary) for name in both},
         tuple(name for name in first if name not in second),

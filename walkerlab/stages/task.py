@@ -23,7 +23,7 @@ from walkerlab.workers import tell
 
 
 @dataclass(frozen=True)
-class Task:
+class StageTask:
     """A stage with all that it is given.
 
     config    what it takes of the config
@@ -80,7 +80,7 @@ class PipeReporter:
         tell(("compiling", kernel))
 
 
-def run_in_worker(task: Task) -> Content:
+def run_in_worker(task: StageTask) -> Content:
     """Run a stage in a worker, telling its progress."""
     reporter = PipeReporter()
     importlib.import_module(task.module)
@@ -97,9 +97,9 @@ def task_of(
     jobs: int,
     key: str,
     left_out: tuple[LeftOut, ...],
-) -> Task:
+) -> StageTask:
     """The task of a stage; it is given of the rest what it asks for."""
-    return Task(
+    return StageTask(
         stage.name,
         stage.module,
         only(config, stage.takes_under(config)),

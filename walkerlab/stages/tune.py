@@ -22,9 +22,9 @@ from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import (
     Adjustment,
     Margin,
+    MarginSearch,
     ScaledStarts,
-    Search,
-    Trial,
+    StartTrial,
     margins,
     scaled_starts,
     smallest_change,
@@ -49,7 +49,7 @@ LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least,
 RIGID_METHOD, RIGID_RTOL, RIGID_ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
-COMPASS_CELLS, CELLS, COARSE = 61, 21, Search(step=0.05, largest=2.0)
+COMPASS_CELLS, CELLS, COARSE = 61, 21, MarginSearch(step=0.05, largest=2.0)
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,13 @@ class Procedure:
 
 
 @dataclass(frozen=True)
-class Findings:
+class TuneFindings:
     """All that the stage found."""
 
     scene: ContactScene
     gait: GaitAnswer
     procedure: Procedure
-    as_it_stands: Trial
+    as_it_stands: StartTrial
     adjustment: Adjustment | None
     margins: list[Margin]
     contact_map: StartMap
@@ -94,7 +94,7 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     near = tuple(float(x) for x in inputs["fixedpoint"].summary["state"])  # the start itself may be far from any gait
     gait = contact_gait(config, rigid_step, near)
     scene = free_scene(config, rigid_step, gait)
-    found = Stage(config, scene, rigid_state, gait).findings(progress, jobs)
+    found = TuneRun(config, scene, rigid_state, gait).findings(progress, jobs)
     stored, said = groups(found), summary(found) | {"left_out": list(of_adjustment(config))}
     limit = rigid_limit(config, found, inputs, progress)
     if limit is not None:
@@ -114,7 +114,7 @@ def free_scene(config: ContactConfig, rigid_step: float, gait: GaitAnswer) -> Co
 
 
 def rigid_limit(
-    config: TuneConfig, found: Findings, inputs: Mapping[str, Content], progress: Progress
+    config: TuneConfig, found: TuneFindings, inputs: Mapping[str, Content], progress: Progress
 ) -> LimitFindings | None:
     """What the rigid limit takes; None if it is not asked for or there is no gait to follow."""
     if found.gait.gait is None or not config.tune.rigid_limit:
@@ -123,7 +123,7 @@ def rigid_limit(
     return limit_findings(config, found.scene, found.gait.gait, rigid, found.procedure.rigid, progress)
 
 
-class Stage:
+class TuneRun:
     """What the parts of the stage share."""
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
@@ -134,7 +134,7 @@ class Stage:
         self.compass, self.of_the_paper = is_plain_compass(config.walker), is_the_papers(config.walker)
         self.starts = self.scaled()
 
-    def findings(self, progress: Progress, jobs: int) -> Findings:
+    def findings(self, progress: Progress, jobs: int) -> TuneFindings:
         """Procedure, margins, map, adjustment and the paper's own start."""
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.compass else CELLS)
@@ -154,11 +154,11 @@ class Stage:
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         adjustment, around = self.adjusted(as_it_stands, quick, walked)
-        search = Search() if self.compass else COARSE
+        search = MarginSearch() if self.compass else COARSE
         found = margins(self.starts, around, search) if adjustment is not None else []
         state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
         adjusted = None if state is None else self.walk(state)
-        return Findings(
+        return TuneFindings(
             self.scene,
             self.gait,
             Procedure(
@@ -181,7 +181,7 @@ class Stage:
         )
 
     def adjusted(
-        self, as_it_stands: Trial, quick: ScaledStarts, cells: StartMap
+        self, as_it_stands: StartTrial, quick: ScaledStarts, cells: StartMap
     ) -> tuple[Adjustment | None, tuple[float, float]]:
         """The smallest change of the velocities, and the factors around which margins are asked."""
         if as_it_stands.walks:

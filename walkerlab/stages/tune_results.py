@@ -25,13 +25,13 @@ from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Group, Variable
 
 if TYPE_CHECKING:
-    from walkerlab.stages.tune import Findings
+    from walkerlab.stages.tune import TuneFindings
 
 WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 SWING, STANCE = "swing_factor", "stance_factor"
 
 
-def summary(found: Findings) -> dict[str, Any]:
+def summary(found: TuneFindings) -> dict[str, Any]:
     """What the command prints."""
     procedure = found.procedure
     return {
@@ -66,7 +66,7 @@ def papers_start(start: AdamsWalk) -> dict[str, Any]:
     }
 
 
-def table_2(found: Findings) -> dict[str, dict[str, Any]]:
+def table_2(found: TuneFindings) -> dict[str, dict[str, Any]]:
     """The start before and after the adjustment, of the paper's compass beside the paper's two, each on either base."""
     n = len(found.names) // 2
     papers = [printed_start(row) for row in TABLE_2] if found.paper is not None else [{}] * (2 * n)
@@ -103,7 +103,7 @@ def percent(value: float, other: float, base: float) -> float | None:
     return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
 
 
-def gait_summary(found: Findings) -> dict[str, Any]:
+def gait_summary(found: TuneFindings) -> dict[str, Any]:
     """The contact model's own gait, or why there is none."""
     gait = found.gait.gait
     said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
@@ -122,9 +122,9 @@ def gait_summary(found: Findings) -> dict[str, Any]:
         "stable": gait.stable,
         "slip_m": step.slip_m,
         "residual": gait.residual,
-        "lost_J": by_channel(found.scene.walker, step.books_J),
+        "lost_J": by_channel(found.scene.walker, step.dissipated_J),
         "height_lost_J": step.height_lost_J,
-        "balance_J": float(step.books_J.sum() - step.height_lost_J),
+        "balance_J": float(step.dissipated_J.sum() - step.height_lost_J),
     }
 
 
@@ -149,7 +149,7 @@ def role_of(walker: ContactWalker, body: int) -> str:
     return "stance" if body in walker.legs[STANCE_FOOT] else "swing"
 
 
-def adjustment_summary(found: Findings) -> dict[str, Any]:
+def adjustment_summary(found: TuneFindings) -> dict[str, Any]:
     """The smallest change that walks, whether any is needed, and the margins around it."""
     needed = not found.as_it_stands.walks
     change = found.adjustment
@@ -193,7 +193,7 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     }
 
 
-def map_summary(found: Findings) -> dict[str, Any]:
+def map_summary(found: TuneFindings) -> dict[str, Any]:
     """How many cells end how, in both models."""
     return {
         "cells": int(found.contact_map.outcome.size),
@@ -209,7 +209,7 @@ def counted(cells: StartMap) -> dict[str, int]:
     return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
 
 
-def groups(found: Findings) -> dict[str, Group]:
+def groups(found: TuneFindings) -> dict[str, Group]:
     """The datasets of the artifact."""
     procedure = found.procedure
     stored: dict[str, Group | None] = {
@@ -224,7 +224,7 @@ def groups(found: Findings) -> dict[str, Group]:
     return {name: group for name, group in stored.items() if group is not None}
 
 
-def map_group(found: Findings) -> Group:
+def map_group(found: TuneFindings) -> Group:
     """Outcome and steps of both models over the two factors."""
     cells, rigid = found.contact_map, found.rigid_map
     dims = (STANCE, SWING)

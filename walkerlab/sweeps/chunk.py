@@ -34,7 +34,7 @@ TEXTS: Final = ("key", "status", "said", "numbers")
 
 
 @dataclass(frozen=True)
-class Row:
+class PointResult:
     """What became of one point.
 
     key      of the stage's result, hex
@@ -54,7 +54,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Task:
+class ChunkTask:
     """What a worker is sent.
 
     graph    where the pipeline is, as module:NAME
@@ -70,7 +70,7 @@ class Task:
     keys: tuple[dict[str, str], ...]
     host: str = ""
 
-    def split(self) -> tuple[Task, Task]:
+    def split(self) -> tuple[ChunkTask, ChunkTask]:
         """Both halves of a chunk of at least two points."""
         middle = len(self.configs) // 2
         first, second = slice(None, middle), slice(middle, None)
@@ -84,11 +84,11 @@ class Task:
 class Chunk:
     """Some points' rows, with unit and meaning of the numbers that the stage itself has labelled."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[PointResult, ...]
     labels: Labels
 
 
-def compute(task: Task) -> Chunk:
+def compute(task: ChunkTask) -> Chunk:
     """Compute a chunk's points in this process; what goes wrong with one does not end the others."""
     keep_compiled_code_apart(task.host)
     graph = graph_at(task.graph)
@@ -129,21 +129,21 @@ def worker_for(where: str, graph: Graph) -> Any:
     return _WORKERS.setdefault(where, InMemory(graph))
 
 
-def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tuple[Row, Content]:
+def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tuple[PointResult, Content]:
     """One point's row, and the content it is from."""
     key = keys[target]
     try:
         answer = worker.answer(without_outputs(config, target, worker.graph), target, keys)
     except WalkerlabError as error:
-        return Row(key, "failed", error.message), Content()
+        return PointResult(key, "failed", error.message), Content()
     except Exception as error:
         said = f"a bug: {type(error).__name__}: {error}"
-        return Row(key, "failed", said, bug=traceback.format_exc()), Content()
+        return PointResult(key, "failed", said, bug=traceback.format_exc()), Content()
     content, no_answer = answer.content, answer.no_answer
     numbers = flat_text(untimed(content.summary, content.timed))
     if no_answer is None:
-        return Row(key, "answered", "", numbers), content
-    return Row(key, "no-answer", no_answer.message, numbers), content
+        return PointResult(key, "answered", "", numbers), content
+    return PointResult(key, "no-answer", no_answer.message, numbers), content
 
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
@@ -204,7 +204,7 @@ def stored_chunk(path: Path) -> Chunk:
         columns = [points[name].tolist() for name in (*TEXTS, "wall_s")]
     except KeyError as error:
         raise Damaged(f"it has no {error}") from error
-    rows = tuple(Row(*row) for row in zip(*columns, strict=True))
+    rows = tuple(PointResult(*row) for row in zip(*columns, strict=True))
     return Chunk(rows, {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()})
 
 
@@ -215,7 +215,7 @@ def chunk_files(runs_dir: Path, stage: str, code_digest: str) -> Iterator[Path]:
 
 def rows_of_single_runs(
     runs_dir: Path, stage: str, wanted: Mapping[str, Any] | set[str]
-) -> Iterator[tuple[Row, Labels]]:
+) -> Iterator[tuple[PointResult, Labels]]:
     """The results of runs of a stage that have one of the wanted keys."""
     for path in sorted(runs_dir.glob(f"*/{stage}.h5")):
         try:
@@ -226,15 +226,15 @@ def rows_of_single_runs(
             yield row_of_artifact(stored), labels_in(stored, {})
 
 
-def row_of_artifact(stored: artifact.Stored) -> Row:
+def row_of_artifact(stored: artifact.Stored) -> PointResult:
     """A single run's result as a row."""
     summary = untimed(stored.summary, stored.timed)
     said = summary.pop("no_answer", None)
     status: Status = "answered" if stored.complete else "no-answer"
-    return Row(stored.identity.key, status, "" if said is None else str(said["message"]), flat_text(summary))
+    return PointResult(stored.identity.key, status, "" if said is None else str(said["message"]), flat_text(summary))
 
 
-def median_wall_s(rows: Sequence[Row]) -> float | None:
+def median_wall_s(rows: Sequence[PointResult]) -> float | None:
     """What a point took, s; None if nothing is known."""
     walls = [row.wall_s for row in rows if row.wall_s > 0.0]
     return float(np.median(walls)) if walls else None

@@ -20,7 +20,7 @@ TEXT_BYTES: Final = 6
 """What a text of some words takes in a file, in units of what it takes here."""
 
 
-class Column:
+class SweepVariable:
     """One variable: a number, a list of numbers, or a text, for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
@@ -78,7 +78,7 @@ class Columns:
         """Nothing is known of `size` results."""
         self.size = size
         self.labels: dict[str, tuple[str, str]] = {}
-        self._columns: dict[str, Column] = {}
+        self._columns: dict[str, SweepVariable] = {}
 
     def put(self, places: Sequence[int], rows: Sequence[Mapping[str, Any]]) -> None:
         """Take what some results say, each by name as `flat.said_in` tells it."""
@@ -87,7 +87,7 @@ class Columns:
             first = rows[there[0]][name]
             text = isinstance(first, str)
             if name not in self._columns:
-                self._columns[name] = Column(self.size, () if text else np.shape(first), text)
+                self._columns[name] = SweepVariable(self.size, () if text else np.shape(first), text)
             column = self._columns[name]
             there = [k for k in there if isinstance(rows[k][name], str) == column.text]
             column.put(np.array([places[k] for k in there], int), [rows[k][name] for k in there])

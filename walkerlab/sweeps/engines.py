@@ -52,7 +52,7 @@ class Pool:
 
 
 @dataclass(frozen=True)
-class Engine:
+class SweepEngine:
     """One way to compute.
 
     opened   a context that gives a pool and closes it
@@ -63,7 +63,7 @@ class Engine:
     chunk_s: float
 
     @contextlib.contextmanager
-    def begun(self, order: Order) -> Iterator[Engine]:
+    def begun(self, order: Order) -> Iterator[SweepEngine]:
         """The engine for one sweep; on this machine its workers load what they need while points are still made."""
         if self.opened is not local:
             yield self
@@ -215,14 +215,14 @@ def number_if_it_is_one(text: str) -> str | int:
     return int(text) if text.isdigit() else text
 
 
-ENGINES: dict[str, Engine] = {
-    "local": Engine(local, chunk_s=5.0),
-    "dask": Engine(dask, chunk_s=10.0),
-    "slurm": Engine(slurm, chunk_s=60.0),
+ENGINES: dict[str, SweepEngine] = {
+    "local": SweepEngine(local, chunk_s=5.0),
+    "dask": SweepEngine(dask, chunk_s=10.0),
+    "slurm": SweepEngine(slurm, chunk_s=60.0),
 }
 
 
-def engine_named(text: str) -> tuple[Engine, str]:
+def engine_named(text: str) -> tuple[SweepEngine, str]:
     """The engine, and the address if there is one, of NAME or NAME=ADDRESS; ConfigError if there is none."""
     name, _, address = text.partition("=")
     if name not in ENGINES:

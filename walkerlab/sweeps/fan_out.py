@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from walkerlab.errors import NoAnswer
-from walkerlab.sweeps.chunk import Chunk, Row, Task, compute
-from walkerlab.sweeps.engines import Engine, Order, Pool
+from walkerlab.sweeps.chunk import Chunk, ChunkTask, PointResult, compute
+from walkerlab.sweeps.engines import Order, Pool, SweepEngine
 
 SCOUTS: Final = 2
 """Points of the first chunk, which goes ahead alone: it has the kernels compiled once and says what a point takes."""
@@ -31,7 +31,7 @@ class Try:
     failures  how often it has come to nothing
     """
 
-    task: Task
+    task: ChunkTask
     failures: int = 0
 
 
@@ -39,7 +39,7 @@ class FanOut:
     """One sweep's work on an engine."""
 
     def __init__(
-        self, engine: Engine, order: Order, chunk_s: float, todo: Iterator[tuple[Any, dict[str, str]]], count: int
+        self, engine: SweepEngine, order: Order, chunk_s: float, todo: Iterator[tuple[Any, dict[str, str]]], count: int
     ) -> None:
         """Begin nothing yet.
 
@@ -72,12 +72,12 @@ class FanOut:
             one = self._again.popleft() if self._again else Try(self._next_task(pool.workers))
             self._running[pool.executor.submit(compute, one.task)] = one
 
-    def _next_task(self, workers: int) -> Task:
+    def _next_task(self, workers: int) -> ChunkTask:
         size = min(self.left, self._chunk_size(workers))
         self.left -= size
         points = [next(self.todo) for _ in range(size)]
         configs, keys = zip(*points, strict=True)
-        return Task(self.graph, self.target, configs, keys, platform.node())
+        return ChunkTask(self.graph, self.target, configs, keys, platform.node())
 
     def _chunk_size(self, workers: int) -> int:
         if self.point_s is None:
@@ -121,4 +121,4 @@ class FanOut:
         else:
             self.point_s = self.point_s or 1.0
             key = one.task.keys[0][self.target]
-            self.keep(Chunk((Row(key, "failed", f"its worker died: {said}"),), {}))
+            self.keep(Chunk((PointResult(key, "failed", f"its worker died: {said}"),), {}))

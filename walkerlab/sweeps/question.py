@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import extra, leaves
-from walkerlab.config.layers import Setting
+from walkerlab.config.layers import ConfigSetting
 from walkerlab.config.problems import Problem, nearest, refusal
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
@@ -41,11 +41,11 @@ class Axis:
     source: str
     ends: tuple[float, float] | None = None
 
-    def setting(self, index: int) -> Setting:
+    def setting(self, index: int) -> ConfigSetting:
         """The `--set` of one value."""
         value = self.values[index]
         place = Position(f"{self.source}, {value}", 1, 1)
-        return Setting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
+        return ConfigSetting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Question:
             places.append(place)
         return tuple(reversed(places))
 
-    def settings(self, index: int) -> list[Setting]:
+    def settings(self, index: int) -> list[ConfigSetting]:
         """The `--set` options of one point."""
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 

@@ -25,14 +25,14 @@ from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.chunk import (
     Chunk,
-    Row,
+    PointResult,
     chunk_files,
     median_wall_s,
     rows_of_single_runs,
     store,
     stored_chunk,
 )
-from walkerlab.sweeps.engines import ENGINES, Engine, Order
+from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.fan_out import FanOut
 from walkerlab.sweeps.points import Points
 from walkerlab.sweeps.question import Question
@@ -42,7 +42,7 @@ PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
 
 
 @dataclass(frozen=True)
-class Work:
+class SweepWork:
     """How a sweep is to be computed.
 
     engine   where
@@ -53,7 +53,7 @@ class Work:
     graph    where the pipeline is, as module:NAME
     """
 
-    engine: Engine = ENGINES["local"]
+    engine: SweepEngine = ENGINES["local"]
     order: Order = field(default_factory=Order)
     chunk_s: float | None = None
     wait: bool = True
@@ -130,7 +130,7 @@ class Foreseen:
     estimate_s: float | None
 
 
-class Sweep:
+class SweepRun:
     """One question, its points checked."""
 
     def __init__(self, question: Question, template: Template, folder: RunFolder, graph: Graph = PIPELINE) -> None:
@@ -157,7 +157,7 @@ class Sweep:
         """What would be done; touches nothing. Raises ConfigError as `run` would."""
         refuse_another_config(self.folder, self.config)
         there = np.zeros(len(self.places), bool)
-        rows: list[Row] = []
+        rows: list[PointResult] = []
         for chunk in self._stored(Silent()):
             rows += chunk.rows
             there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
@@ -168,7 +168,7 @@ class Sweep:
         said = tuple(self.question.said(index) for index in range(min(shown, count)))
         return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
 
-    def run(self, work: Work, reporter: Reporter | None = None) -> Swept:
+    def run(self, work: SweepWork, reporter: Reporter | None = None) -> Swept:
         """Have the sweep's file, computing the points that have no result yet.
 
         Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
@@ -219,7 +219,7 @@ class Sweep:
             merge.put(chunk, self.places)
 
     def _compute(
-        self, merge: Merge, work: Work, reporter: Reporter, progress: Progress, begun: provenance.Provenance
+        self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, begun: provenance.Provenance
     ) -> tuple[str, ...]:
         """Compute what is missing; the tracebacks of bugs, one for each place in the code, which are told at once."""
         missing = np.sort(self.first[~merge.there])

@@ -15,11 +15,11 @@ from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import Method, method_named
 from walkerlab.solvers.stepping import ACCEPTED, RHS
-from walkerlab.verification.contact_start import Prepared, prepared
+from walkerlab.verification.contact_start import ContactStart, prepared
 from walkerlab.verification.momentum import MEASURE, momentum_finding
 from walkerlab.verification.scaling import pendulum_time, scaled, to_twin
 from walkerlab.verification.second_method import Second, promised, second_walk
-from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, NotMeasured, finite
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite
 
 TENFOLD = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
@@ -27,7 +27,7 @@ SAMPLES_PER_PENDULUM_TIME = 40
 NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
 
 
-def walked(ready: Prepared, config: WalksConfig, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
+def walked(ready: ContactStart, config: WalksConfig, case: Case, sharper: float, sampled: bool) -> ContactWalkResult:
     """Walk a case with the tolerances of its config times `sharper`."""
     settings, scene = config.solver.contact, ready.scene
     methods = MethodSettings(
@@ -38,7 +38,7 @@ def walked(ready: Prepared, config: WalksConfig, case: Case, sharper: float, sam
 
 
 def walked_with(
-    methods: MethodSettings, ready: Prepared, case: Case, interval: float | None = None
+    methods: MethodSettings, ready: ContactStart, case: Case, interval: float | None = None
 ) -> ContactWalkResult:
     """Walk a case by a method, with samples at an interval (s) if there is one."""
     scene = ready.scene
@@ -47,7 +47,7 @@ def walked_with(
     )
 
 
-def walked_otherwise(ready: Prepared, config: WalksConfig, case: Case) -> Second[ContactWalkResult]:
+def walked_otherwise(ready: ContactStart, config: WalksConfig, case: Case) -> Second[ContactWalkResult]:
     """Walk a case by another method than its config's, at the same tolerance."""
     settings = config.solver.contact
 
@@ -85,7 +85,7 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
         energy_balance_residual_J=finite(result.energy_balance_residual_J),
         rhs_evaluations=int(result.work[RHS]),
         wall_s=wall_s,
-        findings=(*findings, momentum) if isinstance(momentum, Finding) else tuple(findings),
+        findings=(*findings, momentum) if isinstance(momentum, Measure) else tuple(findings),
         remarks=tuple(remarks),
         second_method=second.method,
         second_tried=second.tried,
@@ -93,7 +93,9 @@ def judge_contact(case: Case, config: Config) -> CaseResult:
     )
 
 
-def momentum_of(result: ContactWalkResult, ready: Prepared, config: WalksConfig, case: Case) -> Finding | NotMeasured:
+def momentum_of(
+    result: ContactWalkResult, ready: ContactStart, config: WalksConfig, case: Case
+) -> Measure | NotMeasured:
     """The momentum's balance of a walk that has an outcome and a length."""
     if not result.outcome.answered or result.end_time_s <= 0.0:
         return NotMeasured(MEASURE, f"the walk ended as {result.outcome.label}")
@@ -101,7 +103,7 @@ def momentum_of(result: ContactWalkResult, ready: Prepared, config: WalksConfig,
 
 
 def compared_walks(
-    ready: Prepared, config: Config, case: Case, second: Second[ContactWalkResult]
+    ready: ContactStart, config: Config, case: Case, second: Second[ContactWalkResult]
 ) -> list[tuple[str, ContactWalkResult, float]]:
     """The walks that must do the same: what they are, and their pendulum times (s)."""
     tenfold = walked(ready, config, case, TENFOLD, sampled=False)
@@ -125,24 +127,24 @@ def without_start(case: Case) -> CaseResult:
     )
 
 
-def of_one_run(result: ContactWalkResult, ready: Prepared, case: Case) -> list[Finding]:
+def of_one_run(result: ContactWalkResult, ready: ContactStart, case: Case) -> list[Measure]:
     """Measures that need no second run."""
     numbers = np.concatenate([result.end_state, result.touch_time_s, result.touch_along_m, result.dissipated_J])
     balance = finite(result.energy_balance_residual_J / ready.energy)
     found = [
-        Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
-        Finding("energy balance residual over energy", balance, case.balance),
-        Finding(BUDGET_USED, float(result.work[RHS]) / case.budget, 1.0 + 20.0 / case.budget),
+        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
+        Measure("energy balance residual over energy", balance, case.balance),
+        Measure(BUDGET_USED, float(result.work[RHS]) / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if result.samples is not None and result.samples.dissipated_J.shape[0] > 1:
         by_channel = result.samples.dissipated_J[:, :2]
         found.append(
-            Finding("energy won back from friction and damping", won_back(by_channel, ready), NEVER_LESS * case.balance)
+            Measure("energy won back from friction and damping", won_back(by_channel, ready), NEVER_LESS * case.balance)
         )
     return found
 
 
-def won_back(dissipated: NDArray[np.float64], ready: Prepared) -> float:
+def won_back(dissipated: NDArray[np.float64], ready: ContactStart) -> float:
     """Largest fall of what was dissipated, as a share of the energy."""
     return finite(max(0.0, float(np.max(-np.diff(dissipated, axis=0)))) / ready.energy)
 
@@ -155,7 +157,7 @@ def time_difference(
     other_unit: float,
     case: Case,
     config: WalksConfig,
-) -> Finding:
+) -> Measure:
     """How far two runs' touches are apart, each in its own pendulum time; their ends if there are none."""
     touches, others = one.touch_time_s / unit, other.touch_time_s / other_unit
     steps = min(touches.size, others.size, case.compared_steps)
@@ -164,7 +166,7 @@ def time_difference(
     else:
         apart = abs(one.end_time_s / unit - other.end_time_s / other_unit)
     limit = promised(case, config.solver.contact.rtol, int(one.work[ACCEPTED] + other.work[ACCEPTED]))
-    return Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)
+    return Measure(f"time apart from {what}, in pendulum times", finite(apart), limit)
 
 
 def outcome_differs(what: str, case: Case, outcome: Outcome, again: Outcome) -> list[str]:

@@ -26,7 +26,7 @@ def gait_of(walker: Standing, seed: int) -> Gait | None:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class ContactStart:
     """A walker on its ground, in the state that it starts from."""
 
     scene: ContactScene
@@ -34,7 +34,7 @@ class Prepared:
     energy: float  # J, m g L and the energy of the start: what residuals are measured by
 
 
-def prepared(config: WalksConfig, case: Case) -> Prepared | None:
+def prepared(config: WalksConfig, case: Case) -> ContactStart | None:
     """The scene and start of a case; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
@@ -57,7 +57,7 @@ def prepared(config: WalksConfig, case: Case) -> Prepared | None:
     speed = float(np.max(np.abs([*y[rates : rates + 2], *(leg * rate for rate in y[rates + 2 :])])))
     law = scene.walker.normal
     stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
-    return Prepared(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)
+    return ContactStart(scene, y, mass * (gravity * leg + 0.5 * speed**2) + stored)
 
 
 def own_pitch(config: ContactConfig, rigid_step_m: float, rigid_state: State) -> float | None:

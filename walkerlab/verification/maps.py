@@ -19,7 +19,7 @@ from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
 from walkerlab.solvers.registry import method_named
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.contact_case import TENFOLD, walked, walked_with
-from walkerlab.verification.contact_start import Prepared, prepared
+from walkerlab.verification.contact_start import ContactStart, prepared
 from walkerlab.verification.ordinary import REFERENCE, STEPS, fixed, natural_units
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import finite
@@ -122,7 +122,9 @@ class StepColumn:
         return [number for h in self.steps_s for number in step_cell(h, ready, walk, natural_units(config))]
 
 
-def step_cell(h: float, ready: Prepared, walk: ContactWalkResult, units: NDArray[np.float64]) -> tuple[float, float]:
+def step_cell(
+    h: float, ready: ContactStart, walk: ContactWalkResult, units: NDArray[np.float64]
+) -> tuple[float, float]:
     """Verdict and error of one step; the error is `NONE` where there is none to speak of."""
     choice = fixed("map", h, ready, walk.end_time_s, np.array(walk.end_state), units, MOST_EVALUATIONS)
     return float(VERDICTS.index(choice.verdict)), NONE if choice.error is None else choice.error

@@ -22,8 +22,8 @@ from walkerlab.hybrid.contact_run import (
     ContactWalkResult,
     MethodSettings,
     gather,
-    new_ledger,
     new_observer,
+    new_walk_state,
     run_parts,
     sampled_feet,
 )
@@ -32,10 +32,10 @@ from walkerlab.mechanics.parts import Assembly
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.stepping import ACCEPTED
-from walkerlab.verification.contact_start import Prepared
+from walkerlab.verification.contact_start import ContactStart
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.second_method import MAGNIFIED, promised
-from walkerlab.verification.verdict import Finding, NotMeasured, finite
+from walkerlab.verification.verdict import Measure, NotMeasured, finite
 
 Array = NDArray[np.float64]
 MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
@@ -64,7 +64,7 @@ class Balance:
     steps: int
 
 
-def momentum_finding(ready: Prepared, config: WalksConfig, case: Case) -> Finding | NotMeasured:
+def momentum_finding(ready: ContactStart, config: WalksConfig, case: Case) -> Measure | NotMeasured:
     """Momentum against impulse, or why it cannot be judged.
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
@@ -76,7 +76,7 @@ def momentum_finding(ready: Prepared, config: WalksConfig, case: Case) -> Findin
     if unknown > MOST_UNKNOWN:
         return NotMeasured(MEASURE, why_unknown(found))
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
-    return Finding(MEASURE, finite(found.residual), limit)
+    return Measure(MEASURE, finite(found.residual), limit)
 
 
 def why_unknown(found: Balance) -> str:
@@ -88,7 +88,7 @@ def why_unknown(found: Balance) -> str:
     return " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
 
 
-def momentum_balance(ready: Prepared, config: WalksConfig, case: Case) -> Balance:
+def momentum_balance(ready: ContactStart, config: WalksConfig, case: Case) -> Balance:
     """Momentum against impulse over the first steps of a case."""
     short = case.model_copy(update={"steps": min(case.steps, STEPS)})
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
@@ -120,14 +120,14 @@ def samples_of(walk: ContactWalkResult) -> ContactSamples:
     return walk.samples
 
 
-def looked_at(ready: Prepared, config: WalksConfig, case: Case, times: Array) -> ContactWalkResult:
+def looked_at(ready: ContactStart, config: WalksConfig, case: Case, times: Array) -> ContactWalkResult:
     """Walk a case and keep its states at these times (s); sampling does not change the walk."""
     settings, scene = config.solver.contact, ready.scene
     methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, case.budget)
-    ledger = new_ledger(scene.walker, scene.terrain, STANCE_FOOT, case.steps, ready.start)
-    observer = new_observer(scene.walker, ledger, ready.start, 1.0, times.size)._replace(times=times)
-    outcome, stopped = run_parts(scene.walker, scene.ground, scene.pinned, ready.start, methods, observer, ledger)
-    return gather(outcome, stopped, ledger, observer, scene.walker, methods)
+    walk_state = new_walk_state(scene.walker, scene.terrain, STANCE_FOOT, case.steps, ready.start)
+    observer = new_observer(scene.walker, walk_state, ready.start, 1.0, times.size)._replace(times=times)
+    outcome, stopped = run_parts(scene.walker, scene.ground, scene.pinned, ready.start, methods, observer, walk_state)
+    return gather(outcome, stopped, walk_state, observer, scene.walker, methods)
 
 
 def with_middles(grid: Array) -> Array:
@@ -156,11 +156,11 @@ def unsettled(times: Array, rate: Array) -> Array:
     return np.asarray(np.abs(change).max(axis=1))
 
 
-def impulse_rate(samples: ContactSamples, ready: Prepared, config: RigidConfig) -> Array:
+def impulse_rate(samples: ContactSamples, ready: ContactStart, config: RigidConfig) -> Array:
     """Force along and up from the slope (N), and torque about a point of the slope (N m), of ground and gravity."""
     walker = ready.scene.walker
     feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(walker, samples.states, samples.carried, feet)
+    sampled_feet(walker, samples.states, samples.has_ground, feet)
     normal, friction = feet[:, :, FEET_NORMAL], feet[:, :, FEET_FRICTION]
     mass, gravity, slope = config.walker.total_mass_kg, config.gravity_m_s2, config.slope_rad
     weight = mass * gravity * np.array([np.sin(slope), -np.cos(slope)])

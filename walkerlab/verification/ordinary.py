@@ -1,8 +1,8 @@
 """What an ordinary choice does with the same scenes: SciPy at its default tolerance, a game engine's fixed step.
 
-The contact scene as one ordinary differential equation without events, as one writes it down who knows nothing of joins
-and pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a sharp tolerance,
-whatever the case asks for. The rigid scene as a script of one's own, with an event function.
+The contact scene as one ordinary differential equation without events, as one writes it down who knows nothing of
+switching points and pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a
+sharp tolerance, whatever the case asks for. The rigid scene as a script of one's own, with an event function.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
 from walkerlab.verification.contact_case import walked_with
-from walkerlab.verification.contact_start import Prepared, prepared
+from walkerlab.verification.contact_start import ContactStart, prepared
 from walkerlab.verification.rigid_case import prepared as rigid_prepared
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import finite
@@ -127,7 +127,7 @@ def natural_units(config: RigidConfig) -> NDArray[np.float64]:
 
 
 def library(
-    case: str, method: str, ready: Prepared, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
+    case: str, method: str, ready: ContactStart, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
 ) -> Choice:
     """A method of SciPy's solve_ivp with nothing but its name given."""
     from scipy.integrate import solve_ivp
@@ -163,7 +163,7 @@ def library(
 def fixed(
     case: str,
     h: float,
-    ready: Prepared,
+    ready: ContactStart,
     end: float,
     reference: NDArray[np.float64],
     units: NDArray[np.float64],

@@ -17,9 +17,9 @@ from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import Checkerboard
 from walkerlab.ground.walker import ContactWalker, FootMotion
-from walkerlab.hybrid.contact_events import SIGNALS, Frame, feet_motion
+from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, Frame, feet_motion
 from walkerlab.hybrid.contact_rules import LAST_TOUCH
-from walkerlab.hybrid.contact_run import NEVER, Ground, MethodSettings, new_ledger, new_observer, walk_free
+from walkerlab.hybrid.contact_run import NEVER, JudgedGround, MethodSettings, new_observer, new_walk_state, walk_free
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
@@ -39,11 +39,11 @@ class Rig:
     """Something on the ground."""
 
     walker: ContactWalker
-    ground: Ground
+    ground: JudgedGround
 
 
 @dataclass(frozen=True)
-class Run:
+class ParticleRun:
     """What it did."""
 
     times: Array  # (samples,) s
@@ -69,7 +69,7 @@ def rig(
     )
     walker = contact_walker(assembly, normal, friction, gravity, slope)
     frame = Frame(-ENDLESS, 1.0, (0.0, 0.0), (0.0, 0.0), True)
-    return Rig(walker, Ground(Checkerboard(ENDLESS, (0.0, 0.0)), frame))
+    return Rig(walker, JudgedGround(Checkerboard(ENDLESS, (0.0, 0.0)), frame))
 
 
 def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
@@ -77,25 +77,25 @@ def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.
     return (*at, angle, 0.0, *velocity, rate, 0.0)
 
 
-def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12) -> Run:
+def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12) -> ParticleRun:
     """Let it move for a time; samples evenly spaced. Raises ArithmeticError if the budget does not suffice."""
     frame = of.ground.frame._replace(pendulum_time=2.0 * duration_s / LONGEST_FLIGHT)
-    ground = Ground(of.ground.terrain, frame)
-    ledger = new_ledger(of.walker, ground.terrain, 1, 1, start)
-    ledger.at_zero[:] = 0
-    ledger.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
-    observer = new_observer(of.walker, ledger, start, duration_s / SAMPLES, SAMPLES)
+    ground = JudgedGround(of.ground.terrain, frame)
+    walk_state = new_walk_state(of.walker, ground.terrain, 1, 1, start)
+    walk_state.at_zero[:] = 0
+    walk_state.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
+    observer = new_observer(of.walker, walk_state, start, duration_s / SAMPLES, SAMPLES)
     method = MethodSettings(method_named("radau5"), rtol, atol, BUDGET).new(len(of.walker.blank))
-    finder = finder_for(method, SIGNALS)
-    outcome = Outcome(walk_free(of.walker, ground, method, finder, observer, ledger, 0.0, start, NEVER))
+    finder = finder_for(method, EVENT_FUNCTIONS)
+    outcome = Outcome(walk_free(of.walker, ground, method, finder, observer, walk_state, 0.0, start, NEVER))
     if outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {outcome.label} at {method.clock[1]:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
-    return Run(
+    return ParticleRun(
         observer.times[:seen].copy(),
         observer.states[:seen].copy(),
         tuple(method.y.tolist()),
-        observer.books.copy(),
+        observer.dissipated.copy(),
         method.counts[:4].copy(),
     )
 
@@ -105,6 +105,6 @@ def first_foot(of: Rig, y: Array) -> FootMotion:
     return feet_motion(of.walker, tuple(float(x) for x in y))[0]
 
 
-def next_landing(height: float, climb: float, gravity: float) -> float:
+def next_landing(height: float, vertical_velocity: float, gravity: float) -> float:
     """Time (s) until something in free flight comes down to height zero."""
-    return (climb + math.sqrt(climb * climb + 2.0 * gravity * height)) / gravity
+    return (vertical_velocity + math.sqrt(vertical_velocity * vertical_velocity + 2.0 * gravity * height)) / gravity

@@ -22,13 +22,13 @@ from walkerlab.verification.contact_start import gait_of
 from walkerlab.verification.rigid_momentum import RigidMasses
 from walkerlab.verification.scaling import pendulum_time, scaled, to_twin
 from walkerlab.verification.second_method import Second, promised, second_walk
-from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Finding, finite
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, finite
 
 ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
 
 
 @dataclass(frozen=True)
-class Prepared:
+class RigidStart:
     """A walker and the state that it starts from."""
 
     walker: Standing
@@ -38,7 +38,7 @@ class Prepared:
     energy: float  # J, m g L and the kinetic energy of the start
 
 
-def prepared(config: WalksConfig) -> Prepared | None:
+def prepared(config: WalksConfig) -> RigidStart | None:
     """Walker and start of a config; None if it starts from a gait that there is not."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
@@ -52,22 +52,22 @@ def prepared(config: WalksConfig) -> Prepared | None:
     speed = walker.leg_length * max(abs(rate) for rate in start[len(start) // 2 :])
     energy = mass * (walker.gravity * walker.leg_length + 0.5 * speed**2)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
-    return Prepared(walker, masses, compass_or_none(config, config.equations), start, energy)
+    return RigidStart(walker, masses, compass_or_none(config, config.equations), start, energy)
 
 
-def walked(ready: Prepared, config: WalksConfig, case: Case, sharper: float) -> RecordedWalk:
+def walked(ready: RigidStart, config: WalksConfig, case: Case, sharper: float) -> RecordedWalk:
     """Walk a case with the tolerances of its config times `sharper`."""
     settings = config.solver.rigid
     return walked_with(method_named(settings.method), settings.rtol * sharper, settings.atol * sharper, ready, case)
 
 
-def walked_with(method: Method, rtol: float, atol: float, ready: Prepared, case: Case) -> RecordedWalk:
+def walked_with(method: Method, rtol: float, atol: float, ready: RigidStart, case: Case) -> RecordedWalk:
     """Walk a case by a method, within the case's budget."""
     solver = method.new(len(ready.walker.blank), rtol, atol, case.budget)
     return take_walk(ready.walker, solver, ready.start, case.steps, budget=case.budget)
 
 
-def walked_otherwise(ready: Prepared, config: WalksConfig, case: Case) -> Second[RecordedWalk]:
+def walked_otherwise(ready: RigidStart, config: WalksConfig, case: Case) -> Second[RecordedWalk]:
     """Walk a case by another method than its config's, at the same tolerance."""
     settings = config.solver.rigid
 
@@ -115,7 +115,7 @@ def judge_rigid(case: Case, config: Config) -> CaseResult:
 
 
 def compared_walks(
-    ready: Prepared, config: Config, case: Case, second: Second[RecordedWalk]
+    ready: RigidStart, config: Config, case: Case, second: Second[RecordedWalk]
 ) -> list[tuple[str, RecordedWalk, float]]:
     """The walks that must do the same: what they are, and their pendulum times (s)."""
     compared = [("tenfold tolerance", walked(ready, config, case, TENFOLD), pendulum_time(config))]
@@ -129,22 +129,22 @@ def compared_walks(
     return compared
 
 
-def of_one_walk(walk: RecordedWalk, ready: Prepared, case: Case) -> list[Finding]:
+def of_one_walk(walk: RecordedWalk, ready: RigidStart, case: Case) -> list[Measure]:
     """Measures that need no second walk."""
     numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
     found = [
-        Finding("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
-        Finding("energy drift within a swing over energy", finite(walk.energy_drift / ready.energy), case.balance),
-        Finding(BUDGET_USED, walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(numbers))), 0.0),
+        Measure("energy drift within a swing over energy", finite(walk.energy_drift / ready.energy), case.balance),
+        Measure(BUDGET_USED, walk.work.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
     ]
     if walk.steps:
         masses, before, after = ready.masses, walk.before, walk.after
         off = masses.feet_off_the_slope(before) / ready.walker.leg_length
         won = masses.energy_won(before, after) / ready.energy
         found += [
-            Finding("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
-            Finding("momentum changed by a heel strike", masses.momentum_change(before, after), ROUNDING),
-            Finding("energy won at a heel strike", finite(won), ROUNDING),
+            Measure("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
+            Measure("momentum changed by a heel strike", masses.momentum_change(before, after), ROUNDING),
+            Measure("energy won at a heel strike", finite(won), ROUNDING),
         ]
     return found
 
@@ -157,7 +157,7 @@ def time_difference(
     other_unit: float,
     case: Case,
     config: WalksConfig,
-) -> list[Finding]:
+) -> list[Measure]:
     """How far two walks' heel strikes are apart, each in its own pendulum time; nothing where there are none."""
     strikes, others = one.heel_strikes / unit, other.heel_strikes / other_unit
     steps = min(strikes.size, others.size, case.compared_steps)
@@ -165,4 +165,4 @@ def time_difference(
         return []
     apart = float(np.max(np.abs(strikes[:steps] - others[:steps])))
     limit = promised(case, config.solver.rigid.rtol, one.work.accepted + other.work.accepted)
-    return [Finding(f"time apart from {what}, in pendulum times", finite(apart), limit)]
+    return [Measure(f"time apart from {what}, in pendulum times", finite(apart), limit)]

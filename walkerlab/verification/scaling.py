@@ -17,7 +17,7 @@ TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
 
 
 @dataclass(frozen=True)
-class Scale:
+class TwinScale:
     """How many times larger the twin's measures are."""
 
     length: float
@@ -45,13 +45,15 @@ def pendulum_time(config: RigidConfig) -> float:
     return math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
 
 
-def to_twin(config: RigidConfig) -> Scale:
+def to_twin(config: RigidConfig) -> TwinScale:
     """The scale that leads from a config's walker to its twin of ordinary size."""
     walker = config.walker
-    return Scale(TWIN_LEG / walker.leg_length_m, TWIN_MASS / walker.total_mass_kg, TWIN_GRAVITY / config.gravity_m_s2)
+    return TwinScale(
+        TWIN_LEG / walker.leg_length_m, TWIN_MASS / walker.total_mass_kg, TWIN_GRAVITY / config.gravity_m_s2
+    )
 
 
-def scaled_block(block: B, by: Scale) -> B:
+def scaled_block(block: B, by: TwinScale) -> B:
     """A block of measures scaled, each by the unit that its key ends in; knees' stops are turned by torques."""
     torque = by.force * by.length
     units = {
@@ -68,7 +70,7 @@ def scaled_block(block: B, by: Scale) -> B:
     return block.model_copy(update=changed)
 
 
-def scaled_value(value: Any, unit: float, by: Scale) -> Any:
+def scaled_value(value: Any, unit: float, by: TwinScale) -> Any:
     """A key's value, blocks and lists of measures with all that is in them."""
     if isinstance(value, Block):
         return scaled_block(value, by)
@@ -77,7 +79,7 @@ def scaled_value(value: Any, unit: float, by: Scale) -> Any:
     return value * unit if isinstance(value, float) and unit != 1.0 else value
 
 
-def scaled(config: Config, by: Scale) -> Config:
+def scaled(config: Config, by: TwinScale) -> Config:
     """The config of the similar walker: every quantity with a unit scaled, angles and pure numbers as they are."""
     walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {"walker": walker, "gravity_m_s2": config.gravity_m_s2 * by.gravity}
@@ -89,7 +91,7 @@ def scaled(config: Config, by: Scale) -> Config:
     return config.model_copy(update=changes)
 
 
-def scaled_contact(contact: Contact, by: Scale) -> Contact:
+def scaled_contact(contact: Contact, by: TwinScale) -> Contact:
     """The similar walker's ground."""
     si = contact.in_si()
     pitch = contact.pad_pitch

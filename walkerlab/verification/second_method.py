@@ -16,7 +16,7 @@ LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Pyt
 MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its steps
 
 
-class Walk(Protocol):
+class SecondWalk(Protocol):
     """A walk of either model."""
 
     @property
@@ -24,7 +24,7 @@ class Walk(Protocol):
         """How it ended."""
 
 
-W = TypeVar("W", bound=Walk)
+W = TypeVar("W", bound=SecondWalk)
 
 
 @dataclass(frozen=True)

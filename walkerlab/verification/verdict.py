@@ -13,7 +13,7 @@ BUDGET_USED: Final = "right-hand sides over budget"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Measure:
     """One independent measure of a run."""
 
     measure: str
@@ -61,7 +61,7 @@ class CaseResult:
     energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")]  # noqa: N815
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")]
     wall_s: float
-    findings: tuple[Finding, ...]
+    findings: tuple[Measure, ...]
     remarks: tuple[str, ...] = ()
     second_method: str = ""
     second_tried: str = ""

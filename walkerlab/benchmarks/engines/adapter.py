@@ -18,7 +18,7 @@ Forces = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True)
-class Contact:
+class EngineContact:
     """What an engine's own contact is to be tuned to, by closed forms, SI.
 
     mass             that stands on one foot (kg)
@@ -106,7 +106,7 @@ class Simulation(ABC):
         """Step until a time, or for a number of steps, or until it is told to stop."""
 
     @abstractmethod
-    def carry(self, ball: int, carried: bool) -> None:
+    def carry(self, ball: int, has_ground: bool) -> None:
         """Put ground under a foot or take it away; means nothing without the engine's own contact."""
 
 
@@ -124,5 +124,5 @@ class Adapter(Protocol):
     CANNOT_EXPRESS: tuple[str, ...]
     Run: type[Simulation]
 
-    def tuned(self, model: str, target: Contact) -> OwnContact:
+    def tuned(self, model: str, target: EngineContact) -> OwnContact:
         """The settings by which a contact model does what the target says, as far as it can."""

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.benchmarks.engines.adapter import (
-    Contact,
+    EngineContact,
     Floats,
     Forces,
     Integrator,
@@ -50,7 +50,7 @@ CANNOT_EXPRESS = (
 )
 
 
-def tuned(model: str, target: Contact) -> OwnContact:
+def tuned(model: str, target: EngineContact) -> OwnContact:
     """The closed forms above, solved for what the target says."""
     stiffness = target.mass * target.gravity / target.penetration
     omega = math.sqrt(target.gravity / target.penetration)
@@ -77,7 +77,7 @@ def slip_share(model: str, load: float) -> float:
     return high
 
 
-class Run(Simulation):
+class DrakeRun(Simulation):
     """A diagram, its simulator and its context."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
@@ -148,15 +148,15 @@ class Run(Simulation):
         x = self._plant.GetPositionsAndVelocities(self._at)
         return x[self._order], x[self._rates]
 
-    def carry(self, ball: int, carried: bool) -> None:
+    def carry(self, ball: int, has_ground: bool) -> None:
         """Let a foot's ball collide or not, by a filter of its own."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
-        if not self._feet or carried == (ball not in self._declared):
+        if not self._feet or has_ground == (ball not in self._declared):
             return
         context = self._scene_graph.GetMyMutableContextFromRoot(self._context)
         manager = self._scene_graph.collision_filter_manager(context)
-        if carried:
+        if has_ground:
             manager.RemoveDeclaration(self._declared.pop(ball))
         else:
             declaration = CollisionFilterDeclaration()

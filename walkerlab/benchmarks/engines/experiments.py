@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.benchmarks.engines.adapter import Contact, Integrator, OwnContact, Stepping
-from walkerlab.benchmarks.engines.process import Lost, OwnProcess
+from walkerlab.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
+from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.benchmarks.engines.registry import Engine
-from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, Row, SwingRow, TuningRow
+from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.runs import (
     SwingAnswer,
     SwingTask,
@@ -80,7 +80,7 @@ def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: fl
     """Our walk; with `until_s` also the state then."""
     settings = MethodSettings(method_named(method), rtol, 1e-2 * rtol, ENDLESS)
     return walk_contact(
-        scene.ours, scene.ground, None, scene.stance, scene.start, settings, steps, until_s, booked=False
+        scene.ours, scene.ground, None, scene.stance, scene.start, settings, steps, until_s, track_energy=False
     )
 
 
@@ -120,7 +120,7 @@ def answered(result: ContactWalkResult, wall_s: float, touches: int) -> WalkAnsw
     )
 
 
-def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
+def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
     """Our own method over its ladder of tolerances, on the same walk."""
     walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
     for rtol in OUR_LADDER:
@@ -134,7 +134,9 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[Row]:
         yield same_law_row(scene, OURS, version, OUR_METHOD, mean, rtol, truth, answer)
 
 
-def same_law_rows(engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess) -> Iterator[Row]:
+def same_law_rows(
+    engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess
+) -> Iterator[EngineRow]:
     """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
@@ -142,7 +144,7 @@ def same_law_rows(engine: Engine, version: str, scene: EngineScene, truth: Truth
         for stepping in ladder_of(name, integrator, truth.until_s):
             task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
-            if isinstance(answer, Lost):
+            if isinstance(answer, TaskLost):
                 yield lost_row(scene, engine.name, version, SAME_LAW, stepping, name, 1.0, answer)
                 if answer.timed_out:
                     break
@@ -175,14 +177,14 @@ def same_law_row(
     tolerance: float | None,
     truth: Truth,
     answer: WalkAnswer,
-) -> Row:
+) -> EngineRow:
     """A run with its errors; without an end state it has none."""
     error = None if answer.end is None else float(np.max(np.abs(answer.end - truth.end)))
     if error is not None and not math.isfinite(error):
         error = None
     enough = answer.touches_s.size >= TOUCHES
     touch = float(np.max(np.abs(answer.touches_s[:TOUCHES] - truth.touches_s))) if enough else None
-    return Row(
+    return EngineRow(
         scene.name, engine, version, SAME_LAW, integrator, 1.0, step_s, tolerance, error, touch, answer.wall_s,
         *last_step(answer), answer.touches_s.size, answer.outcome,
     )  # fmt: skip
@@ -208,17 +210,17 @@ def lost_row(
     stepping: Stepping,
     integrator: str,
     start: float,
-    lost: Lost,
-) -> Row:
+    lost: TaskLost,
+) -> EngineRow:
     """A run that was lost with its process, or that the engine refused."""
     outcome = Outcome.BUDGET_EXHAUSTED if lost.timed_out else Outcome.SOLVER_FAILED
-    return Row(
+    return EngineRow(
         scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None,
         None, None, None, None, 0, outcome.label, lost.why,
     )  # fmt: skip
 
 
-def target_of(scene: EngineScene) -> Contact | None:
+def target_of(scene: EngineScene) -> EngineContact | None:
     """What the walker's own contact is, linearised under its weight on one foot; None on frictionless ground."""
     walker = scene.ours
     law, friction = walker.normal, walker.friction
@@ -230,7 +232,7 @@ def target_of(scene: EngineScene) -> Contact | None:
     creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
-    return Contact(mass, g, depth, law.exponent, ratio, sliding, CREEP_LOAD, creep)
+    return EngineContact(mass, g, depth, law.exponent, ratio, sliding, CREEP_LOAD, creep)
 
 
 def bisected(function: Any, low: float, high: float) -> float:
@@ -242,12 +244,12 @@ def bisected(function: Any, low: float, high: float) -> float:
 
 
 def tuned(
-    engine: Engine, contact: str, scene: EngineScene, target: Contact, process: OwnProcess
-) -> tuple[OwnContact | None, list[TuningRow], Lost | None]:
+    engine: Engine, contact: str, scene: EngineScene, target: EngineContact, process: OwnProcess
+) -> tuple[OwnContact | None, list[TuningRow], TaskLost | None]:
     """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
     task = TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
-    answer: TuningAnswer | Lost = process.do(task, PATIENCE_S)
-    if isinstance(answer, Lost):
+    answer: TuningAnswer | TaskLost = process.do(task, PATIENCE_S)
+    if isinstance(answer, TaskLost):
         return None, [], answer
     settings = dict(answer.own.settings)
     measured = (
@@ -261,7 +263,7 @@ def tuned(
 
 def own_law_rows(
     engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
-) -> Iterator[Row]:
+) -> Iterator[EngineRow]:
     """An engine's own contact over step sizes from the gait, then from other starts at the finest but one.
 
     Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
@@ -271,10 +273,10 @@ def own_law_rows(
     integrator = engine.adapter().INTEGRATORS[name]
     most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
 
-    def walk(stepping: Stepping, factor: float) -> tuple[Row, int]:
+    def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
-        if isinstance(answer, Lost):
+        if isinstance(answer, TaskLost):
             lost = lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
             return lost, most if answer.timed_out else 0
         step = answer.time_s / max(1, answer.steps) if integrator.adapts else stepping.step_s
@@ -303,7 +305,7 @@ def own_law_ladder(name: str, integrator: Integrator, usual_s: float) -> Iterato
         yield from (Stepping(name, h) for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps)
 
 
-def has_settled(coarse: Row, fine: Row) -> bool:
+def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
     """Whether two walks to the end have one period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
@@ -320,18 +322,18 @@ def own_law_row(
     tolerance: float | None,
     truth: Truth,
     answer: WalkAnswer,
-) -> Row:
+) -> EngineRow:
     """A run with how far its last step's period is from that of ADAMS's law."""
     period, length, slip = last_step(answer)
     walked_all = answer.outcome == Outcome.WALKED.label and start == 1.0
     error = abs(period - truth.walk.periods_s[-1]) if period is not None and walked_all else None
-    return Row(
+    return EngineRow(
         scene.name, engine, version, OWN_LAW, contact, start, step_s, tolerance, error, None, answer.wall_s,
         period, length, slip, answer.touches_s.size, answer.outcome,
     )  # fmt: skip
 
 
-def adams_rows(scene: EngineScene, version: str) -> Iterator[Row]:
+def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
     """ADAMS's law on the same starts, by our own walk."""
     for factor in (1.0, *STARTS):
         begun = time.process_time()
@@ -339,26 +341,26 @@ def adams_rows(scene: EngineScene, version: str) -> Iterator[Row]:
         wall = time.process_time() - begun
         answer = answered(result, wall, OWN_TOUCHES)
         mean = answer.time_s / max(1, answer.steps)
-        yield Row(
+        yield EngineRow(
             scene.name, OURS, version, OWN_LAW, "impact", factor, mean, 1e-7, None, None, wall,
             *last_step(answer), answer.touches_s.size, answer.outcome,
         )  # fmt: skip
 
 
-def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[Lost]]:
+def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
     """The hinged walker's swing over step sizes, by each of an engine's integrators."""
     model, chain = pinned_model(scene)
     n = len(chain)
     start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
     truth, energy = swing_truth(scene, start)
     rows: list[SwingRow] = []
-    lost: list[Lost] = []
+    lost: list[TaskLost] = []
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         before = None
         for stepping in swing_ladder(integrator, entry):
             task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps)
-            answer: SwingAnswer | Lost = process.do(task, PATIENCE_S)
-            if isinstance(answer, Lost):
+            answer: SwingAnswer | TaskLost = process.do(task, PATIENCE_S)
+            if isinstance(answer, TaskLost):
                 lost.append(answer)
                 break
             error = float(np.max(np.abs(answer.end - truth)))
@@ -419,7 +421,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     return np.asarray(done.y[:, -1]), energy
 
 
-def least_wall(rows: Sequence[Row], error: float) -> float | None:
+def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:
     """Run time (s) of the quickest run with at most this error."""
     good = [row for row in rows if row.error is not None and row.error <= error]
     return min((row.wall_s for row in good if row.wall_s is not None), default=None)

@@ -14,7 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.benchmarks.engines.adapter import Contact, Floats, Forces, Integrator, OnStep, OwnContact, Simulation
+from walkerlab.benchmarks.engines.adapter import (
+    EngineContact,
+    Floats,
+    Forces,
+    Integrator,
+    OnStep,
+    OwnContact,
+    Simulation,
+)
 from walkerlab.benchmarks.engines.planar import PlanarModel
 
 INTEGRATORS = {
@@ -38,7 +46,7 @@ NO_ITERATION = 1e12
 EXPLICIT = ("ExplicitEuler", "RK44")
 
 
-def tuned(model: str, target: Contact) -> OwnContact:
+def tuned(model: str, target: EngineContact) -> OwnContact:
     """The target's own parameters, and the zone over which friction rises."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
@@ -51,7 +59,7 @@ def tuned(model: str, target: Contact) -> OwnContact:
     return OwnContact(model, settings)
 
 
-class Run(Simulation):
+class ExudynRun(Simulation):
     """A system of one tree, and its contacts."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
@@ -105,10 +113,10 @@ class Run(Simulation):
         self._system.SetPostStepUserFunction(seen)
         self._system.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, name))
 
-    def carry(self, ball: int, carried: bool) -> None:
+    def carry(self, ball: int, has_ground: bool) -> None:
         """Switch a foot's contact on or off."""
         if self._contacts:
-            self._system.SetObjectParameter(self._contacts[ball], "activeConnector", carried)
+            self._system.SetObjectParameter(self._contacts[ball], "activeConnector", has_ground)
 
 
 def assembled(system: Any, model: PlanarModel, node: Any, forces: Forces | None) -> tuple[Any, list[int]]:

@@ -18,15 +18,15 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces, in_arrays
 from walkerlab.ground.held import BENT, FLEXED, LOCKED, RELEASED, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.terrain import carried_in_cell, cell_at, cell_edges, has_pads
+from walkerlab.ground.terrain import cell_at, cell_edges, has_ground_in_cell, has_pads
 from walkerlab.ground.walker import FootMotion
 from walkerlab.hybrid.contact_events import (
-    CLIMB,
     EXTENSION,
     FALLEN_HIP,
     HEIGHT,
     PASSING,
     PER_FOOT,
+    VERTICAL_VELOCITY,
     farthest_slide,
     material_along,
 )
@@ -36,7 +36,7 @@ from walkerlab.hybrid.contact_rules import (
     LAST_TOUCH,
     STANCE,
     STEPS,
-    Ledger,
+    WalkState,
     is_to_lift,
     knee_stops,
     lift,
@@ -44,7 +44,7 @@ from walkerlab.hybrid.contact_rules import (
     release,
     touch,
 )
-from walkerlab.hybrid.contact_run import new_ledger
+from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.scipy_methods import entry_point
@@ -57,10 +57,10 @@ FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get 
 
 
 @dataclass
-class Follower:
+class RuleFollower:
     """The rules of a walk, kept up to date step by step.
 
-    ledger   what the walk remembers
+    walk state   what the walk remembers
     feet     of the last state: along (m), height (m), slip (m/s) and velocity of the height (m/s), twice
     bends    of the last state: each knee's extension (rad) and its rate (rad/s), in the places of a foot's height
     edges    between which a foot is over the same pad or gap (m), twice
@@ -71,7 +71,7 @@ class Follower:
 
     scene: EngineScene
     look: FeetAndForces
-    ledger: Ledger
+    walk_state: WalkState
     feet: Feet
     bends: Feet
     edges: list[tuple[float, float]]
@@ -111,61 +111,66 @@ class Follower:
 
     def _let_happen(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
         """Let everything happen that lies between two states."""
-        ledger, terrain, walker = self.ledger, self.scene.ground.terrain, self.scene.ours
+        walk_state, terrain, walker = self.walk_state, self.scene.ground.terrain, self.scene.ours
         self._cross_edges(now)
         if (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
-            ledger.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
+            walk_state.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
             for foot in range(2):
-                pass_by(terrain, ledger, foot)
+                pass_by(terrain, walk_state, foot)
         h = time_s - self.time_s
         for foot in range(2):
             if (before[foot][1] < 0.0) == (now[foot][1] < 0.0):
                 continue
-            ledger.sides[foot * PER_FOOT + HEIGHT] = 1 if now[foot][1] >= 0.0 else -1
+            walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if now[foot][1] >= 0.0 else -1
             share = crossing(before[foot], now[foot], h)
             there = between(before, now, share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             if now[foot][1] >= 0.0:
-                lift(walker, terrain, ledger, there, foot, y)
+                lift(walker, terrain, walk_state, there, foot, y)
             else:
-                self._end(touch(walker, terrain, ledger, there, foot, self.time_s + share * h, y))
-        if ledger.feet[STEPS] == ledger.touch_time.size and not is_to_lift(ledger):
+                self._end(touch(walker, terrain, walk_state, there, foot, self.time_s + share * h, y))
+        if walk_state.feet[STEPS] == walk_state.touch_time.size and not is_to_lift(walk_state):
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: Feet) -> Turn | None:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
-        ledger, found = self.ledger, []
-        stance = ledger.feet[STANCE]
-        if ledger.releasing[0] and now[stance][3] >= 0.0:
+        walk_state, found = self.walk_state, []
+        stance = walk_state.feet[STANCE]
+        if walk_state.releasing[0] and now[stance][3] >= 0.0:
             sinking = max(0.0, -self.feet[stance][3])
             share = sinking / (sinking + now[stance][3]) if sinking > 0.0 else 0.0
-            found.append(Turn(share, int(stance) * PER_FOOT + CLIMB))
+            found.append(Turn(share, int(stance) * PER_FOOT + VERTICAL_VELOCITY))
         for knee, (old, bend) in enumerate(zip(self.bends, bends, strict=True)):
-            if ledger.knee[knee] == RELEASED and bend[1] < -FLEXED:
-                ledger.knee[knee] = BENT
-            elif ledger.knee[knee] == BENT and bend[1] >= 0.0:
+            if walk_state.knee[knee] == RELEASED and bend[1] < -FLEXED:
+                walk_state.knee[knee] = BENT
+            elif walk_state.knee[knee] == BENT and bend[1] >= 0.0:
                 found.append(Turn(crossing(old, bend, h), EXTENSION + knee))
         return min(found, default=None)
 
     def turn_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Let the knee lock or be released in this state; coordinates and velocities of the walker from there on."""
         assert self.turn is not None, "a knee turns"
-        knees, signal, ledger, y = self.scene.ours.knees, self.turn.signal, self.ledger, self.scene.about_centre(q, v)
+        knees, event, walk_state, y = (
+            self.scene.ours.knees,
+            self.turn.event,
+            self.walk_state,
+            self.scene.about_centre(q, v),
+        )
         state = tuple(y.tolist())
-        if signal >= EXTENSION:
-            knee_stops(knees, ledger, signal, self.time_s)
-            walker, carried = self.scene.ours, (bool(ledger.carried[0]), bool(ledger.carried[1]))
-            held = held_flags(walker.held, walker.knees, ledger.knee)
-            state, _ = locked(OnGround(walker, carried, held, stop_flags(knees, ledger.knee)), state)
+        if event >= EXTENSION:
+            knee_stops(knees, walk_state, event, self.time_s)
+            walker, has_ground = self.scene.ours, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1]))
+            held = held_flags(walker.held, walker.knees, walk_state.knee)
+            state, _ = locked(OnGround(walker, has_ground, held, stop_flags(knees, walk_state.knee)), state)
         else:
-            release(knees, ledger, 1 - int(ledger.feet[STANCE]))
+            release(knees, walk_state, 1 - int(walk_state.feet[STANCE]))
         self.turn = None
         return self._in_next_model(state)
 
     @property
     def is_outdated(self) -> bool:
         """Whether a knee was released by a touch itself: the engine's model has it locked."""
-        return int(np.count_nonzero(self.ledger.knee == LOCKED)) != len(self.scene.locked)
+        return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
 
     def release_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Go on from this state with the knee that a touch has released."""
@@ -173,25 +178,25 @@ class Follower:
 
     def _in_next_model(self, state: State) -> tuple[Floats, Floats]:
         """Coordinates and velocities of the walker with its knees as they are now."""
-        self.scene = self.scene.with_knees_locked(self.ledger.knee)
-        self.look = FeetAndForces(self.scene, self.ledger.carried)
+        self.scene = self.scene.with_knees_locked(self.walk_state.knee)
+        self.look = FeetAndForces(self.scene, self.walk_state.has_ground)
         q, v = self.scene.from_base(state)
         self.feet, self.bends = self.look.feet(q, v), bends_of(self.scene, q, v)
         return q, v
 
     def _cross_edges(self, now: Feet) -> None:
         """The pads and gaps that the feet are over now."""
-        terrain, ledger = self.scene.ground.terrain, self.ledger
+        terrain, walk_state = self.scene.ground.terrain, self.walk_state
         if not has_pads(terrain):
             return
         for foot in range(2):
             cell = cell_at(terrain, foot, now[foot][0])
-            if cell == ledger.cells[foot]:
+            if cell == walk_state.cells[foot]:
                 continue
-            ledger.cells[foot] = cell
-            ledger.carried[foot] = carried_in_cell(terrain, cell)
+            walk_state.cells[foot] = cell
+            walk_state.has_ground[foot] = has_ground_in_cell(terrain, cell)
             self.edges[foot] = edges_at(terrain, foot, cell)
-            if ledger.carried[foot] and now[foot][1] < 0.0:
+            if walk_state.has_ground[foot] and now[foot][1] < 0.0:
                 self._end(int(Outcome.OFF_PAD))
 
     def _end(self, outcome: int) -> None:
@@ -201,32 +206,32 @@ class Follower:
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
         """End the walk that has fallen, slid, flown or taken too long."""
-        ground, carried = self.scene.ground, self.ledger.carried
+        ground, has_ground = self.scene.ground, self.walk_state.has_ground
         tau, t = ground.frame.pendulum_time, self.time_s
-        inside = (now[0][1] < 0.0 and carried[0] != 0, now[1][1] < 0.0 and carried[1] != 0)
+        inside = (now[0][1] < 0.0 and has_ground[0] != 0, now[1][1] < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t
-            stance = self.ledger.feet[STANCE]
+            stance = self.walk_state.feet[STANCE]
             far = farthest_slide(ground.terrain)
-            if inside[stance] and abs(now[stance][0] - self.ledger.foothold[stance]) > far:
+            if inside[stance] and abs(now[stance][0] - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
                 material = material_along(self.scene.ours, stance, now[stance][0], y)
-                if abs(material - self.ledger.touched[stance]) > far:
+                if abs(material - self.walk_state.touched[stance]) > far:
                     self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
         if q[1] < FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
-        elif t - self.ledger.times[LAST_TOUCH] > LONGEST_STEP * tau:
+        elif t - self.walk_state.times[LAST_TOUCH] > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))
 
 
 @dataclass(frozen=True, order=True)
 class Turn:
-    """A knee locks or is released: at what share of a step, and by which signal of a walk."""
+    """A knee locks or is released: at what share of a step, and by which event function of a walk."""
 
     share: float
-    signal: int
+    event: int
 
 
 def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Feet:
@@ -234,7 +239,7 @@ def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Feet:
     return [[0.0, float(q[place]), 0.0, float(v[place])] if place >= 0 else [0.0] * 4 for place in scene.knee_places]
 
 
-def is_near(along: float, height: float, _slip: float, _climb: float) -> bool:
+def is_near(along: float, height: float, _slip: float, _vertical_velocity: float) -> bool:
     """Whether a foot is anywhere near; one whose numbers are lost is not."""
     return -FAR_AWAY < along < FAR_AWAY and -FAR_AWAY < height < FAR_AWAY
 
@@ -242,11 +247,11 @@ def is_near(along: float, height: float, _slip: float, _climb: float) -> bool:
 class FeetAndForces:
     """The compiled function with what stays the same in its calls; coordinates and velocities are contiguous arrays."""
 
-    def __init__(self, scene: EngineScene, carried: Any) -> None:
-        """Make room for its results; `carried` is the ledger's own array and changes with it."""
+    def __init__(self, scene: EngineScene, has_ground: Any) -> None:
+        """Make room for its results; `carried` is the walk state's own array and changes with it."""
         n = len(scene.chain)
         like = ((0.0,) * (4 + 2 * n), (0.0,) * n)
-        self._fixed = (*in_arrays(scene.walker), *like, scene.chain, carried)
+        self._fixed = (*in_arrays(scene.walker), *like, scene.chain, has_ground)
         self._feet, self._forces, self._none = np.zeros((2, 4)), np.zeros(scene.model.size), np.zeros(0)
         q = np.zeros(scene.model.size)
         self._call = entry_point(feet_and_forces, *self._fixed, q, q, self._feet, self._forces)
@@ -262,15 +267,15 @@ class FeetAndForces:
         return self._forces
 
 
-def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> Follower:
+def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> RuleFollower:
     """The rules at the start of a walk of at most `steps` steps, both feet on the ground."""
-    ledger = new_ledger(scene.ours, scene.ground.terrain, scene.stance, steps, scene.start)
-    look = FeetAndForces(scene, ledger.carried)
+    walk_state = new_walk_state(scene.ours, scene.ground.terrain, scene.stance, steps, scene.start)
+    look = FeetAndForces(scene, walk_state.has_ground)
     feet = look.feet(q, v)
     for row in feet:
         row[1] = min(row[1], -sys.float_info.min)  # both stand on the ground, inside or outside by rounding
-    edges = [edges_at(scene.ground.terrain, foot, int(ledger.cells[foot])) for foot in range(2)]
-    return Follower(scene, look, ledger, feet, bends_of(scene, q, v), edges)
+    edges = [edges_at(scene.ground.terrain, foot, int(walk_state.cells[foot])) for foot in range(2)]
+    return RuleFollower(scene, look, walk_state, feet, bends_of(scene, q, v), edges)
 
 
 def edges_at(terrain: Any, foot: int, cell: int) -> tuple[float, float]:

@@ -12,7 +12,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from walkerlab.benchmarks.engines.adapter import Contact, Floats, Forces, Integrator, OnStep, OwnContact, Simulation
+from walkerlab.benchmarks.engines.adapter import (
+    EngineContact,
+    Floats,
+    Forces,
+    Integrator,
+    OnStep,
+    OwnContact,
+    Simulation,
+)
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
 INTEGRATORS = {"Euler": Integrator(1, 120_000), "RK4": Integrator(4, 120_000)}
@@ -30,7 +38,7 @@ AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hin
 MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
-def tuned(model: str, target: Contact) -> OwnContact:
+def tuned(model: str, target: EngineContact) -> OwnContact:
     """The closed forms above, solved for what the target says."""
     stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
     damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
@@ -45,7 +53,7 @@ def tuned(model: str, target: Contact) -> OwnContact:
     return OwnContact(model, settings)
 
 
-class Run(Simulation):
+class MujocoRun(Simulation):
     """A model and its data."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
@@ -70,10 +78,10 @@ class Run(Simulation):
             if not on_step(count * h, q, v):
                 return
 
-    def carry(self, ball: int, carried: bool) -> None:
+    def carry(self, ball: int, has_ground: bool) -> None:
         """Let a foot's ball collide or not."""
         if self._model.ngeom:
-            self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(carried)
+            self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(has_ground)
 
 
 def applied(forces: Forces, data: Any) -> Any:

@@ -23,7 +23,7 @@ class Task(Protocol[R_co]):
 
 
 @dataclass(frozen=True)
-class Lost:
+class TaskLost:
     """A task without a result, and why."""
 
     why: str
@@ -51,7 +51,7 @@ class OwnProcess:
         self._end()
         self._folder.cleanup()
 
-    def do(self, task: Task[R], timeout_s: float) -> R | Lost:
+    def do(self, task: Task[R], timeout_s: float) -> R | TaskLost:
         """A task's result, or what became of it; RuntimeError once it is abandoned."""
         if self._abandoned:
             raise RuntimeError("nobody waits for this process any more")
@@ -62,12 +62,12 @@ class OwnProcess:
             return self._worker.do(task.run, timeout_s=timeout_s)
         except WorkerTimeoutError:
             self._end()
-            return Lost(f"no answer within {timeout_s:.0f} s", timed_out=True)
+            return TaskLost(f"no answer within {timeout_s:.0f} s", timed_out=True)
         except WorkerDiedError as died:
             self._end()
-            return Lost(f"the engine's process ended with code {died.exit_code_of_worker}")
+            return TaskLost(f"the engine's process ended with code {died.exit_code_of_worker}")
         except Exception as error:  # whatever an engine raises is its row's outcome
-            return Lost(traceback.format_exception_only(error)[0].strip()[:200])
+            return TaskLost(traceback.format_exception_only(error)[0].strip()[:200])
 
     def abandon(self) -> None:
         """End what is running and take no more tasks; from another thread than the one that waits."""

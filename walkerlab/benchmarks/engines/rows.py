@@ -15,7 +15,7 @@ FROM_REFERENCE = "difference of the end state (SI), or of the last period (s) on
 
 
 @dataclass(frozen=True)
-class Row:
+class EngineRow:
     """One run of one engine, or of this project beside it.
 
     step_s  of a run of adapted steps that did not come to an end, the largest

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.benchmarks.engines.adapter import Contact, OwnContact, Simulation, Stepping
-from walkerlab.benchmarks.engines.follow import Follower, follower
+from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
+from walkerlab.benchmarks.engines.follow import RuleFollower, follower
 from walkerlab.benchmarks.engines.planar import (
     HINGED,
     UPRIGHT,
@@ -73,33 +73,33 @@ class WalkTask:
 
     def run(self) -> WalkAnswer:
         """Walk."""
-        walk = Walk(self)
+        walk = EngineWalk(self)
         walk.go()
-        rules, ledger = walk.rules, walk.rules.ledger
+        rules, walk_state = walk.rules, walk.rules.walk_state
         outcome = rules.outcome
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
-        done = int(ledger.feet[STEPS])
+        done = int(walk_state.feet[STEPS])
         return WalkAnswer(
             outcome.label,
             rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None,
-            ledger.touch_time[:done].copy(),
-            ledger.touch_along[:done].copy(),
-            ledger.slip[: steps_with_lift(ledger)].copy(),
+            walk_state.touch_time[:done].copy(),
+            walk_state.touch_along[:done].copy(),
+            walk_state.slip[: steps_with_lift(walk_state)].copy(),
             walk.steps,
             walk.time_s,
             walk.wall_s,
         )
 
 
-class Walk:
+class EngineWalk:
     """A walk in an engine: one model after another, each for as long as no knee locks or is released."""
 
     def __init__(self, task: WalkTask) -> None:
         """At the start."""
         self.task = task
         self.q, self.v = task.scene.from_base(task.scene.start)
-        self.rules: Follower = follower(task.scene, task.touches, self.q, self.v)
+        self.rules: RuleFollower = follower(task.scene, task.touches, self.q, self.v)
         self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
 
     @property
@@ -154,7 +154,7 @@ class Walk:
     def hand_over_ground(self, engine: Simulation) -> None:
         """Tell the engine under which feet there is ground."""
         for foot in range(2):
-            engine.carry(foot, bool(self.rules.ledger.carried[foot]))
+            engine.carry(foot, bool(self.rules.walk_state.has_ground[foot]))
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ class TuningTask:
 
     engine: str
     contact: str
-    target: Contact
+    target: EngineContact
     step_s: float
     sliding_velocity: float  # m/s
 
@@ -253,7 +253,7 @@ class Bench:
         self.task, self.own = task, own
         self.adapter = ENGINES[task.engine].adapter()
 
-    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> Motion:
+    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
         """How the ball moves for a time from `depth` (m) inside the ground, pulled by `along` times its weight.
 
         h  step (s)
@@ -269,7 +269,7 @@ class Bench:
         engine = self.adapter.Run(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
-        return Motion(recorded(engine, MANY, steps * h))
+        return EngineMotion(recorded(engine, MANY, steps * h))
 
     @property
     def settling_s(self) -> float:
@@ -309,7 +309,7 @@ class Bench:
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
 
 
-class Motion:
+class EngineMotion:
     """A recorded motion: times (steps,), coordinates and velocities (steps, 2) at the ends of steps."""
 
     def __init__(self, seen: list[tuple[float, Floats, Floats]]) -> None:

@@ -15,7 +15,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import LOCKED, IdealLock
 from walkerlab.ground.merged import Unmerged
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import Ground, knees_at_start
+from walkerlab.hybrid.contact_run import JudgedGround, knees_at_start
 from walkerlab.mechanics.assembly import masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee, Position
 from walkerlab.mechanics.standing import swing_foot
@@ -49,7 +49,7 @@ class EngineScene:
     gravity: float
     ours: ContactWalker
     walker: ContactWalker
-    ground: Ground
+    ground: JudgedGround
     stance: int
     start: State
     locked: tuple[Knee, ...] = ()
@@ -140,7 +140,7 @@ def engine_scene(
     hip: Position,
     gravity: float,
     ours: ContactWalker,
-    ground: Ground,
+    ground: JudgedGround,
     start: State,
 ) -> EngineScene:
     """The scene of an assembly that hangs from the hip."""

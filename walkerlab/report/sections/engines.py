@@ -49,7 +49,7 @@ def engine_and_integrator(row: Row) -> str:
     return f"{row['engine']} {row['integrator']}"
 
 
-RUN = partial(measured, labels=engines.Row)
+RUN = partial(measured, labels=engines.EngineRow)
 SAME_LAW_COLUMNS = (
     Column("integrator", engine_and_integrator),
     RUN("step", "step_s", partial(number, digits=3), prefix="µ"),
