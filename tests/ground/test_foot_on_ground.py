@@ -181,7 +181,7 @@ def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
     assert (np.abs(J - expected) / size).max() < 1e-4
 
 
-@pytest.mark.parametrize("climb", [-1e-4, 0.0, 1e-4])
+@pytest.mark.parametrize("vertical_velocity", [-1e-4, 0.0, 1e-4])
 def test_derivatives_hold_at_the_stiffness_of_the_paper(vertical_velocity):
     walker = ground.compass()
     state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, vertical_velocity)
