@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from walkerlab.kernels import by_type, compiling, kernel, uncompiled, watched
+from walkerlab.kernels import by_type, compiling, inlined, kernel, matrix, uncompiled, vector, watched
 
 
 class Circle(NamedTuple):
@@ -66,6 +66,82 @@ def test_the_body_is_chosen_by_type_in_python_and_compiled(shape):
 def test_a_type_without_a_body_is_refused_while_compiling():
     with pytest.raises(TypingError):
         compiled_area((1.0, 2.0))
+
+
+@by_type
+def corners(shape):
+    """How many corners a shape has."""
+
+
+@corners.default
+def none(shape):
+    return 0
+
+
+@corners.case(Square)
+def four(shape):
+    return 4
+
+
+@kernel
+def compiled_corners(shape):
+    return corners(shape)
+
+
+def test_types_without_a_body_of_their_own_have_the_default():
+    for shape, expected in ((Circle(1.0), 0), (Square(1.0), 4)):
+        assert compiled_corners(shape) == corners(shape) == expected
+
+
+@inlined
+def powers_summed(like, x):
+    """x + x^2 + ..., as many powers as `like` is long, by scratch of its own."""
+    powers, products = vector(like), matrix(like)
+    for i in range(len(powers)):
+        powers[i] = x if i == 0 else powers[i - 1] * x
+        for j in range(len(powers)):
+            products[i, j] = powers[i] if i == j else 0.0
+    total = 0.0
+    for i in range(len(powers)):
+        for j in range(len(powers)):
+            total += products[i, j]
+    return total
+
+
+@kernel
+def scratch_beside_scratch(like, out):
+    """What a called function writes into its scratch does not reach the caller's."""
+    mine = vector(like)
+    for i in range(len(mine)):
+        mine[i] = i
+    for i in range(len(mine)):
+        out[i] = mine[i] + powers_summed(like, 2.0)
+    return len(mine)
+
+
+@pytest.mark.parametrize("like", [(0.0, 0.0, 0.0), np.rec.array([((1.0, 2.0, 3.0),)], dtype=[("n", "f8", (3,))])[0]])
+def test_scratch_is_as_long_as_its_type_says_and_its_functions_own(like):
+    """If a new numba breaks this, what kernels compute is wrong: see `_on_the_stack`."""
+    function = scratch_beside_scratch if isinstance(like, tuple) else scratch_like_a_field
+    for run in (function, uncompiled(function)):
+        out = np.zeros(3)
+        assert run(like, out) == 3
+        assert out.tolist() == [14.0, 15.0, 16.0]
+
+
+@kernel
+def scratch_like_a_field(record, out):
+    mine = vector(record.n)
+    for i in range(len(mine)):
+        mine[i] = i
+    for i in range(len(mine)):
+        out[i] = mine[i] + powers_summed(record.n, 2.0)
+    return len(mine)
+
+
+def test_scratch_that_is_read_unwritten_shows_in_python():
+    assert np.isnan(vector((0.0, 0.0))).all()
+    assert np.isnan(matrix((0.0, 0.0))).all()
 
 
 NESTED = """

@@ -446,14 +446,14 @@ def matrix(like: Any) -> Any:
     return np.full((len(like), len(like)), np.nan)
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def zeros(context: Any, like: Any) -> Any:  # noqa: ARG001 - numba calls it so
     """A tuple of as many zeros as `like` is long: compiled code without counted references returns no arrays."""
 
     def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
         return context.get_constant_generic(builder, called.return_type, (0.0,) * called.return_type.count)
 
-    return types.UniTuple(types.float64, like.shape[0])(like), generate
+    return types.containers.UniTuple(types.float64, like.shape[0])(like), generate
 
 
 def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
@@ -472,7 +472,7 @@ def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
 
     def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
         like = called.args[0]
-        length = like.count if isinstance(like, types.BaseTuple) else like.shape[0]
+        length = like.count if isinstance(like, types.containers.BaseTuple) else like.shape[0]
 
         def number(value: int) -> Any:
             return context.get_constant(types.intp, value)

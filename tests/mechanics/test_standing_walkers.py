@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rigid_physics import heel_strike, knee_strike, potential_energy, rates, state_linked
 
+from walkerlab.kernels import kernel, uncompiled
+from walkerlab.mechanics import impact
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import (
     BENT,
@@ -14,6 +16,7 @@ from walkerlab.mechanics.standing import (
     STRAIGHT,
     SWING,
     Mode,
+    energies,
     ground_reaction,
     kinetic_energy,
     linked,
@@ -21,7 +24,8 @@ from walkerlab.mechanics.standing import (
     swing_foot,
 )
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
-from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled, impact
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled
+from walkerlab.paper.appendix_a import impact as impact_of_appendix_a
 from walkerlab.solvers.system import derivative
 
 THIGH = Limb(0.46, 1.1, 0.21, 0.02, 0.013)
@@ -125,7 +129,7 @@ def test_the_assembled_compass_swings_by_appendix_a(y, sign):
     walker = PAPER._replace(c21_sign=sign, leg_inertia=0.1)
     model = assembled(walker)
     assert rates(model, BENT, y) == pytest.approx(accelerations(walker, *y), rel=1e-12, abs=1e-12)
-    assert heel_strike(model, y) == pytest.approx(impact(walker, *y), rel=1e-12, abs=1e-12)
+    assert heel_strike(model, y) == pytest.approx(impact_of_appendix_a(walker, *y), rel=1e-12, abs=1e-12)
 
 
 def masses_of(model, y, new):
@@ -280,3 +284,39 @@ def test_what_goes_to_zero_leaves_the_compass(order, walker):
         full = y if len(model.blank) == 4 else (*y[:2], 0.05, *y[2:], -0.95)
         errors.append(np.abs(np.array(rates(model, BENT, full))[:2] - wanted).max())
     assert np.log10(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+@kernel
+def compiled(system, y, f, reaction):
+    derivative(system, 0.0, y, f)
+    reaction[0], reaction[1] = ground_reaction(system, y[:8])
+    reaction[2], reaction[3] = energies(system.model, y[:8])
+
+
+@kernel
+def compiled_strikes(model, y, heel, knee):
+    impact.heel_strike(model, y, heel)
+    impact.knee_strike(model, y, knee)
+
+
+@pytest.mark.parametrize("phase", [BENT, STRAIGHT])
+def test_compiled_code_reads_no_scratch_that_was_not_written(phase):
+    """In Python unwritten scratch is no number, and what is compiled says the same."""
+    y = np.random.default_rng(1).uniform(-0.5, 0.5, 24)
+    results = []
+    for rate, strikes in ((compiled, compiled_strikes), (uncompiled(compiled), uncompiled(compiled_strikes))):
+        f, reaction, heel, knee = np.zeros(24), np.zeros(4), np.zeros(24), np.zeros(24)
+        rate(Mode(KNEED, phase), y, f, reaction)
+        strikes(KNEED, y, heel, knee)
+        results.append(np.concatenate((f, reaction, heel, knee)))
+    np.testing.assert_allclose(results[0], results[1], rtol=1e-11, atol=1e-11)
+
+
+def test_a_walker_cannot_be_changed_by_those_who_walk_it():
+    with pytest.raises(ValueError, match="read-only"):
+        KNEED.slope = 0.1
+    steeper = KNEED.changed(slope=0.1)
+    assert (steeper.slope, KNEED.slope) == (0.1, SLOPE)
+    assert steeper != KNEED
+    assert KNEED.changed(slope=SLOPE) == KNEED
+    assert hash(KNEED) == hash(KNEED.changed(slope=SLOPE))

@@ -66,10 +66,18 @@ def two_legs(model: Standing) -> TwoLegs | None:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
-    pairs = (model.A, model.B, model.A_centrifugal, model.B_centrifugal)
+
+    def numbers(values: Any) -> tuple[float, ...]:
+        return tuple(values.ravel().tolist())
+
     return TwoLegs(
         model,
-        *(tuple(numbers.ravel().tolist()) for numbers in (*pairs, model.arm_x, model.arm_y)),
+        numbers(model.A),
+        numbers(model.B),
+        numbers(model.A_centrifugal),
+        numbers(model.B_centrifugal),
+        numbers(model.arm_x),
+        numbers(model.arm_y),
         float(model.slope),
         math.atan2(x, y),
         math.acos(max(-1.0, lowest)),

@@ -1,6 +1,5 @@
 """Energies and forces along a recorded walk of the rigid model."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,7 +73,7 @@ def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedW
     return Places(contact, hip, foot, knees)
 
 
-def turned(psi: Array, lever_x: Sequence[float], lever_y: Sequence[float]) -> Array:
+def turned(psi: Array, lever_x: Any, lever_y: Any) -> Array:
     """Sum (samples, 2) of the bodies' levers at their angles psi (samples, n) from the slope's normal."""
     s, c = np.sin(psi), np.cos(psi)
     x, y = np.array(lever_x), np.array(lever_y)

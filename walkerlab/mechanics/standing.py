@@ -35,7 +35,7 @@ BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
-class Standing(np.record):
+class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type."""
 
     A: Floats  # (n, n) kg m^2
@@ -84,7 +84,7 @@ class Standing(np.record):
 
     def changed(self, **fields: Any) -> "Standing":
         """The same with other values of some fields."""
-        other = self.copy()
+        other: Any = self.copy()
         for name, value in fields.items():
             other[name] = value
         return frozen(other)
@@ -92,7 +92,7 @@ class Standing(np.record):
 
 def frozen(model: Any) -> Standing:
     """A copy that nobody can write to."""
-    memory = np.array(model)
+    memory: Any = np.array(model)
     memory.flags.writeable = False
     read_only: Standing = memory[()]
     return read_only

@@ -84,8 +84,8 @@ def linear_modes(walker: Standing) -> Modes | None:
 def upright_mass(walker: Standing) -> Vector:
     """Mass matrix (n, n) with all angles zero, kg m^2."""
     n, level = len(walker.arm_x), on_slope(walker, 0.0)
-    M, scratch = np.empty((n, n)), np.empty((5, n))
-    equations(level, level.blank, *scratch[:4], M, scratch[4])
+    M, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
+    equations(level, level.blank, s, c, F, U, M, r)
     return M
 
 
