@@ -17,7 +17,7 @@ from walkerlab.solvers.system import State
 # indices into `dissipated`
 DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, CHANNEL_COUNT = 0, 1, 2, 3, 4, 5
 # indices into `extremes`
-MAX_PENETRATION, RESIDUAL, START_ENERGY = 0, 1, 2
+MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
 # nodes and weights of the Radau quadrature on a step: exact to the order of the method of that name
 NODES = (0.15505102572168219, 0.6449489742783178, 1.0)
 WEIGHTS = (0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
@@ -35,7 +35,9 @@ class ContactObserver(NamedTuple):
     sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
     recorded: Any  # (1,)
     dissipated: Any  # (5,) J dissipated so far
-    extremes: Any  # (3,) deepest penetration m, largest residual of the energy balance J, energy at the start J
+    # (4,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
+    # fixed origin, and from the slope below
+    extremes: Any
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
     merged: Any  # tangents of the walker with one and with both knees locked; () if it keeps its bodies
 

@@ -38,7 +38,14 @@ from walkerlab.hybrid.contact_events import (
     hip_height,
     material_along,
 )
-from walkerlab.hybrid.contact_observer import CHANNEL_COUNT, MAX_PENETRATION, RESIDUAL, START_ENERGY, ContactObserver
+from walkerlab.hybrid.contact_observer import (
+    AT_HAND,
+    CHANNEL_COUNT,
+    MAX_PENETRATION,
+    RESIDUAL,
+    START_ENERGY,
+    ContactObserver,
+)
 from walkerlab.hybrid.contact_phases import method_by_knees, walk_by_knees
 from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, WalkState, steps_with_lift
 from walkerlab.hybrid.contact_tangent import Tangent, new_tangent
@@ -307,8 +314,9 @@ def new_observer(
     track_energy         whether to keep the energy balance, by which a walk is judged; ladders of methods do not
     directions           how many directions of the start to carry along as the tangent
     """
-    extremes = np.zeros(3)
+    extremes = np.zeros(4)
     extremes[START_ENERGY] = total_energy(walker, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1])), y)
+    extremes[AT_HAND] = extremes[START_ENERGY] + walker.tree.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
         interval_s * np.arange(samples),
@@ -429,9 +437,9 @@ def explained_residual(observer: ContactObserver, methods: MethodSettings) -> fl
     """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
 
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
-    potential over the first foothold, and all that has been dissipated since.
+    potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[START_ENERGY] + np.abs(observer.dissipated).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum()
     return float(UNEXPLAINED * max(methods.rtol, FINEST) * exchanged)
 
 
