@@ -54,7 +54,12 @@ class TwoLegs(NamedTuple):
     B_centrifugal: tuple[float, ...]
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
+    mass: float  # kg; numbers of the model by value, which loops need not load again
+    radius: float  # m
+    gravity_along: float  # m/s^2
+    gravity_down: float
     slope: float  # rad
+    lean: float  # rad
     upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
     fallen: float  # rad from there, beyond which the hip is too low
     pendulum_time: float  # s
@@ -78,7 +83,12 @@ def two_legs(model: Standing) -> TwoLegs | None:
         numbers(model.B_centrifugal),
         numbers(model.arm_x),
         numbers(model.arm_y),
+        float(model.mass),
+        float(model.radius),
+        float(model.gravity_along),
+        float(model.gravity_down),
         float(model.slope),
+        float(model.lean),
         math.atan2(x, y),
         math.acos(max(-1.0, lowest)),
         math.sqrt(model.leg_length / model.gravity),
@@ -88,20 +98,21 @@ def two_legs(model: Standing) -> TwoLegs | None:
 @derivative.case(TwoLegs, woven=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     """The equations of motion of standing.py for two bodies, written out: of floats or of lanes."""
-    model, R = system.model, system.model.radius
+    R, along, down = system.radius, system.gravity_along, system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
     F_1, U_1 = c_1 * system.arm_x[0] - s_1 * system.arm_y[0], s_1 * system.arm_x[0] + c_1 * system.arm_y[0]
     F_2, U_2 = c_2 * system.arm_x[1] - s_2 * system.arm_y[1], s_2 * system.arm_x[1] + c_2 * system.arm_y[1]
     cos_d, sin_d = c_1 * c_2 + s_1 * s_2, s_1 * c_2 - c_1 * s_2
     squared_1, squared_2 = y[2] * y[2], y[3] * y[3]
-    pulled = model.mass * model.gravity_along + squared_1 * F_1 + squared_2 * F_2
-    r_1 = -model.gravity_along * U_1 - model.gravity_down * F_1
-    r_2 = -model.gravity_along * U_2 - model.gravity_down * F_2 - R * pulled
+    r_1, r_2 = -along * U_1 - down * F_1, -along * U_2 - down * F_2
+    M_12, M_22 = system.A[2] * cos_d + system.B[2] * sin_d, system.A[3] + 0.0 * cos_d
+    if R != 0.0:
+        pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
+        r_2 = r_2 - R * pulled
+        M_12, M_22 = M_12 + R * U_1, M_22 + 2.0 * R * U_2 + system.mass * R * R
     r_2 = r_2 + squared_1 * (system.A_centrifugal[2] * sin_d - system.B_centrifugal[2] * cos_d)
     r_1 = r_1 - squared_2 * (system.A_centrifugal[1] * sin_d + system.B_centrifugal[1] * cos_d)
-    M_12 = system.A[2] * cos_d + system.B[2] * sin_d + R * U_1
-    M_22 = system.A[3] + R * U_2 + R * U_2 + model.mass * R * R
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
     alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)
@@ -269,7 +280,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 @inlined
 def feet_on_slope(walker: TwoLegs, theta_1: Any, theta_2: Any) -> Any:
     """See `standing.feet_on_slope`."""
-    return theta_1 + theta_2 + 2.0 * (walker.slope + walker.model.lean)
+    return theta_1 + theta_2 + 2.0 * (walker.slope + walker.lean)
 
 
 @inlined
@@ -371,7 +382,7 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 @inlined
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
-    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * (walker.slope + walker.model.lean))
+    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * (walker.slope + walker.lean))
     at_start = memory.rows[FIRST, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
     if strike > 1.0:
