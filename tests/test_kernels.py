@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from walkerlab.kernels import by_type, compiling, inlined, kernel, matrix, uncompiled, vector, watched
+from walkerlab.kernels import (
+    by_type,
+    by_type_or_default,
+    compiling,
+    inlined,
+    kernel,
+    matrix,
+    uncompiled,
+    vector,
+    watched,
+)
 
 
 class Circle(NamedTuple):
@@ -63,18 +73,24 @@ def test_the_body_is_chosen_by_type_in_python_and_compiled(shape):
     assert compiled_area(shape) == area(shape) == uncompiled(compiled_area)(shape)
 
 
-def test_a_type_without_a_body_is_refused_while_compiling():
-    with pytest.raises(TypingError):
-        compiled_area((1.0, 2.0))
+class Blob(NamedTuple):
+    """A thing without an area."""
+
+    size: float
 
 
-@by_type
+@pytest.mark.parametrize("call", [area, compiled_area], ids=["python", "compiled"])
+def test_a_type_without_a_body_is_refused_in_one_line_that_names_it(call):
+    with pytest.raises(TypeError) as said:
+        call(Blob(1.0))
+    assert str(said.value) == "area has no body for Blob: register one with @area.case(...)"
+    with pytest.raises(TypeError, match=r"^area has no body for .*[Tt]uple.*: register one"):
+        call((1.0, 2.0))
+
+
+@by_type_or_default
 def corners(shape):
     """How many corners a shape has."""
-
-
-@corners.default
-def none(shape):
     return 0
 
 
@@ -91,6 +107,8 @@ def compiled_corners(shape):
 def test_types_without_a_body_of_their_own_have_the_default():
     for shape, expected in ((Circle(1.0), 0), (Square(1.0), 4)):
         assert compiled_corners(shape) == corners(shape) == expected
+    assert Square in corners
+    assert Circle not in corners
 
 
 @inlined

@@ -374,8 +374,10 @@ def uncompiled(compiled: F) -> F:
 class ByType:
     """A function whose body is chosen by the type of its first argument, in Python and in compiled code alike."""
 
+    __name__: str
+
     def __init__(self, declaration: Callable[..., Any]) -> None:
-        """Take name and documentation from `declaration`, whose own body never runs."""
+        """Take name and documentation from `declaration`."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
         self._woven: set[type] = set()
@@ -383,10 +385,11 @@ class ByType:
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
         """Run the body for the type of `chooser`."""
-        body = self._bodies.get(type(chooser), self._default)
-        if body is None:
-            raise KeyError(f"{self.__name__} has no body for {type(chooser).__name__}")  # type: ignore[attr-defined]
-        return body(chooser, *rest)
+        return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
+
+    def __contains__(self, chosen: type) -> bool:
+        """Whether a type has a body of its own."""
+        return chosen in self._bodies
 
     def case(self, chosen: type, woven: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
@@ -410,7 +413,15 @@ class ByType:
     def body(self, kind: Any, woven: bool) -> Callable[..., Any] | None:
         """The body for numba's type of a first argument, if it is woven or is not; else None."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._bodies.get(chosen, self._default) if (chosen in self._woven) == woven else None
+        return self._body_for(chosen, str(kind)) if (chosen in self._woven) == woven else None
+
+    def _body_for(self, chosen: type, said: str) -> Callable[..., Any]:
+        body = self._bodies.get(chosen, self._default)
+        if body is None:
+            name = chosen.__name__ if hasattr(chosen, "_fields") else said
+            # an error that is not one of numba's own leaves its compiler as it is, in one line
+            raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
+        return body
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
@@ -428,6 +439,13 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
     overload(chosen, strict=False, jit_options=PART_FLAGS)(called)
     overload(chosen, strict=False, jit_options=WOVEN_FLAGS)(woven)
+    return chosen
+
+
+def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
+    """As `by_type`, of a function whose own body runs for all types that have none."""
+    chosen = by_type(declaration)
+    chosen.default(declaration)
     return chosen
 
 
