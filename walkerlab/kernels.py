@@ -9,12 +9,14 @@ import contextlib
 import functools
 import gc
 import hashlib
+import importlib
 import os
 import re
 import shutil
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -24,15 +26,6 @@ import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.caching import (
-    CompileResultCacheImpl,
-    FunctionCache,
-    IndexDataCacheFile,
-    IPythonCacheLocator,
-    UserProvidedCacheLocator,
-)
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable
 from numba.np.arrayobj import make_array, populate_array
@@ -165,6 +158,51 @@ def nothing_compiled_yet() -> bool:
     return next(cache_folder().rglob("*.nbc"), None) is None
 
 
+absent: list[str] = []
+"""What of numba's inner parts is not as it is here: without it everything is compiled as numba itself does it."""
+
+
+def inner_part(name: str, *members: str) -> Any:
+    """A class from within numba, which any version may change; noted in `absent` if it or a member is not there."""
+    module, _, kind = name.rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module), kind)
+    except (ImportError, AttributeError):
+        absent.append(name)
+        return object
+    absent.extend(f"{name}.{member}" for member in members if not hasattr(found, member))
+    return found
+
+
+CompileResultCacheImpl = inner_part("numba.core.caching.CompileResultCacheImpl", "_locator_classes", "locator")
+FunctionCache = inner_part("numba.core.caching.FunctionCache", "_impl_class", "load_overload", "save_overload")
+IndexDataCacheFile = inner_part("numba.core.caching.IndexDataCacheFile", "_load_index")
+IPythonCacheLocator = inner_part("numba.core.caching.IPythonCacheLocator", "from_function")
+UserProvidedCacheLocator = inner_part(
+    "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
+)
+JITCodeLibrary = inner_part(
+    "numba.core.codegen.JITCodeLibrary",
+    "codegen",
+    "get_pointer_to_function",
+    "_ensure_finalized",
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+)
+Compiler = inner_part("numba.core.compiler.Compiler", "compile_extra")
+CompilerBase = inner_part("numba.core.compiler.CompilerBase", "define_pipelines")
+DefaultPassBuilder = inner_part("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+
+if absent:
+    warnings.warn(
+        f"numba {numba.__version__} is without {', '.join(absent)}: compiling takes longer than it could, and is not "
+        "told of. Results are the same; a version of numba that pyproject.toml allows compiles faster.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
 class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
     """Numba's locator for a folder that was chosen, which is `cache_folder`, for kernels alone."""
 
@@ -285,10 +323,24 @@ def watched(tell: Callable[[str], None]) -> Iterator[None]:
 
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    if absent:
+        return cast(F, _cached_plainly(function))
     compiled = numba.njit(pipeline_class=_KernelCompiler, **FLAGS)(function)
     # what enable_caching does, with the kernels' own folder
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
+
+
+def _cached_plainly(function: Callable[..., Any]) -> Any:
+    """The function compiled and kept by numba's own means, in the folder of this state of the sources too."""
+    compiled = numba.njit(**FLAGS)(function)
+    usual = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder())
+    try:
+        compiled.enable_caching()
+    finally:
+        numba.config.CACHE_DIR = usual
+    return compiled
 
 
 class _KernelCompiler(Compiler):  # type: ignore[misc]
@@ -353,7 +405,8 @@ class _PartCompiler(CompilerBase):  # type: ignore[misc]
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-PART_FLAGS["pipeline_class"] = _PartCompiler
+if not absent:
+    PART_FLAGS["pipeline_class"] = _PartCompiler
 
 
 def inlined(function: F) -> F:
