@@ -203,7 +203,7 @@ if absent:
     )
 
 
-class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
+class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
     """Numba's locator for a folder that was chosen, which is `cache_folder`, for kernels alone."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
@@ -217,13 +217,13 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
         return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
 
 
-class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
     """Results of compiling in `cache_folder`; those of a notebook's cells, which have no file, where IPython says."""
 
     _locator_classes = (KernelLocator, IPythonCacheLocator)
 
 
-class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
+class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
     """A kernel's stored code, begun anew where it was stored for types that this process cannot import.
 
     Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
@@ -236,7 +236,7 @@ class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
             return {}
 
 
-class StoredKernel(FunctionCache):  # type: ignore[misc]
+class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
     """A kernel's machine code on disk."""
 
     _impl_class = KernelCacheImpl
@@ -343,7 +343,7 @@ def _cached_plainly(function: Callable[..., Any]) -> Any:
     return compiled
 
 
-class _KernelCompiler(Compiler):  # type: ignore[misc]
+class _KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's own compiler, with garbage collected seldom meanwhile."""
 
     def compile_extra(self, func: Any) -> Any:
@@ -373,7 +373,7 @@ class _WithoutEnvironment:
         """Nothing."""
 
 
-class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
     """The code of a part: linked into kernels, which are optimised as wholes, and no machine code of its own.
 
     To optimise and emit every part for itself too, as numba does, takes a third of the time that compiling takes.
@@ -395,7 +395,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
 
-class _PartCompiler(CompilerBase):  # type: ignore[misc]
+class _PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
     """Numba's own passes, into a library of parts."""
 
     def define_pipelines(self) -> list[Any]:

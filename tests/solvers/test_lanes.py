@@ -48,7 +48,7 @@ def rates(system, y, out):
 
 
 IMPORT_ALL = """
-import importlib, pkgutil, sys
+from collections import Counter
 import numba
 from numba.core.imputils import builtin_registry as code
 from numba.core.typing.templates import builtin_registry as types
@@ -58,15 +58,15 @@ numba.njit(lambda x: x + 1.0)(1.0)
 def theirs():
     templates = [function for function, _ in types.globals] + [template.key for template in types.functions]
     known = templates + [function for _, function, _ in code.functions]
-    return [function for function in known if "walkerlab" not in str(getattr(function, "__module__", ""))]
+    return Counter(str(function) for function in known if "walkerlab" not in str(getattr(function, "__module__", "")))
 
 before = theirs()
 import walkerlab.orbits.basin, walkerlab.hybrid.rigid_lanes, walkerlab.stages.basin
-added = theirs()[len(before):]
-assert added == [], added
+added = theirs() - before
+assert not added, added
 from walkerlab.solvers.lanes import teach_arithmetic
 teach_arithmetic()
-print(len(theirs()) - len(before))
+print((theirs() - before)["<built-in function add>"])
 """
 
 
