@@ -2,13 +2,28 @@
 
 import gc
 import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from walkerlab.kernels import by_type, compiling, inlined, kernel, matrix, uncompiled, vector, watched
+from walkerlab import kernels
+from walkerlab.kernels import (
+    by_type,
+    by_type_or_default,
+    compiling,
+    inlined,
+    kernel,
+    matrix,
+    uncompiled,
+    vector,
+    watched,
+)
 
 
 class Circle(NamedTuple):
@@ -63,18 +78,24 @@ def test_the_body_is_chosen_by_type_in_python_and_compiled(shape):
     assert compiled_area(shape) == area(shape) == uncompiled(compiled_area)(shape)
 
 
-def test_a_type_without_a_body_is_refused_while_compiling():
-    with pytest.raises(TypingError):
-        compiled_area((1.0, 2.0))
+class Blob(NamedTuple):
+    """A thing without an area."""
+
+    size: float
 
 
-@by_type
+@pytest.mark.parametrize("call", [area, compiled_area], ids=["python", "compiled"])
+def test_a_type_without_a_body_is_refused_in_one_line_that_names_it(call):
+    with pytest.raises(TypeError) as said:
+        call(Blob(1.0))
+    assert str(said.value) == "area has no body for Blob: register one with @area.case(...)"
+    with pytest.raises(TypeError, match=r"^area has no body for .*[Tt]uple.*: register one"):
+        call((1.0, 2.0))
+
+
+@by_type_or_default
 def corners(shape):
     """How many corners a shape has."""
-
-
-@corners.default
-def none(shape):
     return 0
 
 
@@ -91,6 +112,8 @@ def compiled_corners(shape):
 def test_types_without_a_body_of_their_own_have_the_default():
     for shape, expected in ((Circle(1.0), 0), (Square(1.0), 4)):
         assert compiled_corners(shape) == corners(shape) == expected
+    assert Square in corners
+    assert Circle not in corners
 
 
 @inlined
@@ -142,6 +165,100 @@ def scratch_like_a_field(record, out):
 def test_scratch_that_is_read_unwritten_shows_in_python():
     assert np.isnan(vector((0.0, 0.0))).all()
     assert np.isnan(matrix((0.0, 0.0))).all()
+
+
+def test_the_installed_numba_has_the_inner_parts_that_are_leant_on():
+    assert kernels.absent == []
+
+
+WITHOUT = """
+import sys
+import numba.core.caching, numba.core.codegen
+if sys.argv[1] == "class":
+    del numba.core.codegen.JITCodeLibrary
+elif sys.argv[1] == "method":
+    del numba.core.caching.IndexDataCacheFile._load_index
+    numba.core.caching.IndexDataCacheFile.load = lambda self, key: None
+    numba.core.caching.IndexDataCacheFile.save = lambda self, key, data: None
+import numba
+from walkerlab.kernels import cache_folder
+own = numba.config.CACHE_DIR
+sys.path.insert(0, sys.argv[2])
+import chosen_kernels
+thing = chosen_kernels.Thing(2.0)
+print(chosen_kernels.measured(thing).hex(), own == numba.config.CACHE_DIR, cache_folder())
+"""
+CHOSEN = """
+from typing import NamedTuple
+from walkerlab import kernels
+from walkerlab.kernels import by_type, by_type_or_default, inlined, kernel, vector, woven
+
+
+class Thing(NamedTuple):
+    size: float
+
+
+@by_type
+def measure(thing):
+    pass
+
+
+@measure.case(Thing)
+def size(thing):
+    return thing.size
+
+
+@by_type_or_default
+def factor(thing):
+    return 1.0 / 3.0
+
+
+@woven
+def scaled(x, by):
+    return x * by
+
+
+@inlined
+def summed(thing):
+    scratch = vector((0.0, 0.0, 0.0))
+    for i in range(3):
+        scratch[i] = scaled(measure(thing), factor(thing))
+    return scratch[0] + scratch[1] + scratch[2]
+
+
+@kernel
+def measured(thing):
+    return summed(thing) + 0.1
+"""
+
+
+def run_without(part, tmp_path):
+    (tmp_path / "chosen_kernels.py").write_text(CHOSEN)
+    environment = {**os.environ, "WALKERLAB_CACHE": str(tmp_path / part)}
+    command = [sys.executable, "-c", WITHOUT, part, str(tmp_path)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    number, untouched, folder = done.stdout.split()
+    assert untouched == "True"
+    return number, Path(folder), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("part", "named"),
+    [("class", "numba.core.codegen.JITCodeLibrary"), ("method", "numba.core.caching.IndexDataCacheFile._load_index")],
+)
+def test_without_numbas_inner_parts_kernels_are_compiled_as_numba_does_it_and_it_is_told_once(part, named, tmp_path):
+    number, folder, told = run_without(part, tmp_path)
+    expected, _, silent = run_without("nothing", tmp_path)
+    assert number == expected
+    assert told.count("RuntimeWarning") == 1
+    assert f"is without {named}: compiling takes longer" in told
+    assert silent == ""
+    if part == "class":
+        stored = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
+        assert stored  # in the folder of this state of the sources, from which the next process takes it
+        run_without(part, tmp_path)
+        assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")} == stored
 
 
 NESTED = """

@@ -9,12 +9,14 @@ import contextlib
 import functools
 import gc
 import hashlib
+import importlib
 import os
 import re
 import shutil
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -24,15 +26,6 @@ import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.caching import (
-    CompileResultCacheImpl,
-    FunctionCache,
-    IndexDataCacheFile,
-    IPythonCacheLocator,
-    UserProvidedCacheLocator,
-)
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable
 from numba.np.arrayobj import make_array, populate_array
@@ -165,7 +158,52 @@ def nothing_compiled_yet() -> bool:
     return next(cache_folder().rglob("*.nbc"), None) is None
 
 
-class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
+absent: list[str] = []
+"""What of numba's inner parts is not as it is here: without it everything is compiled as numba itself does it."""
+
+
+def inner_part(name: str, *members: str) -> Any:
+    """A class from within numba, which any version may change; noted in `absent` if it or a member is not there."""
+    module, _, kind = name.rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module), kind)
+    except (ImportError, AttributeError):
+        absent.append(name)
+        return object
+    absent.extend(f"{name}.{member}" for member in members if not hasattr(found, member))
+    return found
+
+
+CompileResultCacheImpl = inner_part("numba.core.caching.CompileResultCacheImpl", "_locator_classes", "locator")
+FunctionCache = inner_part("numba.core.caching.FunctionCache", "_impl_class", "load_overload", "save_overload")
+IndexDataCacheFile = inner_part("numba.core.caching.IndexDataCacheFile", "_load_index")
+IPythonCacheLocator = inner_part("numba.core.caching.IPythonCacheLocator", "from_function")
+UserProvidedCacheLocator = inner_part(
+    "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
+)
+JITCodeLibrary = inner_part(
+    "numba.core.codegen.JITCodeLibrary",
+    "codegen",
+    "get_pointer_to_function",
+    "_ensure_finalized",
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+)
+Compiler = inner_part("numba.core.compiler.Compiler", "compile_extra")
+CompilerBase = inner_part("numba.core.compiler.CompilerBase", "define_pipelines")
+DefaultPassBuilder = inner_part("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+
+if absent:
+    warnings.warn(
+        f"numba {numba.__version__} is without {', '.join(absent)}: compiling takes longer than it could, and is not "
+        "told of. Results are the same; a version of numba that pyproject.toml allows compiles faster.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
     """Numba's locator for a folder that was chosen, which is `cache_folder`, for kernels alone."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
@@ -179,13 +217,13 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
         return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
 
 
-class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
     """Results of compiling in `cache_folder`; those of a notebook's cells, which have no file, where IPython says."""
 
     _locator_classes = (KernelLocator, IPythonCacheLocator)
 
 
-class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
+class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
     """A kernel's stored code, begun anew where it was stored for types that this process cannot import.
 
     Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
@@ -198,7 +236,7 @@ class KernelIndex(IndexDataCacheFile):  # type: ignore[misc]
             return {}
 
 
-class StoredKernel(FunctionCache):  # type: ignore[misc]
+class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
     """A kernel's machine code on disk."""
 
     _impl_class = KernelCacheImpl
@@ -285,13 +323,27 @@ def watched(tell: Callable[[str], None]) -> Iterator[None]:
 
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    if absent:
+        return cast(F, _cached_plainly(function))
     compiled = numba.njit(pipeline_class=_KernelCompiler, **FLAGS)(function)
     # what enable_caching does, with the kernels' own folder
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
 
 
-class _KernelCompiler(Compiler):  # type: ignore[misc]
+def _cached_plainly(function: Callable[..., Any]) -> Any:
+    """The function compiled and kept by numba's own means, in the folder of this state of the sources too."""
+    compiled = numba.njit(**FLAGS)(function)
+    usual = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder())
+    try:
+        compiled.enable_caching()
+    finally:
+        numba.config.CACHE_DIR = usual
+    return compiled
+
+
+class _KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's own compiler, with garbage collected seldom meanwhile."""
 
     def compile_extra(self, func: Any) -> Any:
@@ -321,7 +373,7 @@ class _WithoutEnvironment:
         """Nothing."""
 
 
-class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
     """The code of a part: linked into kernels, which are optimised as wholes, and no machine code of its own.
 
     To optimise and emit every part for itself too, as numba does, takes a third of the time that compiling takes.
@@ -343,7 +395,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
 
-class _PartCompiler(CompilerBase):  # type: ignore[misc]
+class _PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
     """Numba's own passes, into a library of parts."""
 
     def define_pipelines(self) -> list[Any]:
@@ -353,7 +405,8 @@ class _PartCompiler(CompilerBase):  # type: ignore[misc]
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-PART_FLAGS["pipeline_class"] = _PartCompiler
+if not absent:
+    PART_FLAGS["pipeline_class"] = _PartCompiler
 
 
 def inlined(function: F) -> F:
@@ -374,8 +427,10 @@ def uncompiled(compiled: F) -> F:
 class ByType:
     """A function whose body is chosen by the type of its first argument, in Python and in compiled code alike."""
 
+    __name__: str
+
     def __init__(self, declaration: Callable[..., Any]) -> None:
-        """Take name and documentation from `declaration`, whose own body never runs."""
+        """Take name and documentation from `declaration`."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
         self._woven: set[type] = set()
@@ -383,10 +438,11 @@ class ByType:
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
         """Run the body for the type of `chooser`."""
-        body = self._bodies.get(type(chooser), self._default)
-        if body is None:
-            raise KeyError(f"{self.__name__} has no body for {type(chooser).__name__}")  # type: ignore[attr-defined]
-        return body(chooser, *rest)
+        return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
+
+    def __contains__(self, chosen: type) -> bool:
+        """Whether a type has a body of its own."""
+        return chosen in self._bodies
 
     def case(self, chosen: type, woven: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
@@ -410,7 +466,15 @@ class ByType:
     def body(self, kind: Any, woven: bool) -> Callable[..., Any] | None:
         """The body for numba's type of a first argument, if it is woven or is not; else None."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._bodies.get(chosen, self._default) if (chosen in self._woven) == woven else None
+        return self._body_for(chosen, str(kind)) if (chosen in self._woven) == woven else None
+
+    def _body_for(self, chosen: type, said: str) -> Callable[..., Any]:
+        body = self._bodies.get(chosen, self._default)
+        if body is None:
+            name = chosen.__name__ if hasattr(chosen, "_fields") else said
+            # an error that is not one of numba's own leaves its compiler as it is, in one line
+            raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
+        return body
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
@@ -428,6 +492,13 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
     overload(chosen, strict=False, jit_options=PART_FLAGS)(called)
     overload(chosen, strict=False, jit_options=WOVEN_FLAGS)(woven)
+    return chosen
+
+
+def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
+    """As `by_type`, of a function whose own body runs for all types that have none."""
+    chosen = by_type(declaration)
+    chosen.default(declaration)
     return chosen
 
 

@@ -7,15 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.ground.terrain import (
-    AfterMidSwing,
-    Checkerboard,
+    after_mid_swing,
     cell_at,
     cell_edges,
+    checkerboard,
     has_ground_in_air,
     has_ground_in_cell,
-    order_matters,
     starts_with_ground,
-    stride_measure,
 )
 
 pitches = st.floats(0.05, 5.0)
@@ -25,7 +23,7 @@ feet = st.sampled_from([0, 1])
 
 def walked_on(pitch):
     """Lanes as a walk lays them: the first stance foot (1) stands at 0, the other one pitch behind it."""
-    return Checkerboard(pitch, (-pitch, 0.0))
+    return checkerboard(pitch, (-pitch, 0.0))
 
 
 @given(pitch=pitches, along=places, foot=feet)
@@ -42,7 +40,7 @@ def test_cells_follow_each_other_without_gap_or_overlap(pitch, foot, cell):
     here, there = cell_edges(terrain, foot, cell), cell_edges(terrain, foot, cell + 1)
     assert here[1] == pytest.approx(there[0], abs=1e-9)
     assert cell_at(terrain, foot, 0.5 * (here[0] + here[1])) == cell
-    assert has_ground_in_cell(terrain, cell) != has_ground_in_cell(terrain, cell + 1)
+    assert has_ground_in_cell(cell) != has_ground_in_cell(cell + 1)
 
 
 @given(pitch=pitches, j=st.integers(-20, 20))
@@ -51,8 +49,8 @@ def test_each_legs_pads_lie_centred_on_its_footholds(pitch, j):
     terrain = walked_on(pitch)
     for foothold, foot in ((2 * j * pitch, 1), ((2 * j + 1) * pitch, 0)):
         cell = cell_at(terrain, foot, foothold)
-        assert has_ground_in_cell(terrain, cell)
-        assert not has_ground_in_cell(terrain, cell_at(terrain, 1 - foot, foothold))
+        assert has_ground_in_cell(cell)
+        assert not has_ground_in_cell(cell_at(terrain, 1 - foot, foothold))
         assert sum(cell_edges(terrain, foot, cell)) / 2 == pytest.approx(foothold, abs=1e-9)
 
 
@@ -64,13 +62,13 @@ def test_a_pad_stays_where_it_is(has_ground, ahead):
         assert has_ground_in_air(terrain, has_ground, stands, ahead) == has_ground
     assert starts_with_ground(terrain, False)
     assert starts_with_ground(terrain, True)
-    assert not order_matters(terrain)
-    assert stride_measure(terrain) == 0.4
+    assert not terrain.order_matters
+    assert terrain.stride_measure == 0.4
 
 
 @given(along=places, foot=feet)
 def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
-    terrain = AfterMidSwing(0.4)
+    terrain = after_mid_swing(0.4)
     begins, ends = cell_edges(terrain, foot, cell_at(terrain, foot, along))
     assert begins < along - 1e6 < along + 1e6 < ends
     assert math.isfinite(begins)
@@ -78,8 +76,8 @@ def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
 
 
 def test_on_a_plane_a_foot_is_carried_only_after_it_was_in_the_air_ahead():
-    terrain = AfterMidSwing(0.4)
-    assert order_matters(terrain)
+    terrain = after_mid_swing(0.4)
+    assert terrain.order_matters
     assert starts_with_ground(terrain, True)
     assert not starts_with_ground(terrain, False)  # it is about to swing
     assert not has_ground_in_air(terrain, True, False, False)  # leaves its stance, or fell back, behind: swings through

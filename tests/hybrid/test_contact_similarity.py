@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contact_walks import FIXED_POINT, RIGID_STEP, faster, scene_of, settings, walked
 
-from walkerlab.ground.terrain import Checkerboard
+from walkerlab.ground.terrain import checkerboard
 from walkerlab.hybrid.contact_run import JudgedGround, walk_contact
 from walkerlab.scene.contact import start_state
 
@@ -16,7 +16,7 @@ def test_where_the_walk_begins_does_not_matter():
     start = np.array(start_state(scene, FIXED_POINT))
     start[0] += 64.0
     lanes = tuple(lane + 64.0 for lane in scene.terrain.lanes)
-    ground = JudgedGround(Checkerboard(scene.pitch_m, lanes), scene.frame)
+    ground = JudgedGround(checkerboard(scene.pitch_m, lanes), scene.frame)
     there = walk_contact(scene.walker, ground, None, 1, tuple(start.tolist()), settings(), 10, None)
     np.testing.assert_allclose(there.touch_time_s, here.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(there.touch_along_m - 64.0, here.touch_along_m, atol=1e-6)
@@ -27,7 +27,7 @@ def test_which_leg_begins_does_not_matter():
     scene, one = scene_of(), walked()
     y = start_state(scene, FIXED_POINT)
     exchanged = (y[0], y[1], y[3], y[2], y[4], y[5], y[7], y[6])
-    ground = JudgedGround(Checkerboard(scene.pitch_m, scene.terrain.lanes[::-1]), scene.frame)
+    ground = JudgedGround(checkerboard(scene.pitch_m, scene.terrain.lanes[::-1]), scene.frame)
     other = walk_contact(scene.walker, ground, None, 0, exchanged, settings(), 10, None)
     np.testing.assert_allclose(other.touch_time_s, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m, one.touch_along_m, atol=1e-6)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
 from walkerlab.ground.friction import Coulomb, Frictionless
-from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
+from walkerlab.ground.terrain import after_mid_swing, checkerboard
 from walkerlab.hybrid.contact_events import feet_motion, hip_height
 from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
 from walkerlab.scene.left_out import of_contact_walk
@@ -79,13 +79,13 @@ def test_a_scene_without_friction_has_another_law_not_a_zero():
 
 def test_pads_are_laid_by_the_step_that_the_config_asks_for():
     config = load(None, ()).config
-    assert contact_scene(config, STEP).terrain == Checkerboard(STEP, (-STEP, 0.0))
+    assert contact_scene(config, STEP).terrain == checkerboard(STEP, (-STEP, 0.0))
     assert scene_of("contact.pad_pitch=0.36").pitch_m == 0.36
     own = load(None, ("contact.pad_pitch=own",)).config
     assert contact_scene(own, STEP, 0.3608).pitch_m == 0.3608
     with pytest.raises(ValueError, match="own"):
         contact_scene(own, STEP)
-    assert scene_of("contact.terrain=after-mid-swing").terrain == AfterMidSwing(STEP)
+    assert scene_of("contact.terrain=after-mid-swing").terrain == after_mid_swing(STEP)
 
 
 def test_a_hinged_first_step_is_a_system_of_two_angles():

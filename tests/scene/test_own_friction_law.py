@@ -13,9 +13,11 @@ from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
+from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity
 from walkerlab.orbits.rigid_limit import STICTION, series_of, with_contact_of
-from walkerlab.scene.contact import contact_scene, friction_law, scene_measures
+from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
+from walkerlab.solvers.registry import method_named
 from walkerlab.stages.contact_sim import tell_unresolved_slip
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)
@@ -52,6 +54,43 @@ def own(monkeypatch):
     )
     monkeypatch.setitem(FRICTION_LAWS, "coulomb", Regularised)
     return contact_scene(load().config, 0.3714)
+
+
+class Wordless(NamedTuple):
+    """A law of which half is left out."""
+
+    mu: float
+
+    @classmethod
+    def of(cls, contact):
+        return cls(contact.dynamic_friction)
+
+    largest = rising_until = property(lambda self: self.mu)
+
+
+def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
+    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
+    with pytest.raises(TypeError) as said:
+        contact_scene(load().config, 0.3714)
+    assert str(said.value) == (
+        "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, with_creep, in_words, "
+        "a body @friction_coefficient.case(Wordless)"
+    )
+
+
+def test_a_law_that_counts_its_formulas_must_also_tell_where_they_change(own, monkeypatch):
+    monkeypatch.setitem(friction.switching_count._bodies, Regularised, lambda law: 2)
+    with pytest.raises(TypeError, match=r"lacks a body @sample_switching\.case\(Regularised\)$"):
+        contact_scene(load().config, 0.3714)
+
+
+def test_a_law_without_a_body_is_told_in_words_by_compiled_code(own):
+    walker, methods = (
+        own.walker._replace(friction=Wordless(0.5)),
+        MethodSettings(method_named("radau5"), 1e-7, 1e-9, 1000),
+    )
+    with pytest.raises(TypeError, match=r"^friction_coefficient has no body for Wordless: "):
+        walk_contact(walker, own.ground, None, 1, start_state(own, START), methods, 1, None)
 
 
 def test_every_word_of_the_config_is_a_law():

@@ -1,6 +1,8 @@
 """Numbers in lanes: what is compiled for floats means the same, lane by lane."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -13,10 +15,11 @@ from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers import system
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.in_tuples import derivative
-from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes
+from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes, teach_arithmetic
 
 MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))
 WALKER = two_legs(MODEL)
+teach_arithmetic()
 
 
 @kernel
@@ -42,6 +45,35 @@ def rates(system, y, out):
     rate = derivative(system, 0.0, (load_lanes(y, 0), load_lanes(y, 1), load_lanes(y, 2), load_lanes(y, 3)))
     for i in range(4):
         store_lanes(rate[i], out, i)
+
+
+IMPORT_ALL = """
+from collections import Counter
+import numba
+from numba.core.imputils import builtin_registry as code
+from numba.core.typing.templates import builtin_registry as types
+import numba.np.arrayobj, numba.extending
+numba.njit(lambda x: x + 1.0)(1.0)
+
+def theirs():
+    templates = [function for function, _ in types.globals] + [template.key for template in types.functions]
+    known = templates + [function for _, function, _ in code.functions]
+    return Counter(str(function) for function in known if "walkerlab" not in str(getattr(function, "__module__", "")))
+
+before = theirs()
+import walkerlab.orbits.basin, walkerlab.hybrid.rigid_lanes, walkerlab.stages.basin
+added = theirs() - before
+assert not added, added
+from walkerlab.solvers.lanes import teach_arithmetic
+teach_arithmetic()
+print((theirs() - before)["<built-in function add>"])
+"""
+
+
+def test_an_import_alone_registers_no_operators_for_all_that_a_process_compiles():
+    done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 0  # of those that are looked at
 
 
 def test_arithmetic_is_that_of_floats():

@@ -1,7 +1,8 @@
 """Tangential force of the ground: ADAMS's Coulomb friction without true stick, or none.
 
-A law is a class of its parameters with what `FrictionLaw` lists, a case of each compiled function below, and a name in
-`FRICTION_LAWS`. Nothing outside this file asks which law it is.
+A law is a class of its parameters with what `FrictionLaw` lists, a case of `friction_coefficient`, cases of the two
+functions behind it if the coefficient follows different formulas, and a name in `FRICTION_LAWS`. Nothing outside this
+file asks which law it is.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
 from walkerlab.ground.smooth_step import smooth_step
-from walkerlab.kernels import by_type
+from walkerlab.kernels import by_type, by_type_or_default
 
 
 class FrictionLaw(Protocol):
@@ -44,12 +45,13 @@ def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
     """Tangential over normal force at a slip velocity (m/s), against the slip, and its derivative (s/m)."""
 
 
-@by_type
+@by_type_or_default
 def switching_count(law: Any) -> int:
-    """How many event functions tell where the coefficient follows another formula: at most four."""
+    """How many event functions tell where the coefficient follows another formula: at most four; none if not said."""
+    return 0
 
 
-@by_type
+@by_type_or_default
 def sample_switching(law: Any, slip: float, values: Any, first: int, j: int) -> None:
     """These event functions at a slip velocity (m/s) into values[first:, j]."""
 
@@ -170,19 +172,30 @@ def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-@switching_count.case(Frictionless)
-def no_switching_count(law: Frictionless) -> int:
-    """One formula holds everywhere."""
-    return 0
-
-
-@sample_switching.case(Frictionless)
-def sample_no_switching(law: Frictionless, slip: float, values: Any, first: int, j: int) -> None:
-    """There is none to sample."""
-
-
 FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none": Frictionless}
 """The laws by the words of the config's contact.friction."""
+
+
+def law_named(word: str, contact: Any) -> FrictionLaw:
+    """The law of that word with the parameters of a contact block, a `config.contact.ContactSI`.
+
+    TypeError if the law's class is incomplete, saying what it lacks.
+    """
+    law = FRICTION_LAWS[word]
+    missing = lacking(law)
+    if missing:
+        raise TypeError(f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
+    return law.of(contact)
+
+
+def lacking(law: type) -> list[str]:
+    """What a law's class does not have of what `FrictionLaw` lists, and the cases that are to be registered for it."""
+    asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
+    missing = [name for name in asked if not hasattr(law, name)]
+    switching = (switching_count, sample_switching)
+    needed = (friction_coefficient, *(switching if any(law in function for function in switching) else ()))
+    cases = [f"a body @{function.__name__}.case({law.__name__})" for function in needed if law not in function]
+    return missing + cases
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:

@@ -9,7 +9,7 @@ ideal lock holds is no body of its own once both feet are free: see merged.py.
 from typing import Any, NamedTuple
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.mechanics.tree import Tree
 from walkerlab.mechanics.tuples import Vector, factored, put, solve_factored, solve_symmetric
 from walkerlab.solvers.system import State
@@ -63,58 +63,33 @@ class NoneBends(NamedTuple):
     release_at_touch: bool
 
 
-@by_type
+@by_type_or_default
 def always_held(held: Any) -> Flags:
-    """Which bodies follow others at all times."""
+    """Which bodies follow others at all times: none but where some are held."""
+    return ()
 
 
-@by_type
+@by_type_or_default
 def held_flags(held: Any, knees: Any, knee: Any) -> Flags:
     """Which bodies follow others now: (n) as flags, from what each knee is doing, (2,) in memory."""
+    return ()
 
 
-@by_type
+@by_type_or_default
 def gathered_matrix(held: Any, flags: Flags, M: Vector) -> Vector:
     """E'ME (n n), with the identity for the bodies that follow."""
-
-
-@by_type
-def gathered(held: Any, flags: Flags, torques: Vector) -> Vector:
-    """E'r (n), with zero for the bodies that follow."""
-
-
-@by_type
-def followed(held: Any, flags: Flags, rates: Vector) -> Vector:
-    """E z (n): what follows gets its share."""
-
-
-@always_held.case(NoneHeld)
-def none_always(held: NoneHeld) -> Flags:
-    """None."""
-    return ()
-
-
-@held_flags.case(NoneHeld)
-def none_now(held: NoneHeld, knees: Any, knee: Any) -> Flags:
-    """None."""
-    return ()
-
-
-@gathered_matrix.case(NoneHeld)
-def whole_matrix(held: NoneHeld, flags: Flags, M: Vector) -> Vector:
-    """All of it."""
     return M
 
 
-@gathered.case(NoneHeld)
-def all_torques(held: NoneHeld, flags: Flags, torques: Vector) -> Vector:
-    """All of them."""
+@by_type_or_default
+def gathered(held: Any, flags: Flags, torques: Vector) -> Vector:
+    """E'r (n), with zero for the bodies that follow."""
     return torques
 
 
-@followed.case(NoneHeld)
-def none_follows(held: NoneHeld, flags: Flags, rates: Vector) -> Vector:
-    """As they are."""
+@by_type_or_default
+def followed(held: Any, flags: Flags, rates: Vector) -> Vector:
+    """E z (n): what follows gets its share."""
     return rates
 
 
@@ -195,16 +170,9 @@ def divide_by_held_mass(held: Any, flags: Flags, tree: Tree, M: Vector, J: Any) 
             J[size - n + k, j] = column[k]
 
 
-@by_type
+@by_type_or_default
 def below_locked_knees(knees: Any, knee: Any, flags: Flags) -> Flags:
-    """The flags, with those of the shanks that follow their thighs now."""
-
-
-@below_locked_knees.case(NoKnees)
-@below_locked_knees.case(OneBends)
-@below_locked_knees.case(NoneBends)
-def no_shanks(knees: Any, knee: Any, flags: Flags) -> Flags:
-    """None is a body of its own."""
+    """The flags, with those of the shanks that follow their thighs now: bodies of their own in `Knees` alone."""
     return flags
 
 
@@ -217,18 +185,12 @@ def locked_shanks(knees: Knees, knee: Any, flags: Flags) -> Flags:
     return flags
 
 
-@by_type
+@by_type_or_default
 def bends_otherwise(knees: Any, knee: Any) -> bool:
     """Whether the walker has to go on with other bodies, since a knee locked or was released.
 
     knee  (2,) what each knee is doing
     """
-
-
-@bends_otherwise.case(NoKnees)
-@bends_otherwise.case(Knees)
-def never(knees: Any, knee: Any) -> bool:
-    """Its bodies serve any."""
     return False
 
 
@@ -247,80 +209,38 @@ def one_bends(knees: NoneBends, knee: Any) -> bool:
 # ---- the stop of a knee ----------------------------------------------------------------------------------------------
 
 
-@by_type
+@by_type_or_default
 def no_stops(knees: Any) -> Flags:
-    """No knee is in its stop."""
+    """No knee is in its stop; only `Knees` have any."""
+    return ()
 
 
-@by_type
+@by_type_or_default
 def stop_flags(knees: Any, now: Any) -> Flags:
     """Which knees are in their stops: from what each is doing, (2,) in memory."""
+    return ()
 
 
-@by_type
+@by_type_or_default
 def knee_torques(knees: Any, stops: Flags, y: State, first: int, torques: Vector) -> Vector:
     """Add the torques (N m) of the stops; the bodies' angles are y[first], ..., the last n of y their velocities."""
+    return torques
 
 
-@by_type
+@by_type_or_default
 def knee_gradients(knees: Any, stops: Flags, y: State, first: int, J: Any) -> None:
     """Add the derivatives of those torques to the last n rows of J."""
 
 
-@by_type
+@by_type_or_default
 def knee_energy(knees: Any, stops: Flags, y: State, first: int) -> float:
     """Elastic energy (J) in the stops."""
-
-
-@by_type
-def knee_power(knees: Any, stops: Flags, y: State, first: int) -> float:
-    """Power (W) that the stops dissipate."""
-
-
-@no_stops.case(NoKnees)
-@no_stops.case(OneBends)
-@no_stops.case(NoneBends)
-def without_stops(knees: Any) -> Flags:
-    """There are none."""
-    return ()
-
-
-@stop_flags.case(NoKnees)
-@stop_flags.case(OneBends)
-@stop_flags.case(NoneBends)
-def without_stops_now(knees: Any, now: Any) -> Flags:
-    """There are none."""
-    return ()
-
-
-@knee_torques.case(NoKnees)
-@knee_torques.case(OneBends)
-@knee_torques.case(NoneBends)
-def without_torques(knees: Any, stops: Flags, y: State, first: int, torques: Vector) -> Vector:
-    """As they are."""
-    return torques
-
-
-@knee_gradients.case(NoKnees)
-@knee_gradients.case(OneBends)
-@knee_gradients.case(NoneBends)
-def without_gradients(knees: Any, stops: Flags, y: State, first: int, J: Any) -> None:
-    """Nothing."""
-
-
-@knee_energy.case(NoKnees)
-@knee_energy.case(OneBends)
-@knee_energy.case(NoneBends)
-def without_energy(knees: Any, stops: Flags, y: State, first: int) -> float:
-    """None."""
     return 0.0
 
 
-@knee_power.case(NoKnees)
-@knee_power.case(OneBends)
-@knee_power.case(NoneBends)
-def without_power(knees: Any, stops: Flags, y: State, first: int) -> float:
-    """None."""
+@by_type_or_default
+def knee_power(knees: Any, stops: Flags, y: State, first: int) -> float:
+    """Power (W) that the stops dissipate."""
     return 0.0
 
 
@@ -349,14 +269,12 @@ def extension_rate(knees: Knees, knee: int, y: State, first: int) -> float:
     return y[rates + knees.shanks[knee]] - y[rates + knees.thighs[knee]]
 
 
-@by_type
+@by_type_or_default
 def stop_torque(stop: Any, angle: float, rate: float) -> tuple[float, float, float, float]:
-    """Torque (N m) against the extension, its elastic part, and its derivatives along angle and rate."""
+    """Torque (N m) against the extension, its elastic part, and its derivatives along angle and rate.
 
-
-@stop_torque.case(IdealLock)
-def no_torque(stop: IdealLock, angle: float, rate: float) -> tuple[float, float, float, float]:
-    """An ideal lock acts in no time."""
+    An ideal lock acts in no time.
+    """
     return 0.0, 0.0, 0.0, 0.0
 
 
@@ -369,14 +287,9 @@ def impact_torque(stop: NormalLaw, angle: float, rate: float) -> tuple[float, fl
     return torque.force, torque.spring, torque.by_penetration, torque.by_rate
 
 
-@by_type
+@by_type_or_default
 def stop_energy(stop: Any, angle: float) -> float:
     """Elastic energy (J) of a stop."""
-
-
-@stop_energy.case(IdealLock)
-def no_energy(stop: IdealLock, angle: float) -> float:
-    """None."""
     return 0.0
 
 

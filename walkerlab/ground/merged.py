@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.held import Held, IdealLock, Knees, NoneHeld
 from walkerlab.ground.walker import ContactWalker, Foot
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.mechanics.tree import Tree, merged_tree
 from walkerlab.mechanics.tuples import Vector, numbers, put
 from walkerlab.solvers.system import State
@@ -126,15 +126,9 @@ def as_fewer(walker: ContactWalker, fewer: Fewer, held: Any, knees: Any) -> Cont
     )
 
 
-@by_type
+@by_type_or_default
 def store_whole(merging: Any, y: State, whole: Any) -> None:
     """Write the state y of a walker into `whole`, as that of the whole walker."""
-
-
-@store_whole.case(Unmerged)
-@store_whole.case(ByKnees)
-def store_as_it_is(merging: Any, y: State, whole: Any) -> None:
-    """It is that state."""
     for i in range(len(y)):
         whole[i] = y[i]
 

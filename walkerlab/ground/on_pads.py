@@ -30,8 +30,8 @@ def over_pads(system: OnPads, y: State) -> OnGround:
     s, c = sines_cosines(walker.tree, y, 2, walker.slope)
     first = foot_motion(walker, walker.feet[0], s, c, y).along
     second = foot_motion(walker, walker.feet[1], s, c, y).along
-    over_first = has_ground_in_cell(terrain, cell_at(terrain, 0, first))
-    over_second = has_ground_in_cell(terrain, cell_at(terrain, 1, second))
+    over_first = has_ground_in_cell(cell_at(terrain, 0, first))
+    over_second = has_ground_in_cell(cell_at(terrain, 1, second))
     return OnGround(walker, (over_first, over_second), always_held(walker.held), no_stops(walker.knees))
 
 

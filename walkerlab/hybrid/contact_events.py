@@ -15,18 +15,16 @@ from walkerlab.ground.held import (
     LOCKED,
     STOPPING,
     Knees,
-    NoKnees,
     NoneBends,
     OneBends,
     extension,
     extension_rate,
 )
-from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.pinned import Pinned, floating_state
-from walkerlab.ground.terrain import cell_edges, stride_measure
+from walkerlab.ground.terrain import Terrain, cell_edges
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.mechanics.tree import sines_cosines
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing
 from walkerlab.solvers.system import State
@@ -56,14 +54,9 @@ class Frame(NamedTuple):
     locate_switching: bool  # end steps at the switching points of the force law
 
 
-@by_type
+@by_type_or_default
 def walker_state(system: Any, y: State) -> State:
     """The state of the free walker."""
-
-
-@walker_state.case(OnGround)
-def free_state(system: OnGround, y: State) -> State:
-    """It is the state."""
     return y
 
 
@@ -73,14 +66,9 @@ def hinged_state(system: Pinned, y: State) -> State:
     return floating_state(system, y)
 
 
-@by_type
+@by_type_or_default
 def is_free(system: Any, foot: int) -> bool:
     """Whether a foot may touch and lift."""
-
-
-@is_free.case(OnGround)
-def free_both(system: OnGround, foot: int) -> bool:
-    """Both may."""
     return True
 
 
@@ -124,7 +112,7 @@ def hip_height(walker: ContactWalker, frame: Frame, y: State) -> float:
 def sample_event_functions(
     system: Any,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     cells: Any,
     stance: int,
@@ -148,9 +136,9 @@ def sample_event_functions(
 
 
 @inlined
-def farthest_slide(terrain: Any) -> float:
+def farthest_slide(terrain: Terrain) -> float:
     """How far a loaded stance foot may slip (m)."""
-    return FARTHEST_SLIDE * stride_measure(terrain)
+    return FARTHEST_SLIDE * terrain.stride_measure
 
 
 @inlined
@@ -168,15 +156,9 @@ def sample_foot(
     sample_switching(walker.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 
-@by_type
+@by_type_or_default
 def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
     """The knees' event functions at node j."""
-
-
-@sample_knees.case(NoKnees)
-@sample_knees.case(NoneBends)
-def sample_no_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
-    """Nothing."""
 
 
 @sample_knees.case(Knees)
@@ -188,7 +170,7 @@ def sample_both_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> N
         finder.values[EXTENSION_RATE + knee, j] = extension_rate(knees, knee, y, 2)
 
 
-@by_type
+@by_type_or_default
 def knee_crossing(
     knees: Any, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
 ) -> tuple[float, int]:
@@ -197,13 +179,6 @@ def knee_crossing(
     knee       (2,) what each knee is doing
     releasing  whether the trailing knee is released when the stance foot stops sinking in
     """
-
-
-@knee_crossing.case(NoKnees)
-def no_knee_crossing(
-    knees: NoKnees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
-) -> tuple[float, int]:
-    """None."""
     return NO_CROSSING, -1
 
 

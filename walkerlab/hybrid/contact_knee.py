@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, divide_by_held_mass, knee_energy, turned_by
+from walkerlab.ground.held import Knees, divide_by_held_mass, knee_energy, turned_by
 from walkerlab.ground.motion import OnGround, motion_gradient
 from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
 from walkerlab.hybrid.contact_rules import catches
 from walkerlab.hybrid.contact_tangent import Tangent, jump
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.mechanics.tree import Tree, mass_matrix, sines_cosines, tree_gradients
 from walkerlab.mechanics.tuples import Vector, put
 from walkerlab.solvers.in_tuples import derivative, end_state
@@ -17,16 +17,9 @@ from walkerlab.solvers.stepping import T
 from walkerlab.solvers.system import State
 
 
-@by_type
+@by_type_or_default
 def cross_knee(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, event: int) -> State:
     """The state after an event that led from one mode to another; what it cost is noted, and the tangent jumps."""
-
-
-@cross_knee.case(NoKnees)
-@cross_knee.case(OneBends)
-@cross_knee.case(NoneBends)
-def cross_nothing(knees: Any, observer: ContactObserver, method: Any, before: Any, after: Any, event: int) -> State:
-    """As it was."""
     return end_state(method, before)
 
 
@@ -47,32 +40,22 @@ def cross_some_knee(knees: Knees, observer: ContactObserver, method: Any, before
     return new
 
 
-@by_type
+@by_type_or_default
 def angles_of(system: Any) -> int:
-    """Where the bodies' angles begin in the state."""
+    """Where the bodies' angles begin in the state: after the centre of mass's two positions, if nothing is hinged."""
+    return 2
 
 
-@by_type
+@by_type_or_default
 def tree_of_system(system: Any) -> Tree:
     """The tree whose angles these are, about a root that the knees' impulses do not move."""
-
-
-@angles_of.case(OnGround)
-def free_angles(system: OnGround) -> int:
-    """After the centre of mass's two positions."""
-    return 2
+    return system.walker.tree
 
 
 @angles_of.case(Pinned)
 def hinged_angles(system: Pinned) -> int:
     """At once."""
     return 0
-
-
-@tree_of_system.case(OnGround)
-def free_tree(system: OnGround) -> Tree:
-    """About the centre of mass."""
-    return system.walker.tree
 
 
 @tree_of_system.case(Pinned)
@@ -113,14 +96,12 @@ def locked(system: Any, y: State) -> tuple[State, float]:
     return new, lost
 
 
-@by_type
+@by_type_or_default
 def event_gradient(system: Any, knees: Knees, event: int, y: State, gradient: Any) -> bool:
-    """Write the derivative of an event function by the state into `gradient`; whether the event changes the motion."""
+    """Write the derivative of an event function by the state into `gradient`; whether the event changes the motion.
 
-
-@event_gradient.case(Pinned)
-def hinged_gradient(system: Pinned, knees: Knees, event: int, y: State, gradient: Any) -> bool:
-    """The tangent is carried from section to section, where nothing is hinged."""
+    The tangent is carried from section to section, where nothing is hinged.
+    """
     return False
 
 

@@ -3,12 +3,12 @@
 from typing import Any, NamedTuple
 
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
-from walkerlab.ground.held import Knees, NoKnees, NoneBends, OneBends, knee_energy, knee_power
+from walkerlab.ground.held import Knees, knee_energy, knee_power
 from walkerlab.ground.merged import store_whole
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, VERTICAL_VELOCITY, feet_motion, walker_state
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.in_tuples import end_state, interpolate
 from walkerlab.solvers.stepping import T_OLD, T
@@ -148,16 +148,9 @@ def work_until(
     return damping, friction, stop_work(walker.knees, method, system, fraction)
 
 
-@by_type
+@by_type_or_default
 def stop_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
     """Work (J) lost in the knees' stops."""
-
-
-@stop_work.case(NoKnees)
-@stop_work.case(OneBends)
-@stop_work.case(NoneBends)
-def no_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
-    """None."""
     return 0.0
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from walkerlab.ground.held import LOCKED, NoneBends, OneBends, always_held, no_stops
 from walkerlab.ground.merged import ByKnees, Unmerged, as_fewer, merged_levers, merged_state, place_of, store_whole
 from walkerlab.ground.motion import OnGround
+from walkerlab.ground.terrain import Terrain
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import EXTENSION, HEIGHT, PER_FOOT, VERTICAL_VELOCITY, Frame
 from walkerlab.hybrid.contact_knee import carry_over, locked
@@ -57,7 +58,7 @@ def dense_degree_by_knees(method: MethodByKnees) -> int:
 def walk_by_knees(
     merging: Any,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     method: Any,
     finder: CrossingFinder,
@@ -74,7 +75,7 @@ def walk_by_knees(
 def walk_with_all_bodies(
     merging: Unmerged,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     method: Any,
     finder: CrossingFinder,
@@ -93,7 +94,7 @@ def walk_with_all_bodies(
 def walk_with_fewer_bodies(
     merging: ByKnees,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     method: MethodByKnees,
     finder: CrossingFinder,
@@ -142,7 +143,7 @@ def walk_bending(
     swing: int,
     released: bool,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     method: MethodByKnees,
     finder: CrossingFinder,
@@ -210,7 +211,7 @@ def lock_modes(walker: ContactWalker, swing: int, walk_state: WalkState) -> tupl
 @inlined
 def walk_merged(
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     whole: MethodByKnees,
     method: Any,

@@ -10,18 +10,11 @@ from walkerlab.ground.held import (
     STOPPING,
     IdealLock,
     Knees,
-    NoKnees,
     NoneBends,
     OneBends,
     extension,
 )
-from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.terrain import (
-    has_ground_in_air,
-    has_ground_in_cell,
-    has_pads,
-    stride_measure,
-)
+from walkerlab.ground.terrain import Terrain, has_ground_in_air, has_ground_in_cell
 from walkerlab.ground.walker import ContactWalker, FootMotion
 from walkerlab.hybrid.contact_events import (
     EXTENSION,
@@ -40,7 +33,7 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
@@ -81,7 +74,7 @@ class WalkState(NamedTuple):
 @inlined
 def happen(
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     observer: ContactObserver,
     walk_state: WalkState,
     event: int,
@@ -115,7 +108,7 @@ def happen(
         walk_state.at_zero[event] = 0
         walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
         walk_state.cells[foot] += 1 if kind == RIGHT_EDGE else -1
-        if not has_ground_in_cell(terrain, walk_state.cells[foot]):
+        if not has_ground_in_cell(walk_state.cells[foot]):
             observe_edge(observer, walker, foot, walk_state.has_ground[foot] != 0, y)
             walk_state.has_ground[foot] = 0
         elif is_above(walk_state, foot):
@@ -152,7 +145,7 @@ def is_ahead(walk_state: WalkState, foot: int) -> bool:
 
 
 @inlined
-def pass_by(terrain: Any, walk_state: WalkState, foot: int) -> None:
+def pass_by(terrain: Terrain, walk_state: WalkState, foot: int) -> None:
     """The feet changed places: one that is in the air may find ground, or lose it."""
     if is_above(walk_state, foot):
         stands = foot == walk_state.feet[STANCE]
@@ -162,7 +155,12 @@ def pass_by(terrain: Any, walk_state: WalkState, foot: int) -> None:
 
 @inlined
 def lift(
-    walker: ContactWalker, terrain: Any, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: State
+    walker: ContactWalker,
+    terrain: Terrain,
+    walk_state: WalkState,
+    feet: tuple[FootMotion, FootMotion],
+    foot: int,
+    y: State,
 ) -> None:
     """A foot rose above the ground: from its stance, or out of a scuff."""
     stands = foot == walk_state.feet[STANCE]
@@ -189,7 +187,7 @@ def note_slip(
 @inlined
 def touch(
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     walk_state: WalkState,
     feet: tuple[FootMotion, FootMotion],
     foot: int,
@@ -210,8 +208,8 @@ def touch(
     material = material_along(walker, foot, feet[foot].along, y)
     if foot == stance:
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
-    measure = stride_measure(terrain)
-    if has_pads(terrain) and walk_state.cells[foot] == walk_state.left_cells[foot]:
+    measure = terrain.stride_measure
+    if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.stood[foot, 1])
         return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
@@ -237,75 +235,42 @@ def touch(
     return GOES_ON
 
 
-@by_type
+@by_type_or_default
 def knee_stops(knees: Any, walk_state: WalkState, event: int, t: float) -> None:
     """A knee got straight, or turned back in its stop."""
 
 
-@by_type
+@by_type_or_default
 def release(knees: Any, walk_state: WalkState, knee: int) -> None:
     """A knee is free again."""
 
 
-@by_type
+@by_type_or_default
 def is_straight(knees: Any, walk_state: WalkState, foot: int) -> bool:
     """Whether a foot may come down: its knee is locked."""
+    return True
 
 
-@by_type
+@by_type_or_default
 def follow_strike(knees: Any, walk_state: WalkState, trailing: int) -> None:
     """The other foot has touched: the trailing knee is released, or is to be."""
 
 
-@by_type
+@by_type_or_default
 def note_flexion(knees: Any, walk_state: WalkState, y: State) -> None:
     """A released knee that has bent is caught when it straightens."""
 
 
-@by_type
+@by_type_or_default
 def catches(stop: Any) -> bool:
-    """Whether a knee that gets straight locks at once."""
+    """Whether a knee that gets straight locks at once; a compliant stop turns it back first."""
+    return False
 
 
 @catches.case(IdealLock)
 def lock_catches(stop: IdealLock) -> bool:
-    """Yes."""
+    """It does."""
     return True
-
-
-@catches.case(NormalLaw)
-def stop_catches(stop: NormalLaw) -> bool:
-    """Its stop turns it back first."""
-    return False
-
-
-@knee_stops.case(NoKnees)
-@knee_stops.case(NoneBends)
-def nothing_stops(knees: Any, walk_state: WalkState, event: int, t: float) -> None:
-    """Nothing."""
-
-
-@release.case(NoKnees)
-def nothing_is_released(knees: NoKnees, walk_state: WalkState, knee: int) -> None:
-    """Nothing."""
-
-
-@is_straight.case(NoKnees)
-@is_straight.case(NoneBends)
-def always_straight(knees: Any, walk_state: WalkState, foot: int) -> bool:
-    """Yes."""
-    return True
-
-
-@follow_strike.case(NoKnees)
-def nothing_follows(knees: NoKnees, walk_state: WalkState, trailing: int) -> None:
-    """Nothing."""
-
-
-@note_flexion.case(NoKnees)
-@note_flexion.case(NoneBends)
-def nothing_flexes(knees: Any, walk_state: WalkState, y: State) -> None:
-    """Nothing."""
 
 
 @knee_stops.case(Knees)

@@ -21,7 +21,7 @@ from walkerlab.ground.held import (
 )
 from walkerlab.ground.merged import ByKnees
 from walkerlab.ground.pinned import Pinned, floating_state
-from walkerlab.ground.terrain import cell_at, has_ground_in_cell, starts_with_ground
+from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import (
     EVENT_FUNCTIONS,
@@ -104,7 +104,7 @@ class Stopped:
 class JudgedGround(NamedTuple):
     """What a walk happens on and is judged by."""
 
-    terrain: Any  # Checkerboard, AfterMidSwing or Plane
+    terrain: Terrain
     frame: Frame
 
 
@@ -226,13 +226,13 @@ class ContactWalkResult:
         return np.diff(self.touch_along_m, prepend=0.0)
 
 
-def new_walk_state(walker: ContactWalker, terrain: Any, stance: int, steps: int, y: State) -> WalkState:
+def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
     """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
     feet = feet_motion(walker, y)
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
     for foot in range(2):
-        on_pad = has_ground_in_cell(terrain, int(cells[foot]))
+        on_pad = has_ground_in_cell(int(cells[foot]))
         has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
     sides, at_zero = known_sides(walker, feet, stance, y)
     return WalkState(

@@ -2,14 +2,12 @@
 
 from typing import Any, NamedTuple
 
-from walkerlab.ground.terrain import has_pads
+from walkerlab.ground.terrain import Terrain
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame, earliest_crossing, sample_event_functions
-from walkerlab.kernels import by_type, inlined, kernel
-from walkerlab.solvers.dop853 import Dop853
+from walkerlab.kernels import by_type_or_default, inlined, kernel
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.in_tuples import blank, interpolate
-from walkerlab.solvers.radau5 import Radau5
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
@@ -19,7 +17,7 @@ class Scene(NamedTuple):
     """What does not change while a walk goes on."""
 
     walker: ContactWalker
-    terrain: Any  # Checkerboard, AfterMidSwing or Plane
+    terrain: Terrain
     frame: Frame
     watch_order: bool  # whether it matters that the feet pass each other
 
@@ -59,25 +57,19 @@ def search(system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tup
         feet.order[0],
         feet.sides,
         feet.at_zero,
-        has_pads(scene.terrain),
+        scene.terrain.has_pads,
         feet.knee,
         feet.releasing[0] != 0,
         finder,
     )
 
 
-@by_type
+@by_type_or_default
 def scan(method: Any, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
     """Fraction of a method's last step at which the first event lies, and which it is; its dense output is ready.
 
     The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
     """
-
-
-@scan.case(Dop853)
-@scan.case(Radau5)
-def scan_compiled(method: Any, system: Any, scene: Scene, feet: Feet, finder: CrossingFinder) -> tuple[float, int]:
-    """Compiled with the walk."""
     for node in range(finder.nodes.size):
         sample(system, scene, feet, interpolate(method, system, finder.nodes[node]), node, finder)
     return search(system, scene, feet, finder)

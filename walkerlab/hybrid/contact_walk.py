@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.ground.held import bends_otherwise, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.pinned import Pinned
-from walkerlab.ground.terrain import order_matters
+from walkerlab.ground.terrain import Terrain
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, Frame, is_switching, walker_state
 from walkerlab.hybrid.contact_knee import cross_knee
@@ -27,7 +27,7 @@ from walkerlab.hybrid.contact_rules import (
 )
 from walkerlab.hybrid.contact_scan import Feet, Scene, scan
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type, by_type_or_default, inlined
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.in_tuples import begin, end_state
 from walkerlab.solvers.stepping import H_NEXT, OUT_OF_BUDGET, STEP_DONE, T_OLD, T, advance, prepare_dense, rewind
@@ -66,14 +66,9 @@ def hinged_mode(system: Pinned, walk_state: WalkState) -> Pinned:
     return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops, has_ground)
 
 
-@by_type
+@by_type_or_default
 def is_hinged(system: Any) -> bool:
     """Whether a hinge carries the walker, until its first step releases it."""
-
-
-@is_hinged.case(OnGround)
-def free_is_not(system: OnGround) -> bool:
-    """No."""
     return False
 
 
@@ -87,7 +82,7 @@ def pinned_is(system: Pinned) -> bool:
 def walk_part(
     system: Any,
     walker: ContactWalker,
-    terrain: Any,
+    terrain: Terrain,
     frame: Frame,
     method: Any,
     finder: CrossingFinder,
@@ -109,7 +104,7 @@ def walk_part(
     arriving, refinements, rewinds, event = False, 0, 0, -1
     target = deadline(frame, walk_state)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
-    scene = Scene(walker, terrain, frame, order_matters(terrain) or stop_passing_after >= 0)
+    scene = Scene(walker, terrain, frame, terrain.order_matters or stop_passing_after >= 0)
     feet = Feet(
         walk_state.has_ground,
         walk_state.cells,

@@ -21,7 +21,7 @@ from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_f
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
 from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.lane_steps import ERROR_3, ERROR_5, combine, error_sums, stages_of
-from walkerlab.solvers.lanes import WIDTH, Lanes, any_positive, choose, load_lanes, store_lanes
+from walkerlab.solvers.lanes import WIDTH, Lanes, any_positive, choose, load_lanes, store_lanes, teach_arithmetic
 from walkerlab.solvers.system import State
 
 # rows of a batch's memory, each with one number a lane
@@ -131,6 +131,7 @@ class LaneMemory(NamedTuple):
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
     """Memory for batches at these tolerances."""
+    teach_arithmetic()
     return LaneMemory(
         rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )

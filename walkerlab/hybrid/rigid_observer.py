@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import by_type, inlined, vector
+from walkerlab.kernels import by_type_or_default, inlined, vector
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
@@ -33,34 +33,19 @@ class Observer(NamedTuple):
     energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
 
 
-@by_type
+@by_type_or_default
 def observe_start(observer: Any, mode: Mode, y: Any) -> None:
     """Take note of the start of a swing phase."""
 
 
-@by_type
+@by_type_or_default
 def observe(observer: Any, method: Any, mode: Mode, fraction: float, step: int) -> None:
     """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
 
 
-@by_type
+@by_type_or_default
 def wants_dense(observer: Any) -> bool:
     """Whether `observe` needs the dense output of every integration step."""
-
-
-@observe_start.case(Unobserved)
-def ignore_start(observer: Unobserved, mode: Mode, y: Any) -> None:
-    """Nothing."""
-
-
-@observe.case(Unobserved)
-def ignore(observer: Unobserved, method: Any, mode: Mode, fraction: float, step: int) -> None:
-    """Nothing."""
-
-
-@wants_dense.case(Unobserved)
-def without_dense(observer: Unobserved) -> bool:
-    """No."""
     return False
 
 

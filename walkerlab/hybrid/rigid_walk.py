@@ -10,7 +10,7 @@ from typing import Any
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import observe, observe_start, wants_dense
-from walkerlab.kernels import by_type, inlined, kernel, vector
+from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
@@ -25,9 +25,7 @@ from walkerlab.mechanics.standing import (
     hip_height,
     swing_foot_motion,
 )
-from walkerlab.solvers.dop853 import Dop853
 from walkerlab.solvers.events import FALLING, NO_CROSSING, RISING, CrossingFinder, first_crossing, value_at
-from walkerlab.solvers.radau5 import Radau5
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
     H_NEXT,
@@ -146,15 +144,9 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     return strike, fall, struck
 
 
-@by_type
+@by_type_or_default
 def scan_swing(method: Any, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """`events_in_step` of the last step of a method; its dense output is ready."""
-
-
-@scan_swing.case(Dop853)
-@scan_swing.case(Radau5)
-def scan_compiled(method: Any, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Compiled with the walk."""
     y = vector(system.model.blank)
     for node in range(finder.nodes.size):
         interpolate(method, system, finder.nodes[node], y)

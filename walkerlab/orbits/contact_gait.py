@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.terrain import stride_measure
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING
 from walkerlab.hybrid.contact_rules import STANCE, STEPS
@@ -54,7 +53,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, methods: MethodS
     methods = replace(methods, budget=BUDGET_OF_A_STEP)
     said = "the start does not even let the feet pass each other"
     for steps, z in section_points(walker, ground, methods, start):
-        gait = gait_near(walker, ground, methods, z, stride_measure(ground.terrain))
+        gait = gait_near(walker, ground, methods, z, ground.terrain.stride_measure)
         if isinstance(gait, ContactGait):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         said = f"Newton's method found none after {steps} steps from the start: {gait}"
@@ -132,7 +131,7 @@ def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State) -> GaitAnswer:
     """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
-    pitch, last = stride_measure(ground.terrain), None
+    pitch, last = ground.terrain.stride_measure, None
     for _steps, z in section_points(with_rigidity(walker, 1.0), ground, methods, start):
         found = gait_near(with_rigidity(walker, 1.0), ground, methods, z, pitch)
         if isinstance(found, ContactGait):

@@ -6,12 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.terrain import AfterMidSwing, Checkerboard
+from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
 from walkerlab.hybrid.outcome import Outcome
@@ -90,16 +89,16 @@ class ContactMap:
         assert here is not None, "a point of the section belongs to a walker"
         return np.asarray(z / self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time))
 
-    def _walk(self, here: WalkerOnGround, z: Floats, terrain: Any) -> SectionStep:
+    def _walk(self, here: WalkerOnGround, z: Floats, terrain: Terrain) -> SectionStep:
         units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
-        measure = terrain.pitch if isinstance(terrain, Checkerboard) else self._measure
+        measure = terrain.stride_measure if terrain.has_pads else self._measure
         return step_from_section(
             here.walker, JudgedGround(terrain, here.ground.frame), self._methods, z * units, measure
         )
 
-    def _terrain(self, here: WalkerOnGround) -> Any:
+    def _terrain(self, here: WalkerOnGround) -> Terrain:
         terrain = here.ground.terrain
-        return AfterMidSwing(self._measure) if isinstance(terrain, Checkerboard) else terrain
+        return after_mid_swing(self._measure) if terrain.has_pads else terrain
 
     def step(self, z: Floats, p: float) -> MappedStep:
         """One step with all derivatives."""
@@ -141,7 +140,7 @@ class ContactMap:
             step = self._walk(here, at, self._terrain(here))
             slip, at = max(slip, abs(step.slip_m)), step.z / self.units(1.0, 1.0)
             if self._on_pads and steps == 1:
-                on_pads = self._walk(here, z, Checkerboard(step.length_m, (0.0, 0.0)))
+                on_pads = self._walk(here, z, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Held, IdealLock, Knees, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.terrain import Checkerboard, has_ground_in_air
+from walkerlab.ground.terrain import checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
@@ -152,12 +152,12 @@ def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
 
 def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: int, pitch_m: float) -> JudgedGround:
     """The ground with its pads laid for steps of `pitch_m`, the standing foot in the middle of one."""
-    if not isinstance(ground.terrain, Checkerboard):
+    if not ground.terrain.has_pads:
         return ground
     foothold = feet_motion(walker, state)[stance].along
     ahead = foothold + pitch_m
     lanes = (ahead, foothold) if stance == 1 else (foothold, ahead)
-    return JudgedGround(Checkerboard(pitch_m, lanes), ground.frame)
+    return JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
 
 
 def step_from_section(

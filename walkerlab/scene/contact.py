@@ -17,10 +17,10 @@ from walkerlab.ground.compliant import (
     contact_walker,
     pinned_walker,
 )
-from walkerlab.ground.friction import FRICTION_LAWS, FrictionLaw
+from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned, floating_state
-from walkerlab.ground.terrain import AfterMidSwing, Checkerboard, Plane
+from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
 from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
@@ -45,7 +45,7 @@ class ContactScene:
     """A walker on the ground, ready to walk."""
 
     walker: ContactWalker
-    terrain: Checkerboard | AfterMidSwing | Plane
+    terrain: Terrain
     frame: Frame
     pinned: Pinned | None  # the hinged first step, if the config wants one
     pitch_m: float
@@ -128,10 +128,10 @@ def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
     return (0.0, 0.0)
 
 
-TERRAINS: dict[str, Callable[[float], Checkerboard | AfterMidSwing | Plane]] = {
-    "checkerboard": lambda pitch: Checkerboard(pitch, (-pitch, 0.0)),
-    "after-mid-swing": AfterMidSwing,
-    "plane": Plane,
+TERRAINS: dict[str, Callable[[float], Terrain]] = {
+    "checkerboard": lambda pitch: checkerboard(pitch, (-pitch, 0.0)),
+    "after-mid-swing": after_mid_swing,
+    "plane": plane,
 }
 
 
@@ -181,7 +181,7 @@ def normal_law(contact: Contact) -> NormalLaw:
 
 def friction_law(contact: Contact) -> FrictionLaw:
     """The friction in SI; no friction is a law of its own, not a coefficient of zero."""
-    return FRICTION_LAWS[contact.friction].of(contact.in_si())
+    return law_named(contact.friction, contact.in_si())
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:

@@ -8,6 +8,7 @@ several of them.
 They exist in compiled code only.
 """
 
+import functools
 import math
 import operator
 from collections.abc import Callable
@@ -135,20 +136,26 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
     return _called("fma")(builder, a, b, c) if a.type == VECTOR else builder.fma(a, b, c)
 
 
-_ONE, _TWO, _SOME = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
-for _plain, _in_place, _instruction in (
-    (operator.add, operator.iadd, "fadd"),
-    (operator.sub, operator.isub, "fsub"),
-    (operator.mul, operator.imul, "fmul"),
-    (operator.truediv, operator.itruediv, "fdiv"),
-):
-    for _operator in (_plain, _in_place):
-        _define(_operator, _instruction_of(_instruction), _TWO)
-_define(operator.neg, lambda builder, a: builder.fneg(a), _ONE)
-_define(abs, _called("fabs"), _ONE)
-_define(math.sqrt, _called("sqrt"), _ONE)
-_define(min, _pairwise("minnum"), _SOME)
-_define(max, _pairwise("maxnum"), _SOME)
+@functools.cache
+def teach_arithmetic() -> None:
+    """Have numba know arithmetic on lanes, before the first kernel that does any is compiled.
+
+    Operators are registered for all that a process compiles, so not by an import alone.
+    """
+    one, two, some = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
+    for plain, in_place, instruction in (
+        (operator.add, operator.iadd, "fadd"),
+        (operator.sub, operator.isub, "fsub"),
+        (operator.mul, operator.imul, "fmul"),
+        (operator.truediv, operator.itruediv, "fdiv"),
+    ):
+        for each in (plain, in_place):
+            _define(each, _instruction_of(instruction), two)
+    _define(operator.neg, lambda builder, a: builder.fneg(a), one)
+    _define(abs, _called("fabs"), one)
+    _define(math.sqrt, _called("sqrt"), one)
+    _define(min, _pairwise("minnum"), some)
+    _define(max, _pairwise("maxnum"), some)
 
 
 @intrinsic

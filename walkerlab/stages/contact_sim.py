@@ -13,7 +13,7 @@ from walkerlab.config.reads import ContactConfig, ContactSimConfig, SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Knees
-from walkerlab.ground.terrain import Checkerboard
+from walkerlab.ground.terrain import Terrain
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
@@ -177,7 +177,7 @@ def knee_times(result: ContactWalkResult) -> dict[str, Any]:
 def groups(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored = {"steps": steps_group(result)}
-    if isinstance(scene.terrain, Checkerboard):
+    if scene.terrain.has_pads:
         stored["terrain"] = pads_group(scene.terrain, result)
     if result.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, result.samples)
@@ -202,17 +202,18 @@ def steps_group(result: ContactWalkResult) -> Group:
     return Group(touches(result.touch_time_s) | variables)
 
 
-def pads_group(terrain: Checkerboard, result: ContactWalkResult) -> Group:
+def pads_group(terrain: Terrain, result: ContactWalkResult) -> Group:
     """The pads from behind the start to ahead of the end."""
-    last = int(np.ceil(result.end_state[0] / terrain.pitch)) + 2
+    pitch = terrain.stride_measure
+    last = int(np.ceil(result.end_state[0] / pitch)) + 2
     numbers = range(-2, last + 1)
-    centres = np.array([number * terrain.pitch for number in numbers])
+    centres = np.array([number * pitch for number in numbers])
     legs = np.array([1 if number % 2 == 0 else 0 for number in numbers])
     return Group(
         {
             "pad": Variable(np.arange(centres.size), ("pad",), "1", "pad number"),
-            "left_m": Variable(centres - 0.5 * terrain.pitch, ("pad",), "m", "where the pad begins, along the slope"),
-            "right_m": Variable(centres + 0.5 * terrain.pitch, ("pad",), "m", "where the pad ends, along the slope"),
+            "left_m": Variable(centres - 0.5 * pitch, ("pad",), "m", "where the pad begins, along the slope"),
+            "right_m": Variable(centres + 0.5 * pitch, ("pad",), "m", "where the pad ends, along the slope"),
             "leg": Variable(legs, ("pad",), "1", "leg whose lane the pad lies in"),
         }
     )

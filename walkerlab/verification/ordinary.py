@@ -20,7 +20,6 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
-from walkerlab.ground.terrain import AfterMidSwing
 from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.paper.appendix_a import RigidWalker
@@ -79,7 +78,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
     ready = prepared(config, case)
-    if ready is None or ready.scene.pinned is not None or isinstance(ready.scene.terrain, AfterMidSwing):
+    if ready is None or ready.scene.pinned is not None or ready.scene.terrain.order_matters:
         return ()
     name, rtol, atol = REFERENCE
     walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.terrain import Checkerboard
+from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, FootMotion
 from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, Frame, feet_motion
 from walkerlab.hybrid.contact_rules import LAST_TOUCH
@@ -69,7 +69,7 @@ def rig(
     )
     walker = contact_walker(assembly, normal, friction, gravity, slope)
     frame = Frame(-ENDLESS, 1.0, (0.0, 0.0), (0.0, 0.0), True)
-    return Rig(walker, JudgedGround(Checkerboard(ENDLESS, (0.0, 0.0)), frame))
+    return Rig(walker, JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame))
 
 
 def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:

@@ -18,7 +18,7 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces, in_arrays
 from walkerlab.ground.held import BENT, FLEXED, LOCKED, RELEASED, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
-from walkerlab.ground.terrain import cell_at, cell_edges, has_ground_in_cell, has_pads
+from walkerlab.ground.terrain import Terrain, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import FootMotion
 from walkerlab.hybrid.contact_events import (
     EXTENSION,
@@ -187,14 +187,14 @@ class RuleFollower:
     def _cross_edges(self, now: Feet) -> None:
         """The pads and gaps that the feet are over now."""
         terrain, walk_state = self.scene.ground.terrain, self.walk_state
-        if not has_pads(terrain):
+        if not terrain.has_pads:
             return
         for foot in range(2):
             cell = cell_at(terrain, foot, now[foot][0])
             if cell == walk_state.cells[foot]:
                 continue
             walk_state.cells[foot] = cell
-            walk_state.has_ground[foot] = has_ground_in_cell(terrain, cell)
+            walk_state.has_ground[foot] = has_ground_in_cell(cell)
             self.edges[foot] = edges_at(terrain, foot, cell)
             if walk_state.has_ground[foot] and now[foot][1] < 0.0:
                 self._end(int(Outcome.OFF_PAD))
@@ -278,9 +278,9 @@ def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> RuleFollow
     return RuleFollower(scene, look, walk_state, feet, bends_of(scene, q, v), edges)
 
 
-def edges_at(terrain: Any, foot: int, cell: int) -> tuple[float, float]:
+def edges_at(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
     """Where a pad or gap begins and ends (m); ordinary ground does nowhere."""
-    return cell_edges(terrain, foot, cell) if has_pads(terrain) else (-math.inf, math.inf)
+    return cell_edges(terrain, foot, cell) if terrain.has_pads else (-math.inf, math.inf)
 
 
 def motions(rows: Feet) -> tuple[FootMotion, FootMotion]:
