@@ -10,9 +10,10 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.stages import contact_sim, simulate
+from walkerlab.stages import contact_sim, fixedpoint, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.walk_columns import numbers_of_steps, of_steps
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 from walkerlab.store.key import Identity
@@ -34,6 +35,13 @@ FIXED_KEYS = {
 # a result of fixedpoint, as far as contact-sim reads it: the corrected gait of the paper's slope
 GAIT = Content({}, {"state": [-0.204200, 0.169400, -0.605819, -0.861041], "step_length_m": 0.3714303})
 SLOPE, RADIUS, WEIGHT = 0.0174, 0.001, 20.0 * 9.81
+SHARED = {
+    "trajectory": {
+        "time", "leg", "stance_leg", "angle", "velocity", "hip_along_m", "hip_height_m", "foot_along_m",
+        "foot_height_m", "normal_force_N", "friction_force_N", "kinetic_J", "potential_J", "mechanical_J",
+    },
+    "steps": {"step", "touch_time_s", "period_s", "length_m", "touch_along_m", "rolling_m"},
+}  # fmt: skip
 STUMBLE = "start=[-0.2042, 0.1694, 0, 0]"
 
 
@@ -159,11 +167,43 @@ def test_the_ground_carries_the_walker_and_never_pulls(paper):
 
 def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
     rigid = simulate.run(only(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
-    ours, theirs = (walk["trajectory"].variables for walk in (paper, rigid))
-    shared = {name for name in ours.keys() & theirs if ours[name].dims == theirs[name].dims} - {"stance_leg"}
-    assert shared >= {"time", "leg", "angle", "velocity", "hip_along_m", "foot_height_m", "mechanical_J"}
-    for name in shared:
-        assert (ours[name].units, ours[name].long_name) == (theirs[name].units, theirs[name].long_name)
+    for group, expected in SHARED.items():
+        ours, theirs = (walk[group].variables for walk in (paper, rigid))
+        shared = ours.keys() & theirs
+        assert shared >= expected
+        for name in shared:
+            one, other = ours[name], theirs[name]
+            assert (one.dims, one.units, one.long_name) == (other.dims, other.units, other.long_name)
+    assert not {"penetration_m", "slip_velocity_m_s"} & rigid["trajectory"].variables.keys()
+    assert "slip_m" not in rigid["steps"].variables
+    assert {"touch_times_s", "step_periods_s", "step_lengths_m"} <= paper.summary.keys() & rigid.summary
+
+
+def test_knee_strikes_are_stored_and_said_alike(rigid_and_contact_with_knees):
+    for walk in rigid_and_contact_with_knees:
+        times, steps = walk.summary["knee_strike_times_s"], walk["steps"]
+        assert steps["knee_strike_time_s"].tolist() == times
+        touches = steps["touch_time_s"]
+        assert len(times) == touches.size == 2
+        assert (np.append(0.0, touches[:-1]) < times).all()
+        assert (times < touches).all()
+    (aliased,) = [walk.summary["knee_strikes_s"] for walk in rigid_and_contact_with_knees[1:]]
+    assert aliased == times
+
+
+@pytest.fixture(scope="module")
+def rigid_and_contact_with_knees():
+    config = load("kneed", ["strides=1", "outputs=[]"]).config
+    gait = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    stages = {"simulate": simulate, "contact-sim": contact_sim}
+    return [stage.run(only(config, PIPELINE[name].takes), gait, Silent()) for name, stage in stages.items()]
+
+
+def test_a_knee_that_does_not_lock_is_a_gap():
+    kneed = of_steps([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
+    np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
+    told = numbers_of_steps(*np.array([[0.7, 1.4], [0.7, 0.7], [0.3, 0.3], [0.5, np.nan]]))
+    assert told["knee_strike_times_s"] == [0.5, None]
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):
