@@ -10,7 +10,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.stages import contact_sim, fixedpoint, simulate
+from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.walk_columns import numbers_of_steps, of_steps
@@ -177,26 +177,6 @@ def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
     assert not {"penetration_m", "slip_velocity_m_s"} & rigid["trajectory"].variables.keys()
     assert "slip_m" not in rigid["steps"].variables
     assert {"touch_times_s", "step_periods_s", "step_lengths_m"} <= paper.summary.keys() & rigid.summary
-
-
-def test_knee_strikes_are_stored_and_said_alike(rigid_and_contact_with_knees):
-    for walk in rigid_and_contact_with_knees:
-        times, steps = walk.summary["knee_strike_times_s"], walk["steps"]
-        assert steps["knee_strike_time_s"].tolist() == times
-        touches = steps["touch_time_s"]
-        assert len(times) == touches.size == 2
-        assert (np.append(0.0, touches[:-1]) < times).all()
-        assert (times < touches).all()
-    (aliased,) = [walk.summary["knee_strikes_s"] for walk in rigid_and_contact_with_knees[1:]]
-    assert aliased == times
-
-
-@pytest.fixture(scope="module")
-def rigid_and_contact_with_knees():
-    config = load("kneed", ["strides=1", "outputs=[]"]).config
-    gait = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
-    stages = {"simulate": simulate, "contact-sim": contact_sim}
-    return [stage.run(only(config, PIPELINE[name].takes), gait, Silent()) for name, stage in stages.items()]
 
 
 def test_a_knee_that_does_not_lock_is_a_gap():
