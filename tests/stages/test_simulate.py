@@ -2,10 +2,12 @@
 
 import json
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
@@ -102,6 +104,17 @@ def test_forces_and_energies_in_time_agree_with_the_summary(paper):
     total = trajectory["kinetic_J"] + trajectory["potential_J"]
     assert trajectory["mechanical_J"] == pytest.approx(total, rel=1e-15)
     assert total == pytest.approx(summary["mean_energy_J"], rel=1e-9)
+
+
+def test_what_a_step_rolled_is_how_far_the_stance_foots_lowest_point_moved():
+    config = load(Path("round-feet"), ["strides=2"]).config
+    inputs = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    walk = simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+    trajectory = walk["trajectory"]
+    for step, rolled in enumerate(walk["steps"]["rolling_m"]):
+        along = trajectory["foot_along_m"][trajectory["step"] == step, 1 - step % 2]
+        assert rolled == pytest.approx(along[-1] - along[0], abs=1e-12)
+        assert rolled > 0.01
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_said():
