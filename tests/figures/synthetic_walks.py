@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from walkerlab.stages.walk_columns import of_steps, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
@@ -50,20 +51,7 @@ def motion(steps, period, jumps):
 
 def energies(time, level):
     kinetic = 4.0 + np.cos(9.0 * time)
-    return {
-        "kinetic_J": Variable(kinetic, ("time",), "J", "kinetic energy"),
-        "potential_J": Variable(level - kinetic, ("time",), "J", "potential energy"),
-        "mechanical_J": Variable(np.full(time.size, level), ("time",), "J", "mechanical energy"),
-    }
-
-
-def states(time, stance, angle, velocity):
-    return {
-        "time": Variable(time, ("time",), "s", "time"),
-        "stance_leg": Variable(stance, ("time",), "1", "leg that stands"),
-        "angle": Variable(angle, ("time", "leg"), "rad", "angle of the leg"),
-        "velocity": Variable(velocity, ("time", "leg"), "rad/s", "angular velocity of the leg"),
-    }
+    return over_time(kinetic_J=kinetic, potential_J=level - kinetic, mechanical_J=np.full(time.size, level))
 
 
 def joints(step, stance, angle):
@@ -71,51 +59,42 @@ def joints(step, stance, angle):
     from_hip = LEG_LENGTH * np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
     hip = np.stack((step * STEP_LENGTH, 0.0 * step), axis=-1) - from_hip[np.arange(step.size), stance]
     feet = hip[:, None] + from_hip
-    return {
-        "hip_along_m": Variable(hip[:, 0], ("time",), "m", "hip along the slope"),
-        "hip_height_m": Variable(hip[:, 1], ("time",), "m", "hip over the slope"),
-        "foot_along_m": Variable(feet[..., 0], ("time", "leg"), "m", "foot along the slope"),
-        "foot_height_m": Variable(feet[..., 1], ("time", "leg"), "m", "foot over the slope"),
-    }
+    return over_time(
+        hip_along_m=hip[:, 0], hip_height_m=hip[:, 1], foot_along_m=feet[..., 0], foot_height_m=feet[..., 1]
+    )
 
 
-def per_step(period, count, strikes, **more):
-    columns = {"period_s": np.full(count, period), "length_m": np.full(count, STEP_LENGTH), strikes: more.pop(strikes)}
-    return Group({name: Variable(values, ("step",), "1", name) for name, values in {**columns, **more}.items()})
+def trajectory(step, time, angle, velocity, level):
+    stance = 1 - step % 2
+    moving = over_time(time=time, stance_leg=stance, angle=angle, velocity=velocity)
+    return {**moving, **energies(time, level), **joints(step, stance, angle)}
+
+
+def walked(period, count):
+    """What is stored of the steps, if there are any."""
+    number = np.arange(1, count + 1)
+    columns = of_steps(
+        period * number,
+        period_s=np.full(count, period),
+        length_m=np.full(count, STEP_LENGTH),
+        touch_along_m=STEP_LENGTH * number,
+    )
+    return {"steps": Group(columns)} if count else {}
 
 
 def rigid(steps=10, period=0.7, outcome="walked", completed=None):
     """The result of `simulate`; `completed` steps, and the rest of the time on the way to no heel strike."""
     time, step, angle, velocity = motion(steps, period, jumps=True)
     done = steps if completed is None else completed
-    trajectory = {
-        **states(time, 1 - step % 2, angle, velocity),
-        **energies(time, 150.24),
-        **joints(step, 1 - step % 2, angle),
-        "step": Variable(step, ("time",), "1", "step"),
-    }
-    groups = {"trajectory": Group(trajectory)}
-    if done:
-        times = period * np.arange(1, done + 1)
-        groups["steps"] = per_step(period, done, "heel_strike_time_s", heel_strike_time_s=times)
+    numbered = {"step": Variable(step, ("time",), "1", "step")}
+    groups = {"trajectory": Group(trajectory(step, time, angle, velocity, 150.24) | numbered), **walked(period, done)}
     return stored("simulate", groups, {"outcome": outcome, "steps": done, "slope_rad": SLOPE})
 
 
 def contact(steps=10, period=0.71, outcome="walked", pads=True):
     """The result of `contact-sim`."""
     time, step, angle, velocity = motion(steps, period, jumps=False)
-    touches = period * np.arange(1, steps + 1)
-    stance = 1 - step % 2
-    trajectory = {
-        **states(time, stance, angle, velocity),
-        **energies(time, 150.0),
-        **joints(step, stance, angle),
-    }
-    landings = STEP_LENGTH * np.arange(1, steps + 1)
-    groups = {
-        "trajectory": Group(trajectory),
-        "steps": per_step(period, steps, "touch_time_s", touch_time_s=touches, touch_along_m=landings),
-    }
+    groups = {"trajectory": Group(trajectory(step, time, angle, velocity, 150.0)), **walked(period, steps)}
     if pads:
         groups["terrain"] = pads_group(steps)
     summary = {"outcome": outcome, "steps": steps, "slope_rad": SLOPE, "pitch_m": STEP_LENGTH}

@@ -171,7 +171,7 @@ def test_captions_are_sentences_with_numbers(name):
 def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
     results = both_models()
     expected = {
-        RIGID.colour: results["simulate"]["steps"]["heel_strike_time_s"].tolist(),
+        RIGID.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),
         CONTACT.colour: results["contact-sim"]["steps"]["touch_time_s"].tolist(),
     }
     for figure in (figure_07.FIGURE, figure_10.FIGURE):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from walkerlab.config.loader import load
+from walkerlab.stages.walk_columns import legs, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
@@ -79,6 +80,7 @@ def walk(outcome="walked", steps=STEPS, **changed):
         "steps": steps,
         "step_periods_s": [PERIOD] * steps,
         "step_lengths_m": [LENGTH] * steps,
+        "touch_times_s": [PERIOD * (step + 1) for step in range(steps)],
         **changed,
     }
 
@@ -101,31 +103,27 @@ def rigid_trajectory(steps):
     step = np.minimum((time / PERIOD).astype(int), max(steps, 1) - 1)
     spread = math.asin(LENGTH / 2) * np.cos(np.pi * (time / PERIOD))
     angle = np.column_stack((-spread, spread)) - SLOPE
-    return Group(
-        {
-            "time": column(time, "time", "s", "time"),
-            "leg": column([0, 1], "leg"),
-            "step": column(step, "time"),
-            "stance_leg": column(1 - step % 2, "time"),
-            "angle": Variable(angle, ("time", "leg"), "rad", "angle of the leg"),
-        }
-    )
+    stance = 1 - step % 2
+    tilted = angle + SLOPE
+    leg = np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
+    hip = np.column_stack((LENGTH * step, 0.0 * step)) - leg[np.arange(step.size), stance]
+    feet = hip[:, None] + leg
+    places = {"hip_along_m": hip[:, 0], "hip_height_m": hip[:, 1], "foot_along_m": feet[..., 0]}
+    places |= {"foot_height_m": feet[..., 1]}
+    seen = over_time(time=time, stance_leg=stance, angle=angle, **places)
+    return Group({**seen, **legs(), "step": column(step, "time")})
 
 
 def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
     time = np.linspace(0.0, max(steps, 1) * PERIOD, 60)
-    pair = ("time", "leg")
     feet = np.column_stack((0.5 * time - 0.1, 0.5 * time + 0.1))
-    trajectory = Group(
-        {
-            "time": column(time, "time", "s", "time"),
-            "leg": column([0, 1], "leg"),
-            "angle": Variable(np.zeros((60, 2)), pair, "rad", "angle"),
-            "hip_along_m": column(0.5 * time, "time", "m"),
-            "hip_height_m": column(np.linspace(0.98, hip, 60), "time", "m"),
-            "foot_along_m": Variable(feet, pair, "m", "position of the foot"),
-            "foot_height_m": Variable(np.zeros((60, 2)), pair, "m", "height of the foot"),
-        }
+    seen = over_time(
+        time=time,
+        angle=np.zeros((60, 2)),
+        hip_along_m=0.5 * time,
+        hip_height_m=np.linspace(0.98, hip, 60),
+        foot_along_m=feet,
+        foot_height_m=np.zeros((60, 2)),
     )
     numbers = {
         "end_time_s": max(steps, 1) * PERIOD,
@@ -140,30 +138,27 @@ def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
         "pitch_m": LENGTH,
         "friction": "creeping friction of its own kind",
     }
-    return stored("contact-sim", {"trajectory": trajectory}, walk(outcome, steps, **(numbers | changed)))
+    return stored("contact-sim", {"trajectory": Group({**seen, **legs()})}, walk(outcome, steps, **(numbers | changed)))
 
 
 def with_motion(result):
     """The same result, whose trajectory also has what the player's other views show: velocities, energies, forces."""
     trajectory = result.groups["trajectory"]
     time = trajectory["time"]
-    pair, wave = ("time", "leg"), np.sin(9.0 * time)
+    wave = np.sin(9.0 * time)
     both = np.column_stack((wave, -wave))
-    more = {
-        "velocity": Variable(both, pair, "rad/s", "velocity"),
-        "kinetic_J": column(4.0 + wave, "time", "J"),
-        "potential_J": column(146.0 - wave, "time", "J"),
-        "mechanical_J": column(150.0 + 0.0 * wave, "time", "J"),
-    }
+    more = over_time(
+        velocity=both, kinetic_J=4.0 + wave, potential_J=146.0 - wave, mechanical_J=np.full_like(wave, 150.0)
+    )
     if result.identity.stage == "contact-sim":
         loaded = np.column_stack((wave > 0.0, wave <= 0.0))
-        more |= {
-            "angle": Variable(0.2 * both, pair, "rad", "angle"),
-            "normal_force_N": Variable(196.0 * loaded, pair, "N", "normal force"),
-            "friction_force_N": Variable(10.0 * both * loaded, pair, "N", "friction"),
-            "penetration_m": Variable(6e-5 * np.abs(both) * loaded, pair, "m", "penetration"),
-            "slip_velocity_m_s": Variable(1e-3 * both, pair, "m/s", "slip velocity"),
-        }
+        more |= over_time(
+            angle=0.2 * both,
+            normal_force_N=196.0 * loaded,
+            friction_force_N=10.0 * both * loaded,
+            penetration_m=6e-5 * np.abs(both) * loaded,
+            slip_velocity_m_s=1e-3 * both,
+        )
     groups = {**result.groups, "trajectory": Group({**trajectory.variables, **more})}
     return stored(result.identity.stage, groups, result.summary)
 
@@ -174,12 +169,12 @@ def families_that_move(walk):
     seen = walk.groups["trajectory"].variables
     time = seen["time"].values
     feet = np.column_stack((0.6 * time, 0.5 * time))
-    joints = {
-        "hip_along_m": column(0.5 * time, "time", "m"),
-        "hip_height_m": column(0.98 + 0.0 * time, "time", "m"),
-        "foot_along_m": Variable(feet, ("time", "leg"), "m", "foot"),
-        "foot_height_m": Variable(0.0 * feet, ("time", "leg"), "m", "foot"),
-    }
+    joints = over_time(
+        hip_along_m=0.5 * time,
+        hip_height_m=np.full_like(time, 0.98),
+        foot_along_m=feet,
+        foot_height_m=np.zeros_like(feet),
+    )
     two = {
         f"rigid/branch_0/motion_{place}": Group({**seen, **joints}, {"value": value, "slope_rad": slope, "steps": 1})
         for place, value, slope in ((0, 1.0, 0.02), (3, 5.0, 0.09))

@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 from html_page import Page
 
@@ -38,6 +39,21 @@ def test_both_models_walk_on_plain_ground(run):
     assert compared["outcomes"] == {"rigid": "walked", "contact": "walked"}
     assert compared["steps"]["rigid"]["period_s"] == pytest.approx(compared["steps"]["gait"]["period_s"], rel=1e-8)
     assert compared["dissipated_J"]["knee_strikes"] > 0.0
+
+
+def test_knee_strikes_are_stored_and_said_alike_in_both_models(run):
+    results, _ = run
+    for stage in ("simulate", "contact-sim"):
+        times, steps = results.summary(stage)["knee_strike_times_s"], results.group(stage, "steps")
+        assert steps["knee_strike_time_s"].tolist() == times
+        touches = steps["touch_time_s"]
+        assert len(times) == touches.size == 4
+        assert (np.append(0.0, touches[:-1]) < times).all()
+        assert (times < touches).all()
+        within = times[-1] - touches[-2]
+        model = results.summary("compare")["steps"]["rigid" if stage == "simulate" else "contact"]
+        assert model["knee_strike_s"] == pytest.approx(within, abs=1e-15)
+    assert results.summary("contact-sim")["knee_strikes_s"] == times
 
 
 def test_the_instant_of_release_decides_which_gait_is_walked(run):

@@ -14,7 +14,8 @@ from walkerlab.stages import compare, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.stages.walk_columns import of_steps, over_time
+from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 
 SLOWER = 1.01
@@ -54,25 +55,19 @@ def gaits(study):
 def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
     """The rigid walk, a little slower and without samples at its heel strikes, laid out as a contact walk."""
     done, trajectory = rigid["steps"], rigid["trajectory"]
-    touches = SLOWER * done["heel_strike_time_s"][:steps]
+    touches = SLOWER * done["touch_time_s"][:steps]
     end = touches[-1] if steps else 0.3
     apart = np.diff(trajectory["time"], append=np.inf) > 1e-9
     apart &= np.diff(trajectory["time"], prepend=-np.inf) > 1e-9
     kept = apart & (SLOWER * trajectory["time"] <= end)
     columns = {
-        "time": (SLOWER * trajectory["time"], ("time",), "s"),
-        "angle": (trajectory["angle"], ("time", "leg"), "rad"),
-        "velocity": (trajectory["velocity"] / SLOWER, ("time", "leg"), "rad/s"),
-        "mechanical_J": (trajectory["mechanical_J"], ("time",), "J"),
+        "time": SLOWER * trajectory["time"],
+        "angle": trajectory["angle"],
+        "velocity": trajectory["velocity"] / SLOWER,
+        "mechanical_J": trajectory["mechanical_J"],
     }
-    variables = {
-        name: Variable(values[kept][:samples], dims, units, name)
-        for name, (values, dims, units) in columns.items()
-        if name not in leave_out
-    }
-    groups = {"trajectory": Group(variables)}
-    if steps:
-        groups["steps"] = Group({"touch_time_s": Variable(touches, ("step",), "s", "touch")})
+    seen = {name: values[kept][:samples] for name, values in columns.items() if name not in leave_out}
+    groups = {"trajectory": Group(over_time(**seen))} | ({"steps": Group(of_steps(touches))} if steps else {})
     return Content(
         groups,
         {

@@ -13,6 +13,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
+from walkerlab.stages.walk_columns import numbers_of_steps, of_steps
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 from walkerlab.store.key import Identity
@@ -34,6 +35,13 @@ FIXED_KEYS = {
 # a result of fixedpoint, as far as contact-sim reads it: the corrected gait of the paper's slope
 GAIT = Content({}, {"state": [-0.204200, 0.169400, -0.605819, -0.861041], "step_length_m": 0.3714303})
 SLOPE, RADIUS, WEIGHT = 0.0174, 0.001, 20.0 * 9.81
+SHARED = {
+    "trajectory": {
+        "time", "leg", "stance_leg", "angle", "velocity", "hip_along_m", "hip_height_m", "foot_along_m",
+        "foot_height_m", "normal_force_N", "friction_force_N", "kinetic_J", "potential_J", "mechanical_J",
+    },
+    "steps": {"step", "touch_time_s", "period_s", "length_m", "touch_along_m", "rolling_m"},
+}  # fmt: skip
 STUMBLE = "start=[-0.2042, 0.1694, 0, 0]"
 
 
@@ -159,11 +167,23 @@ def test_the_ground_carries_the_walker_and_never_pulls(paper):
 
 def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
     rigid = simulate.run(only(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
-    ours, theirs = (walk["trajectory"].variables for walk in (paper, rigid))
-    shared = {name for name in ours.keys() & theirs if ours[name].dims == theirs[name].dims} - {"stance_leg"}
-    assert shared >= {"time", "leg", "angle", "velocity", "hip_along_m", "foot_height_m", "mechanical_J"}
-    for name in shared:
-        assert (ours[name].units, ours[name].long_name) == (theirs[name].units, theirs[name].long_name)
+    for group, expected in SHARED.items():
+        ours, theirs = (walk[group].variables for walk in (paper, rigid))
+        shared = ours.keys() & theirs
+        assert shared >= expected
+        for name in shared:
+            one, other = ours[name], theirs[name]
+            assert (one.dims, one.units, one.long_name) == (other.dims, other.units, other.long_name)
+    assert not {"penetration_m", "slip_velocity_m_s"} & rigid["trajectory"].variables.keys()
+    assert "slip_m" not in rigid["steps"].variables
+    assert {"touch_times_s", "step_periods_s", "step_lengths_m"} <= paper.summary.keys() & rigid.summary
+
+
+def test_a_knee_that_does_not_lock_is_a_gap():
+    kneed = of_steps([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
+    np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
+    told = numbers_of_steps(*np.array([[0.7, 1.4], [0.7, 0.7], [0.3, 0.3], [0.5, np.nan]]))
+    assert told["knee_strike_times_s"] == [0.5, None]
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):

@@ -13,7 +13,7 @@ CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.Method
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
-    "walk": walk_columns.OVER_TIME,
+    "walk": walk_columns.OVER_TIME | walk_columns.OF_STEPS,
     "limit": tune_limit.FACTORS | tune_limit.DISTANCES | tune_limit.OF_WALKS,
 }
 

@@ -2,10 +2,12 @@
 
 import json
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
@@ -68,7 +70,9 @@ def test_steps_table_agrees_with_the_summary(paper):
     assert steps["period_s"].tolist() == summary["step_periods_s"]
     assert steps["length_m"].tolist() == summary["step_lengths_m"]
     assert steps["state_after"][-1].tolist() == summary["final_state"]
-    assert steps["heel_strike_time_s"] == pytest.approx(np.cumsum(summary["step_periods_s"]), rel=1e-14)
+    assert steps["touch_time_s"] == pytest.approx(np.cumsum(summary["step_periods_s"]), rel=1e-14)
+    assert steps["touch_time_s"].tolist() == summary["touch_times_s"]
+    assert steps["touch_along_m"] == pytest.approx(np.cumsum(summary["step_lengths_m"]), rel=1e-14)
     # the legs change roles: what swung stands, what stood swings
     assert (steps["state_before"][:, [1, 0]] == steps["state_after"][:, :2]).all()
 
@@ -92,10 +96,25 @@ def test_leg_0_swings_first_and_the_legs_take_turns(paper):
 
 def test_forces_and_energies_in_time_agree_with_the_summary(paper):
     trajectory, summary = paper["trajectory"], paper.summary
-    assert trajectory["normal_force_N"].min() == pytest.approx(summary["min_normal_force_N"], rel=1e-4)
+    stands = trajectory["stance_leg"][:, None] == trajectory["leg"]
+    normal, friction = trajectory["normal_force_N"], trajectory["friction_force_N"]
+    assert normal[stands].min() == pytest.approx(summary["min_normal_force_N"], rel=1e-4)
+    assert (normal[~stands] == 0.0).all()
+    assert (friction[~stands] == 0.0).all()
     total = trajectory["kinetic_J"] + trajectory["potential_J"]
     assert trajectory["mechanical_J"] == pytest.approx(total, rel=1e-15)
     assert total == pytest.approx(summary["mean_energy_J"], rel=1e-9)
+
+
+def test_what_a_step_rolled_is_how_far_the_stance_foots_lowest_point_moved():
+    config = load(Path("round-feet"), ["strides=2"]).config
+    inputs = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    walk = simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+    trajectory = walk["trajectory"]
+    for step, rolled in enumerate(walk["steps"]["rolling_m"]):
+        along = trajectory["foot_along_m"][trajectory["step"] == step, 1 - step % 2]
+        assert rolled == pytest.approx(along[-1] - along[0], abs=1e-12)
+        assert rolled > 0.01
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_said():
@@ -106,6 +125,7 @@ def test_what_outputs_do_not_ask_for_is_left_out_and_said():
     energies = run(outputs=["energies"])
     assert set(energies["trajectory"].variables) == {
         "time",
+        "leg",
         "step",
         "stance_leg",
         "kinetic_J",

@@ -265,9 +265,10 @@ def test_many_strings_that_share_one_long_text_are_not_read(path, identity):
     assert "more data than the file holds" in refusal(path, identity.key)
 
 
-def test_a_file_of_another_layout_is_outdated_and_not_damaged(path, identity):
+@pytest.mark.parametrize("version", [1, 10**6])
+def test_a_file_of_another_layout_is_outdated_and_not_damaged(path, identity, version):
     with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = 10**6
+        file.attrs["schema_version"] = version
     path.write_bytes(sealed(path.read_bytes()))
     verdict = artifact.check(path, identity.key)
     assert not verdict.accepted

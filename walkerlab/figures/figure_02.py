@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from walkerlab.figures.canvas import legend_above
 from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.stick_diagram import Sticks, cycle_caption, draw_slope, entries, stick_diagram, stored_sticks
-from walkerlab.figures.walks import JOINTS, NO_STATES, RIGID_STAGE, STATES, STEPS, STEPS_TAKEN_RIGID, TRAJECTORY
+from walkerlab.figures.walks import JOINTS, NO_STATES, RIGID_STAGE, STATES, STEPS_TAKEN_RIGID, TRAJECTORY
 
 
 def plot(results: Results) -> Figure:
@@ -26,7 +25,7 @@ def plot(results: Results) -> Figure:
 def sticks_of(results: Results) -> Sticks:
     """The joints' places as the walk has stored them."""
     result = results[RIGID_STAGE]
-    sticks = stored_sticks(result, "heel_strike_time_s", np.concatenate(([0.0], np.cumsum(result[STEPS]["length_m"]))))
+    sticks = stored_sticks(result)
     # a compass has point feet in the rigid model, whatever its ball feet
     return replace(sticks, radius=0.0) if result.identity.config_slice["walker"]["type"] == "compass" else sticks
 

@@ -8,20 +8,19 @@ from walkerlab.figures.illustration import paper_figure
 from walkerlab.figures.in_time import legend, line, time_axes
 from walkerlab.figures.needs import Need, Results
 from walkerlab.figures.style import CONTACT, RIGID, Look
-from walkerlab.figures.walks import Walk, shown, strike_times
+from walkerlab.figures.walks import Walk, shown, touch_times
 from walkerlab.store.content import Content
 
 TUNE_STAGE = "tune"
 STATES = ("time", "velocity")
 ADJUSTED = Need(TUNE_STAGE, "adjusted", STATES, "no start of those searched walks")
 FROM_RIGID = Need(TUNE_STAGE, "rigid_start", STATES, "the rigid model took no step")
-TOUCHES = "touch_time_s"
 
 
 def walk_from(result: Content, group: str, look: Look, outcome: str) -> Walk:
     """A walk that `tune` stored in one of its groups."""
     stored = result[group]
-    times = strike_times(Content({"steps": stored}), TOUCHES)
+    times = touch_times(stored)
     return Walk(look, outcome, times.size, times, stored["time"], {"velocity": stored["velocity"]})
 
 

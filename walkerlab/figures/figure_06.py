@@ -23,7 +23,7 @@ from walkerlab.figures.stick_diagram import (
     stored_sticks,
 )
 from walkerlab.figures.style import LEGS
-from walkerlab.figures.walks import CONTACT_STAGE, JOINTS, NO_STATES, STATES, STEPS, STEPS_TAKEN_CONTACT, TRAJECTORY
+from walkerlab.figures.walks import CONTACT_STAGE, JOINTS, NO_STATES, STATES, STEPS_TAKEN_CONTACT, TRAJECTORY
 from walkerlab.store.content import Group
 
 TERRAIN = "terrain"
@@ -50,8 +50,7 @@ def plot(results: Results) -> Figure:
 
 def sticks_of(results: Results) -> Sticks:
     """The joints' places as the walk has stored them."""
-    result = results[CONTACT_STAGE]
-    return stored_sticks(result, "touch_time_s", np.concatenate(([0.0], result[STEPS]["touch_along_m"])))
+    return stored_sticks(results[CONTACT_STAGE])
 
 
 def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> None:

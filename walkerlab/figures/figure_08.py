@@ -18,7 +18,6 @@ from walkerlab.figures.walks import (
     COMPARE_STAGE,
     NO_STATES,
     RIGID_STAGE,
-    RIGID_STRIKES,
     STEPS_TAKEN_RIGID,
     Array,
     Walk,
@@ -114,7 +113,7 @@ def times_of(walk: Walk, phases: Array) -> Array:
 
 def rigid_walk(results: Results) -> Walk:
     """The walk over whose steps the errors are shown."""
-    walks, _ = shown([walk_of(results[RIGID_STAGE], RIGID, RIGID_STRIKES, ("time",))])
+    walks, _ = shown([walk_of(results[RIGID_STAGE], RIGID, ("time",))])
     return walks[0]
 
 

@@ -112,13 +112,9 @@ class Sticks:
         return np.asarray(right - left_is_nearer, dtype=np.int64)
 
 
-def stored_sticks(result: Stored, strikes: str, landings: Array) -> Sticks:
-    """The joints' places as a walk has stored them.
-
-    strikes   the name under which the times of its steps' ends are stored
-    landings  (1 + steps,) m along the slope
-    """
-    trajectory, walker = result["trajectory"], result.identity.config_slice["walker"]
+def stored_sticks(result: Stored) -> Sticks:
+    """The joints' places as a walk has stored them."""
+    trajectory, steps, walker = result["trajectory"], result["steps"], result.identity.config_slice["walker"]
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
@@ -131,8 +127,8 @@ def stored_sticks(result: Stored, strikes: str, landings: Array) -> Sticks:
         trajectory["time"],
         hip,
         joints("foot"),
-        result["steps"][strikes],
-        landings,
+        steps["touch_time_s"],
+        np.append(0.0, steps["touch_along_m"]),
         slope,
         joints("knee") if "knee_along_m" in trajectory.variables else None,
         sole_radius(walker),

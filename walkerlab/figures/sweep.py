@@ -22,7 +22,7 @@ MOST_PANELS: Final = 4
 MOST_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
 PREFERRED: Final[tuple[str, ...]] = (
-    "period_s", "spectral_radius", "step_length_m", "steps", "mean_period_s", "slip_per_step_m", "max_penetration_m",
+    "period_s", "spectral_radius", "step_length_m", "steps", "slip_per_step_m", "max_penetration_m",
     "min_normal_force_N", "energy_drift_J", "end_time_s",
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"

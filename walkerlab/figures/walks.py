@@ -23,14 +23,14 @@ ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
 NO_STATES = "'states' is not among the config's outputs"
 NO_ENERGIES = "'energies' is not among the config's outputs"
 NO_STEP = "no step was completed"
-RIGID_STRIKES, CONTACT_STRIKES = "heel_strike_time_s", "touch_time_s"
+TOUCHES = "touch_time_s"
 
 RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATES, NO_STATES)
 RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
-STEPS_TAKEN_RIGID = Need(RIGID_STAGE, STEPS, (RIGID_STRIKES, "length_m"), NO_STEP)
+STEPS_TAKEN_RIGID = Need(RIGID_STAGE, STEPS, (TOUCHES, "touch_along_m"), NO_STEP)
 CONTACT_STATES = Need(CONTACT_STAGE, TRAJECTORY, STATES, NO_STATES)
 CONTACT_ENERGIES = Need(CONTACT_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
-STEPS_TAKEN_CONTACT = Need(CONTACT_STAGE, STEPS, (CONTACT_STRIKES, "touch_along_m"), NO_STEP)
+STEPS_TAKEN_CONTACT = Need(CONTACT_STAGE, STEPS, (TOUCHES, "touch_along_m"), NO_STEP)
 
 PAPER_STRIDES = 5
 """Strides that the paper's figures in time show; a longer walk's figures show its first ones."""
@@ -85,26 +85,24 @@ class Walk:
 
 def walks_with(results: Results, rigid: Need, contact: Need) -> list[Walk]:
     """The walks of the models whose results have what is needed, the rigid model's first."""
-    offers = ((rigid, RIGID, RIGID_STRIKES), (contact, CONTACT, CONTACT_STRIKES))
     return [
-        walk_of(results[need.stage], look, strikes, need.variables)
-        for need, look, strikes in offers
+        walk_of(results[need.stage], look, need.variables)
+        for need, look in ((rigid, RIGID), (contact, CONTACT))
         if need.missing_in(results, {}) is None
     ]
 
 
-def walk_of(result: Content, look: Look, strikes: str, variables: tuple[str, ...]) -> Walk:
+def walk_of(result: Content, look: Look, variables: tuple[str, ...]) -> Walk:
     """The walk that a stage has stored, with the variables that are wanted."""
     trajectory = result[TRAJECTORY]
-    times = strike_times(result, strikes)
+    times = touch_times(result.groups.get(STEPS, Group({})))
     samples = {name: trajectory[name] for name in variables}
     return Walk(look, str(result.summary["outcome"]), times.size, times, trajectory["time"], samples)
 
 
-def strike_times(result: Content, name: str) -> Array:
+def touch_times(steps: Group) -> Array:
     """Times of the heel strikes (s); none if no step was completed."""
-    steps = result.groups.get(STEPS, Group({}))
-    return np.asarray(steps[name], dtype=np.float64) if name in steps.variables else np.zeros(0)
+    return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
 def sentence(walks: list[Walk]) -> str:

@@ -84,6 +84,11 @@ class RecordedWalk:
         return int(self.heel_strikes.size)
 
     @property
+    def touch_along(self) -> Array:
+        """Where the feet came down (steps,), in m along the slope from the first foothold."""
+        return np.cumsum(self.lengths)
+
+    @property
     def final_state(self) -> State:
         """State after the last heel strike; the start if there was none."""
         return as_state(self.after[-1]) if self.steps else self.start

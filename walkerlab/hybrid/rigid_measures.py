@@ -61,7 +61,7 @@ def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedW
     """
     n = len(walker.arm_x)
     psi = samples.state[:, :n] + walker.slope
-    touches = np.concatenate(([0.0], np.cumsum(walk.lengths)))[samples.step]
+    touches = np.append(0.0, walk.touch_along)[samples.step]
     set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
     contact = touches - walker.radius * (samples.state[:, STANCE] - set_down)
     centre = np.column_stack((contact, np.full_like(contact, walker.radius)))

@@ -92,7 +92,7 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
         state=state,
         slope=walker.slope,
         energy=float(energies(walker, start).sum()),
-        weight=walker.tree.mass * walker.gravity,
+        weight=float(walker.mass * walker.gravity),
         normal_force=float(reactions(walker, start)[0, 1]),
         pull_from=first_below_zero(walk.samples.time, reactions(walker, walk.samples.state)[:, 1]),
         heel_strikes=walk.steps,

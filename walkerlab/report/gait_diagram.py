@@ -115,7 +115,7 @@ def gaits(results: Results, across: DiagramAxis, up: DiagramAxis) -> Iterator[Ga
     for path, branch in branches_of(results):
         for place, value in enumerate(branch["value"].tolist()):
             moving = results.group("continuation", f"{path}/motion_{place}")
-            track = None if moving is None else track_in(results.config, {}, moving)
+            track = None if moving is None else track_in(moving)
             if moving is None or track is None:
                 continue
             steps, stable = int(moving.attrs["steps"]), bool(branch["stable"][place])

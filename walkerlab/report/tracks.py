@@ -6,7 +6,6 @@ import base64
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,16 @@ from walkerlab.store.content import Group
 
 SAMPLES_A_SECOND = 150
 LEGS = (0, 1)
+OF_THE_WALKER = {
+    "time": "t", "hip_along_m": "hx", "hip_height_m": "hy", "torso_angle": "u", "stance_leg": "s",
+    "kinetic_J": "ke", "potential_J": "pe", "mechanical_J": "me",
+}  # fmt: skip
+OF_A_LEG = {
+    "foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky",
+    "angle": "a", "velocity": "v", "shank_angle": "b",
+    "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
+}  # fmt: skip
+"""Channels by the names of stored variables."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -67,50 +76,23 @@ class Track:
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
-def track_of(config: RigidConfig, result: Stored) -> Track | None:
+def track_of(result: Stored) -> Track | None:
     """The motion that a stage stored; None if it stored none, or none that tells where the joints are."""
     trajectory = result.groups.get("trajectory")
-    return None if trajectory is None else track_in(config, result.summary, trajectory)
+    return None if trajectory is None else track_in(trajectory)
 
 
-def track_in(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Track | None:
+def track_in(trajectory: Group) -> Track | None:
     """The motion in a stored trajectory; None if it does not tell where the joints are."""
-    if "angle" not in trajectory.variables or trajectory["time"].size < 2:
+    if "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
-    channels = {"t": trajectory["time"]} | joints(config, summary, trajectory)
-    if "hx" not in channels:
-        return None
-    channels |= pairs(trajectory, {"angle": "a", "velocity": "v", "shank_angle": "b"})
-    channels |= forces(trajectory)
-    channels |= singles(trajectory, {"kinetic_J": "ke", "potential_J": "pe", "mechanical_J": "me"})
-    channels |= singles(trajectory, {"torso_angle": "u", "stance_leg": "s"})
+    channels = singles(trajectory, OF_THE_WALKER) | pairs(trajectory, OF_A_LEG)
+    if {"penetration_m", "slip_velocity_m_s"} <= trajectory.variables.keys():
+        for leg in LEGS:
+            touching = trajectory["penetration_m"][:, leg] > 0.0
+            velocity = trajectory["slip_velocity_m_s"][:, leg]
+            channels[f"q{leg}"] = slip_since_touch(trajectory["time"], velocity, touching)
     return Track({name: np.asarray(values, dtype=np.float64) for name, values in channels.items()})
-
-
-def joints(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Channels:
-    """Hip, feet and knees as they were stored, or of a walker on points from its angles; nothing if unknown."""
-    if "hip_along_m" in trajectory.variables:
-        names = {"foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky"}
-        return singles(trajectory, {"hip_along_m": "hx", "hip_height_m": "hy"}) | pairs(trajectory, names)
-    if config.walker.type == "compass" and {"stance_leg", "step"} <= trajectory.variables.keys():
-        return from_angles(config, summary, trajectory)
-    return {}
-
-
-def from_angles(config: RigidConfig, summary: Mapping[str, Any], trajectory: Group) -> Channels:
-    """Hip and feet of legs that stand on points, from their angles and the steps' lengths (eqs. A.1 to A.3)."""
-    length = config.walker.leg_length_m
-    footholds: Any = np.concatenate(([0.0], np.cumsum(summary["step_lengths_m"])))
-    tilted = trajectory["angle"] + config.slope_rad
-    row = np.arange(tilted.shape[0])
-    stance = tilted[row, trajectory["stance_leg"].astype(np.int64)]
-    foothold = footholds[np.minimum(trajectory["step"], footholds.size - 1)]
-    hip = {"hx": foothold - length * np.sin(stance), "hy": length * np.cos(stance)}
-    feet: Channels = {}
-    for leg in LEGS:
-        feet[f"fx{leg}"] = hip["hx"] + length * np.sin(tilted[:, leg])
-        feet[f"fy{leg}"] = hip["hy"] - length * np.cos(tilted[:, leg])
-    return hip | feet
 
 
 def singles(trajectory: Group, names: Mapping[str, str]) -> Channels:
@@ -122,32 +104,6 @@ def pairs(trajectory: Group, names: Mapping[str, str]) -> Channels:
     """Variables with a value for each leg, a channel a leg; those that there are."""
     there = {name: channel for name, channel in names.items() if name in trajectory.variables}
     return {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in there.items() for leg in LEGS}
-
-
-def forces(trajectory: Group) -> Channels:
-    """Forces of the ground on each foot, and how deep and how far each has gone since its touch."""
-    variables = trajectory.variables
-    if "normal_force_N" not in variables:
-        return {}
-    if trajectory["normal_force_N"].ndim == 1:
-        return forces_on_stance(trajectory)
-    found = pairs(trajectory, {"normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p"})
-    if {"penetration_m", "slip_velocity_m_s"} <= variables.keys():
-        for leg in LEGS:
-            touching = trajectory["penetration_m"][:, leg] > 0.0
-            found[f"q{leg}"] = slip_since_touch(trajectory["time"], trajectory["slip_velocity_m_s"][:, leg], touching)
-    return found
-
-
-def forces_on_stance(trajectory: Group) -> Channels:
-    """The one force of a rigid walk, given to the foot that stands."""
-    found: Channels = {}
-    for leg in LEGS:
-        stands = trajectory["stance_leg"] == leg
-        for name, channel in (("normal_force_N", "n"), ("tangential_force_N", "d")):
-            if name in trajectory.variables:
-                found[f"{channel}{leg}"] = np.where(stands, trajectory[name], 0.0)
-    return found
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:

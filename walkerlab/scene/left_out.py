@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 LeftOut = dict[str, str]
 PAPERS = "it is the paper's procedure with its compass"
-RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 2}
+RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 """How many numbers a sample each output takes, model by model."""
 

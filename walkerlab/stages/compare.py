@@ -12,7 +12,7 @@ from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
+from walkerlab.hybrid.comparison import Array, Motion, sampled_at_strikes
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
@@ -43,7 +43,7 @@ from walkerlab.stages.compared_releases import LEFT_OUT, KneedStart, compare_rel
 from walkerlab.stages.compared_tables import numbers_group, table_group
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import rows_group
-from walkerlab.store.content import Content
+from walkerlab.store.content import Content, Group
 
 STEPS_OF_A_STRIDE = 2
 SAMPLES_OF_A_MOTION = 2
@@ -114,11 +114,12 @@ NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     """Period (s) and length (m) of a walk's last step and how long into it a knee locked (s); None if it took none."""
-    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strikes_s")
+    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:
         return step
-    return {**step, "knee_strike_s": strikes[-1] - sum(periods[:-1]) if strikes[-1] >= 0.0 else None}
+    begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
+    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
 
 
 def row_summary(row: JudgedNumber) -> dict[str, Any]:
@@ -147,23 +148,21 @@ def motion_of(walk: Content) -> Motion | None:
     trajectory = walk.groups.get("trajectory")
     if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < SAMPLES_OF_A_MOTION:
         return None
-    strikes = walk.summary.get("knee_strikes_s", walk.summary.get("knee_strike_times_s", []))
+    strikes = times_of_steps(walk, "knee_strike_time_s")
     motion = Motion(
         trajectory["time"],
         trajectory["angle"],
         trajectory["velocity"],
-        step_ends(walk),
-        np.array([strike for strike in strikes if strike > 0.0]),
+        times_of_steps(walk, "touch_time_s"),
+        strikes[strikes > 0.0],
     )
     return sampled_at_strikes(motion)
 
 
-def step_ends(walk: Content) -> Any:
-    """Times (s) of the heel strikes or touches of a stored walk."""
-    steps = walk.groups.get("steps")
-    if steps is None:
-        return np.zeros(0)
-    return steps["heel_strike_time_s" if "heel_strike_time_s" in steps.variables else "touch_time_s"]
+def times_of_steps(walk: Content, name: str) -> Array:
+    """Times (s) that a stored walk has of its steps; none of a walk without a step, and of what the walker has not."""
+    steps = walk.groups.get("steps", Group({}))
+    return steps[name] if name in steps.variables else np.zeros(0)
 
 
 def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
@@ -231,7 +230,7 @@ def energy_of(walk: Content) -> EnergyRecord | None:
     trajectory = walk.groups.get("trajectory")
     if trajectory is None or "mechanical_J" not in trajectory.variables:
         return None
-    return over_last_steps(trajectory["time"], trajectory["mechanical_J"], step_ends(walk))
+    return over_last_steps(trajectory["time"], trajectory["mechanical_J"], times_of_steps(walk, "touch_time_s"))
 
 
 def start_of(walk: Content) -> State | None:

@@ -38,7 +38,7 @@ from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import method_named
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
-from walkerlab.stages.walk_columns import LEG, NORMAL_FORCE, STEP, TIME, at_samples, legs, of_body, over_time, touches
+from walkerlab.stages.walk_columns import TIME, legs, numbers_of_steps, of_body, of_steps, over_time
 from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
@@ -142,9 +142,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
     return {
         "outcome": result.outcome.label,
         "advice": result.advice,
-        "steps": int(result.touch_time_s.size),
-        "step_periods_s": result.periods_s.tolist(),
-        "step_lengths_m": result.lengths_m.tolist(),
+        **numbers_of_steps(result.touch_time_s, result.periods_s, result.lengths_m, knee_strikes(scene, result)),
         "end_time_s": result.end_time_s,
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": mean_of(result.slip_m),
@@ -153,7 +151,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, result.dissipated_J),
-        **knee_times(result),
+        **({"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}),  # until 0.3
         "rhs_evaluations": int(result.work[0]),
         "accepted_steps": int(result.work[1]),
         "rejected_steps": int(result.work[2]),
@@ -169,37 +167,36 @@ def mean_of(values: Floats) -> float | None:
     return float(np.mean(values)) if values.size else None
 
 
-def knee_times(result: ContactWalkResult) -> dict[str, Any]:
-    """When the swing leg's knee locked in each step (s), for walkers with knees."""
-    return {"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}
+def knee_strikes(scene: ContactScene, result: ContactWalkResult) -> Floats | None:
+    """When the swing leg's knee locked in each step (s), nan where it did not; None without knees."""
+    if not isinstance(scene.walker.knees, Knees):
+        return None
+    return np.where(result.knee_strike_s < 0.0, np.nan, result.knee_strike_s)
 
 
 def groups(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
-    stored = {"steps": steps_group(result)}
+    stored = {"steps": steps_group(scene, result)} if result.touch_time_s.size else {}
     if scene.terrain.has_pads:
         stored["terrain"] = pads_group(scene.terrain, result)
     if result.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, result.samples)
-    return {name: group for name, group in stored.items() if group is not None}
+    return stored
 
 
-def steps_group(result: ContactWalkResult) -> Group:
+def steps_group(scene: ContactScene, result: ContactWalkResult) -> Group:
     """One row a step."""
-    rows = (
-        ("period_s", result.periods_s, "s", "time from touch to touch"),
-        ("length_m", result.lengths_m, "m", "distance along the slope from touch to touch"),
-        ("touch_along_m", result.touch_along_m, "m", "where that touch is, along the slope from the first foothold"),
+    return Group(
+        of_steps(
+            result.touch_time_s,
+            period_s=result.periods_s,
+            length_m=result.lengths_m,
+            touch_along_m=result.touch_along_m,
+            knee_strike_time_s=knee_strikes(scene, result),
+            slip_m=result.slip_m,
+            rolling_m=result.rolling_m,
+        )
     )
-    to_lift = (
-        ("slip_m", result.slip_m, "net slip of the stance foot's material from its touch to its lift"),
-        ("rolling_m", result.rolling_m, "how far the stance foot rolled from its touch to its lift"),
-    )
-    variables = {name: Variable(values, (STEP,), units, text) for name, values, units, text in rows}
-    for name, values, text in to_lift:
-        gap = np.full(result.touch_time_s.size - values.size, np.nan)
-        variables[name] = Variable(np.append(values, gap), (STEP,), "m", text, missing=True)
-    return Group(touches(result.touch_time_s) | variables)
 
 
 def pads_group(terrain: Terrain, result: ContactWalkResult) -> Group:
@@ -221,12 +218,7 @@ def pads_group(terrain: Terrain, result: ContactWalkResult) -> Group:
 
 def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: ContactSamples) -> Group:
     """Samples of the walk: what `outputs` asks for."""
-    per_leg = (TIME, LEG)
-    variables = {
-        **over_time(time=samples.time_s),
-        **legs(),
-        "stance_leg": Variable(samples.stance, (TIME,), "1", "leg of the last step's touch"),
-    }
+    variables = {**over_time(time=samples.time_s, stance_leg=samples.stance), **legs()}
     feet = np.zeros((samples.time_s.size, 2, 5))
     sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
     if "states" in config.outputs:
@@ -235,14 +227,12 @@ def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: Con
         variables |= energy_variables(scene, samples, feet)
     if "forces" in config.outputs:
         depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
-        variables |= {
-            "penetration_m": Variable(depth, per_leg, "m", "depth of the foot in the ground that carries it"),
-            "normal_force_N": at_samples(feet[:, :, 2], NORMAL_FORCE),
-            "friction_force_N": Variable(feet[:, :, 3], per_leg, "N", "friction on the foot, positive downhill"),
-            "slip_velocity_m_s": Variable(
-                feet[:, :, 4], per_leg, "m/s", "velocity of the foot's lowest material point"
-            ),
-        }
+        variables |= over_time(
+            normal_force_N=feet[:, :, 2],
+            friction_force_N=feet[:, :, 3],
+            penetration_m=depth,
+            slip_velocity_m_s=feet[:, :, 4],
+        )
     return Group(variables)
 
 

@@ -12,13 +12,13 @@ from walkerlab.config.reads import SimulateConfig, StartConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state, take_walk
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
+from walkerlab.mechanics.standing import STANCE
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
-from walkerlab.stages.walk_columns import STEP, TIME, legs, of_body, over_time
-from walkerlab.store.columns import numbered
+from walkerlab.stages.walk_columns import COORDINATE, STEP, TIME, legs, numbers_of_steps, of_body, of_steps, over_time
 from walkerlab.store.content import Content, Group, Variable
 
 
@@ -47,9 +47,7 @@ def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
     return {
         "outcome": walk.outcome.label,
         "advice": walk.outcome.advice,
-        "steps": walk.steps,
-        "step_periods_s": walk.periods.tolist(),
-        "step_lengths_m": walk.lengths.tolist(),
+        **numbers_of_steps(walk.heel_strikes, walk.periods, walk.lengths, walk.knee_strikes),
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,
@@ -57,7 +55,6 @@ def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio or None,
         "max_scuff_depth_m": walk.max_scuff_depth,
-        **({} if walk.knee_strikes is None else {"knee_strike_times_s": walk.knee_strikes.tolist()}),
         "rhs_evaluations": walk.work.rhs_evaluations,
         "accepted_steps": walk.work.accepted,
         "rejected_steps": walk.work.rejected,
@@ -79,18 +76,19 @@ def groups(scene: RigidScene, walk: RecordedWalk) -> dict[str, Group]:
 
 def steps_group(scene: RigidScene, walk: RecordedWalk) -> Group:
     """One row a step."""
-    states = (STEP, "coordinate")
-    return Group(
-        {
-            **numbered(walk.steps, STEP, "step number"),
-            "coordinate": Variable(np.array(scene.names), ("coordinate",), "", "coordinate of the state"),
-            "period_s": Variable(walk.periods, (STEP,), "s", "time from heel strike to heel strike"),
-            "length_m": Variable(walk.lengths, (STEP,), "m", "distance between the feet at heel strike"),
-            "heel_strike_time_s": Variable(walk.heel_strikes, (STEP,), "s", "time of the heel strike at the end"),
-            "state_before": Variable(walk.before, states, "rad, rad/s", "state just before that heel strike"),
-            "state_after": Variable(walk.after, states, "rad, rad/s", "state just after it, roles changed"),
-        }
+    set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
+    columns = of_steps(
+        walk.heel_strikes,
+        period_s=walk.periods,
+        length_m=walk.lengths,
+        touch_along_m=walk.touch_along,
+        knee_strike_time_s=walk.knee_strikes,
+        rolling_m=scene.walker.radius * (set_down - walk.before[:, STANCE]),
+        state_before=walk.before,
+        state_after=walk.after,
     )
+    names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
+    return Group({**columns, COORDINATE: names})
 
 
 def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) -> Group:
@@ -98,9 +96,9 @@ def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) ->
     # leg 0 swings in even steps, leg 1 in odd ones
     stance = 1 - samples.step % 2
     variables = {
-        **over_time(time=samples.time),
+        **over_time(time=samples.time, stance_leg=stance),
+        **legs(),
         STEP: Variable(samples.step, (TIME,), "1", "step number"),
-        "stance_leg": Variable(stance, (TIME,), "1", "leg that stands"),
     }
     if scene.states:
         variables |= leg_variables(samples, stance)
@@ -110,11 +108,11 @@ def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) ->
         kinetic, potential = energies(scene.walker, samples.state).T
         variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if scene.forces:
-        force = reactions(scene.walker, samples.state, samples.bent)
-        variables |= {
-            "tangential_force_N": Variable(force[:, 0], (TIME,), "N", "force of the ground along the slope, downhill"),
-            "normal_force_N": Variable(force[:, 1], (TIME,), "N", "force of the ground normal to the slope"),
-        }
+        friction, normal = (
+            of_legs(np.column_stack((np.zeros_like(force), force)), stance)
+            for force in reactions(scene.walker, samples.state, samples.bent).T
+        )
+        variables |= over_time(normal_force_N=normal, friction_force_N=friction)
     return Group(variables)
 
 
@@ -123,7 +121,7 @@ def leg_variables(samples: Samples, stance: Any) -> dict[str, Variable]:
     n = samples.state.shape[1] // 2
     angle = of_legs(samples.state[:, :2], stance)
     velocity = of_legs(samples.state[:, n : n + 2], stance)
-    return {**legs(), **over_time(angle=angle, velocity=velocity)}
+    return over_time(angle=angle, velocity=velocity)
 
 
 def of_legs(by_role: Any, stance: Any) -> Any:

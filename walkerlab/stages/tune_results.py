@@ -20,7 +20,7 @@ from walkerlab.paper.adams_start import AdamsWalk
 from walkerlab.paper.printed import TABLE_2, StartRow
 from walkerlab.scene.contact import ContactScene
 from walkerlab.stages.simulate import leg_variables
-from walkerlab.stages.walk_columns import NORMAL_FORCE, TIME, at_samples, legs, over_time, touches
+from walkerlab.stages.walk_columns import TIME, legs, of_steps, over_time
 from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Group, Variable
 
@@ -280,8 +280,7 @@ def walk_group(walk: ContactWalkResult, walker: ContactWalker) -> Group | None:
     """Angles and velocities of a walk of the contact model; None if nothing was sampled."""
     if walk.samples is None or walk.samples.time_s.size == 0:
         return None
-    of_steps = touches(walk.touch_time_s) if walk.touch_time_s.size else {}
-    return Group({**legs_in_time(walk.samples, walker), **of_steps})
+    return Group({**legs_in_time(walk.samples, walker), **of_steps(walk.touch_time_s)})
 
 
 def rigid_group(walk: RecordedWalk) -> Group | None:
@@ -289,8 +288,8 @@ def rigid_group(walk: RecordedWalk) -> Group | None:
     samples = walk.samples
     if samples is None or samples.time.size == 0:
         return None
-    of_steps = touches(walk.heel_strikes) if walk.steps else {}
-    return Group({**over_time(time=samples.time), **leg_variables(samples, 1 - samples.step % 2), **of_steps})
+    in_time = {**legs(), **over_time(time=samples.time), **leg_variables(samples, 1 - samples.step % 2)}
+    return Group({**in_time, **of_steps(walk.heel_strikes)})
 
 
 def legs_in_time(samples: ContactSamples, walker: ContactWalker) -> dict[str, Variable]:
@@ -305,7 +304,7 @@ def paper_group(paper: AdamsWalk, walker: ContactWalker) -> Group:
     return Group(
         {
             **({} if samples is None else legs_in_time(samples, walker)),
-            "normal_force_N": at_samples(paper.normal, NORMAL_FORCE),
+            **over_time(normal_force_N=paper.normal),
             "mechanical_J": Variable(paper.mechanical, (TIME,), "J", "kinetic and potential energy"),
         }
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 from walkerlab.config.canonical import canonical_json
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Of the artifacts' layout: raise it when files written before must not be read any more."""
 
 

@@ -25,7 +25,7 @@ def section(results: Results) -> Section | None:
     tracks: dict[str, Track] = {}
     for stage in MODELS:
         result = results.stored.get(stage)
-        track = None if result is None else track_of(results.config, result)
+        track = None if result is None else track_of(result)
         if track is not None:
             tracks[stage] = track
     if not tracks:
@@ -60,9 +60,9 @@ def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
     times = []
     for stage in MODELS:
-        periods = (results.summary(stage) or {}).get("step_periods_s", [])
-        if len(periods) >= MAX_STEPS:
-            times.append(sum(periods[:MAX_STEPS]))
+        touches = (results.summary(stage) or {}).get("touch_times_s", [])
+        if len(touches) >= MAX_STEPS:
+            times.append(touches[MAX_STEPS - 1])
     return max(times) if times else math.inf
 
 
@@ -70,7 +70,7 @@ def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
     """A model's motion and how it ended."""
     summary = results.stored[stage].summary
     thin = track.thinned(gap)
-    strikes = [float(time) for time in np.cumsum(summary["step_periods_s"]) if time <= track.end + 1e-9]
+    strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     ended = "" if summary["outcome"] == WALKED else ends(summary["outcome"])
     return Walker(
         name=MODELS[stage],
