@@ -171,7 +171,7 @@ def reductions() -> list[Reduction]:
         Reduction("all outputs, so dense states", "all outputs", scenes=(whole, none)),
         Reduction("all outputs of the rigid walk", "all outputs", scenes=(rigid(), rigid(outputs()))),
         Reduction(
-            "dissipation: the energy's books",
+            "dissipation: the energy balance",
             "kept along the walk",
             works=(partial(with_books, True), partial(with_books, False)),
             note="contact-sim keeps them, and so do searches and maps: a walk that does not balance is no answer",
