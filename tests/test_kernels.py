@@ -286,3 +286,22 @@ def test_a_kernel_is_told_of_until_it_is_compiled_itself_and_not_only_what_it_ca
     with watched(told.append):
         assert module.outer(1.0) == 4.0
     assert told == ["outer", "inner", "outer", ""]
+
+
+@pytest.mark.parametrize("stops", [KeyboardInterrupt, TypeError])
+def test_a_kernel_whose_compiling_is_stopped_gives_its_lock_back(stops, tmp_path, monkeypatch):
+    path = tmp_path / "stopped_kernels.py"
+    path.write_text(NESTED)
+    spec = importlib.util.spec_from_file_location("stopped_kernels", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+    def stop(*_):
+        raise stops
+
+    monkeypatch.setattr(kernels.Compiler, "compile_extra", stop)
+    with pytest.raises(stops):
+        module.inner(1.0)
+    assert kernels.compiling == []
+    monkeypatch.undo()
+    assert module.inner(1.0) == 2.0

@@ -43,6 +43,30 @@ def test_one_job_is_done_here_and_so_is_what_comes_first():
     assert os.getpid() not in (ids[0], ids[2])
 
 
+LOADS_SLOWLY = """
+import pathlib, time
+
+
+class Slow:
+    def __set_name__(self, owner, name):
+        pathlib.Path(__file__).with_suffix(".begun").touch()
+        time.sleep(60.0)
+
+
+class Holder:
+    slow = Slow()
+"""
+
+
+def test_a_worker_that_is_told_to_end_while_it_loads_says_nothing(tmp_path, monkeypatch, capfd):
+    (tmp_path / "loads_slowly.py").write_text(LOADS_SLOWLY)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with WorkerPool(1, ("loads_slowly",)) as one:
+        one.start_all()
+        until((tmp_path / "loads_slowly.begun").exists)
+    assert capfd.readouterr().err == ""
+
+
 def test_an_error_comes_back_as_it_is_with_its_traceback(pool):
     with pytest.raises(ZeroDivisionError) as caught:
         pool.start(calls.divide_by_zero).result()

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from walkerlab.config.fields import Block
@@ -191,6 +192,8 @@ def sweep(
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     found = resolve(str(config), settings(set), runs=Path(runs))
+    if not isinstance(over, Mapping):
+        raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
     block = found.template.base.config.sweep or SweepBlock()
     question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
@@ -383,7 +386,9 @@ def typed_lines(lines: Mapping[str, Any]) -> tuple[Config, Tree]:
 
 
 def settings(values: Mapping[str, Any] | None) -> list[str]:
-    """Values of keys as `--set` options."""
+    """Values of keys as `--set` options; ConfigError if they are no mapping of keys to values."""
+    if not isinstance(values, Mapping | NoneType):
+        raise ConfigError(f"set: {values!r} is not a mapping of keys to values.", 'For example set={"slope_deg": 3}.')
     return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
 
 

@@ -351,7 +351,7 @@ class _KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
         gc.set_threshold(*SELDOM)
         try:
             return super().compile_extra(func)
-        except Exception:  # whatever stops it goes on to the caller; the kernel's lock and name do not stay behind
+        except BaseException:  # whatever stops it goes on to the caller; the kernel's lock and name do not stay behind
             if compiling and compiling[-1][0].kernel == func.__name__:
                 cache, signature = compiling[-1]
                 cache.finish(signature)

@@ -264,14 +264,15 @@ def serve(number: int, modules: Sequence[str]) -> None:
     number  of the open file that calls come through
     """
     os.set_inheritable(number, False)
-    signal.signal(signal.SIGTERM, leave)
     line = Connection(number)
     _lines.append(line)
     calls: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=receive, args=(line, calls), daemon=True).start()
+    # Until there is something to drop, a process that is told to end just ends.
+    for module in modules:
+        importlib.import_module(module)
     with contextlib.suppress(LeaveError):
-        for module in modules:
-            importlib.import_module(module)
+        signal.signal(signal.SIGTERM, leave)
         while True:
             line.send_bytes(answer(calls.get()))
 

@@ -67,11 +67,12 @@ def test_show_prints_summary_arrays_and_origin(toy):
     assert value["provenance"]["config"].startswith("name: paper")
 
 
-def test_show_of_nothing_exits_5_and_of_something_outdated_warns(toy):
+def test_show_of_no_run_exits_3_of_no_result_5_and_of_something_outdated_warns(toy):
     done = toy("show", "drop")
-    assert done.returncode == 5
+    assert done.returncode == 3  # there is no such run
     assert "advice: `walkerlab drop` makes it." in done.stderr
     toy("drop")
+    assert toy("show", "roll").returncode == 5  # the run has no such result
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text() + "# changed\n")
     done = toy("show", "drop")

@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
 from walkerlab.cli.text import described_summary
-from walkerlab.errors import StaleError
+from walkerlab.errors import ConfigError, StaleError
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import survey
@@ -23,6 +23,8 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     """Print a stage's artifact, current or not; StaleError if there is none that can be read."""
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
+    if not request.folder.path.is_dir():
+        raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` makes it.")
     if step.found is None:
         why = "there is none yet" if step.reason == NOT_THERE else step.reason
         raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` makes it.")

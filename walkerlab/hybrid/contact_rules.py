@@ -42,9 +42,9 @@ FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
 BENT_KNEE = int(Outcome.BENT_KNEE)
 GOES_ON = -1
 
-# indices into Ledger.times
+# indices into WalkState.times
 LAST_TOUCH, AIRBORNE_SINCE = 0, 1
-# indices into Ledger.feet
+# indices into WalkState.feet
 STANCE, STEPS = 0, 1
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin, builtin_names, find
 from walkerlab.config.loader import EarlierRun, Template, template
 from walkerlab.errors import ConfigError
-from walkerlab.stages.runs import config_text, find_run
+from walkerlab.stages.runs import config_text, find_run, read_all, stored_in
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged
 from walkerlab.store.runfolder import RunFolder
@@ -73,8 +73,9 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, EarlierRun] | None:
         return None
     config = config_text(folder)
     if config is None:
+        bad = "".join(f" {why}." for why in read_all(folder, stored_in(folder))[1].values())
         raise ConfigError(
-            f"{folder.path} has no result to take a config from.", "Give a run folder, an artifact or a file."
+            f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )
     return folder, EarlierRun(config, folder.name, str(folder.path))
 

@@ -76,8 +76,13 @@ def config_text(folder: RunFolder) -> str | None:
     record = folder.record()
     if record is not None:
         return record.config
-    found = read_all(folder, (path.stem for path in folder.path.glob("*.h5")))[0].values()
+    found = read_all(folder, stored_in(folder))[0].values()
     return max(found, key=lambda stored: stored.provenance.ended_utc).provenance.config if found else None
+
+
+def stored_in(folder: RunFolder) -> list[str]:
+    """The stages of whose results there are files in a folder, whether or not they can be read."""
+    return [path.stem for path in folder.path.glob("*.h5")]
 
 
 def config_of(folder: RunFolder) -> Config | None:

@@ -20,6 +20,8 @@ LEAST_CHUNK_S: Final = 0.5
 LARGEST_CHUNK: Final = 1000
 SHARES: Final = 3
 """A chunk is at most this part of what is left to a worker, so that all end together."""
+BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
+"""What no worker's death is, but a fault of this program's outside any point."""
 MOST_DEATHS: Final = 12
 """Deaths before any chunk has come back, after which it is the machine and not the points."""
 
@@ -106,7 +108,9 @@ class FanOut:
         self.keep(chunk)
 
     def _failed(self, one: Try, error: BaseException) -> None:
-        """Try a chunk again, then split it, then give its point up."""
+        """Try a chunk again, then split it, then give its point up; a bug is raised."""
+        if isinstance(error, BUGS):
+            raise error
         self._deaths += 1
         said = f"{type(error).__name__}: {error}"
         if self._deaths > MOST_DEATHS and not self._alive:
