@@ -32,7 +32,7 @@ from walkerlab.orbits.fixed_point import GaitSearch, Search, SearchSettings, fin
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.random_starts import LEAST_START, MOST_START, SHORTEST_STEP
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import NO_RESIDUAL, on_section, residual_alone, section_of
+from walkerlab.orbits.step_map import WALKED, evaluate, on_section, section_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.stepping import T
@@ -214,14 +214,13 @@ def overlooks(walker: Standing) -> bool:
     starts[:, 0] = 0.5 * starts[:, 0] - still
 
     def residual(z: NDArray[np.float64]) -> NDArray[np.float64]:
-        walks = residual_alone(looking, z) < NO_RESIDUAL
-        return looking.z_next - z if walks else np.ones(d)
+        return looking.z_next - z if evaluate(looking, z)[0] == WALKED else np.ones(d)
 
-    walking = [z for z in starts if residual_alone(looking, z) < NO_RESIDUAL]
+    walking = [z for z in starts if evaluate(looking, z)[0] == WALKED]
     for z in walking[:TRIED]:
         solved = root(residual, z, options={"maxfev": EVALUATIONS})
-        left = residual_alone(looking, solved.x)
-        if left < SOLVED and abs(solved.x[0] + still) > APART and looking.plain.clock[T] > SHORTEST_STEP:
+        left = np.abs(residual(solved.x)).max()
+        if left < SOLVED and abs(solved.x[0] + still) > APART and looking.method.clock[T] > SHORTEST_STEP:
             return True
     return False
 

@@ -68,13 +68,13 @@ from walkerlab.config.loader import template
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.engines import Order
 from walkerlab.sweeps.question import asked, axis_of_text
-from walkerlab.sweeps.sweep import Sweep, Work
+from walkerlab.sweeps.sweep import SweepRun, SweepWork
 from toy_sweep.sweep_pipeline import GRAPH
 read = template()
 question = asked("deadly", [axis_of_text("seed=100:179:80")])
-sweep = Sweep(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
+sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
 order = Order(2, modules=("toy_sweep.deadly",))
-swept = sweep.run(Work(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
+swept = sweep.run(SweepWork(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
 print(swept.content.digest(), swept.failed)
 """
 

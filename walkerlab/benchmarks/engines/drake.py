@@ -77,7 +77,7 @@ def slip_share(model: str, load: float) -> float:
     return high
 
 
-class DrakeRun(Simulation):
+class EngineRun(Simulation):
     """A diagram, its simulator and its context."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

@@ -59,7 +59,7 @@ def tuned(model: str, target: EngineContact) -> OwnContact:
     return OwnContact(model, settings)
 
 
-class ExudynRun(Simulation):
+class EngineRun(Simulation):
     """A system of one tree, and its contacts."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

@@ -53,7 +53,7 @@ def tuned(model: str, target: EngineContact) -> OwnContact:
     return OwnContact(model, settings)
 
 
-class MujocoRun(Simulation):
+class EngineRun(Simulation):
     """A model and its data."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

@@ -132,7 +132,7 @@ class EngineWalk:
         if not ENGINES[task.engine].adapter().INTEGRATORS[stepping.integrator].adapts:
             stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
         law = self.rules.look.forces if task.own is None else task.own
-        engine = ENGINES[task.engine].adapter().Run(self.rules.scene.model, stepping, self.q, self.v, law)
+        engine = ENGINES[task.engine].adapter().EngineRun(self.rules.scene.model, stepping, self.q, self.v, law)
         since = self.time_s
         self.hand_over_ground(engine)
 
@@ -184,7 +184,7 @@ class SwingTask:
         q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])), rcond=None)[
             0
         ].T
-        engine = ENGINES[self.engine].adapter().Run(self.model, self.stepping, q, v, None)
+        engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v, None)
         begun = time.process_time()
         last = recorded(engine, self.most, self.until_s)[-1]
         wall = time.process_time() - begun
@@ -266,7 +266,7 @@ class Bench:
         )
         name = self.adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, ROUNDING if self.adapter.INTEGRATORS[name].adapts else None)
-        engine = self.adapter.Run(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
+        engine = self.adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
         return EngineMotion(recorded(engine, MANY, steps * h))
