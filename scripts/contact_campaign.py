@@ -167,7 +167,7 @@ def kneed(seed: int) -> Drawn:
     exponent, depth_mm, ratio = die.choice((1.0, 1.5, 2.2, 2.2)), die.choice(SINKS_MM[1:]), die.choice((0.3, 1.0, 3.0))
     full = depth_mm
     if seed % 9 in LOSSY:
-        ratio, full = 7.0, 0.15 * depth_mm
+        ratio, depth_mm, full = 7.0, 0.3, 0.05
     damping = 2.0 * ratio * (exponent * weight / depth_mm * weight / 9.81 / 1000.0) ** 0.5
     static, stiction = die.choice((0.9, 0.9, 0.9, 0.3)), die.choice((10.0, 10.0, 100.0))
     slope = round(KNEED_SLOPE * die.uniform(0.8, 1.4), 5)
