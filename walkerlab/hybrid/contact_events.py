@@ -42,6 +42,7 @@ EVENT_FUNCTIONS = SLIDE + 5
 NO_SIDE = 0  # of an event function that may cross zero either way
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
+ROUNDING = 1e-14  # m, rad or their rates: what event functions are zero to
 
 
 class Frame(NamedTuple):
@@ -295,14 +296,19 @@ def earliest_crossing(
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
     """Fraction at which an event function crosses to the other side of zero than it is known to be on.
 
-    At once if it is there already: the step before, which ended for another event, went past its zero, or on it.
+    At once if it is there already: the step before, which ended for another event, went past its zero, or on it. Not
+    while rounding alone has moved it from zero: a foot whose hinge is released, say, may still sink in.
     """
-    zero_at_start = zero_at_start or finder.values[event, 0] == 0.0
+    zero_at_start = zero_at_start or abs(finder.values[event, 0]) < ROUNDING
     if side != NO_SIDE:
-        beyond = zero_at_start or side * finder.values[event, 0] < 0.0
+        beyond, farthest = zero_at_start or side * finder.values[event, 0] < 0.0, ROUNDING
         if zero_at_start:
+            farthest = 0.0
             for j in range(1, finder.nodes.size):
                 beyond = beyond and side * finder.values[event, j] < 0.0
+                farthest = max(farthest, abs(finder.values[event, j]))
+        if farthest < ROUNDING:
+            return NO_CROSSING
         if beyond:
             return 0.0
     return first_crossing(finder, event, -side, 0.0, zero_at_start)
