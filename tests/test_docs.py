@@ -69,6 +69,8 @@ def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
         words = [word for word in words if not word.startswith("runs/") and word != "-c"]
     for name in (word for word in words if word.endswith(".yaml") and not word.startswith("configs/")):
         (tmp_path / name).write_text("extends: paper\n", encoding="utf-8")
+    if words[0] == "show":
+        (tmp_path / "runs" / "paper").mkdir(parents=True)  # a run, without results
     dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
     done = CliRunner().invoke(program(), [*words, *dry])
     assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
