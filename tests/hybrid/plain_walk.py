@@ -359,8 +359,8 @@ def take_steps(walker, y, h, hinged, diary):
     side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
     while done < steps or leaving[0] or leaving[1]:
         counts[ROUNDS] += 1
-        aloft = grounded_at + 0.25 * tau - t
-        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, has_ground)), aloft)
+        deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
+        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, has_ground)), deadline)
         new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
         g = event_values(walker, new, cells, stance, touched)
         low, high, event = 0.0, dt, -1
@@ -402,7 +402,7 @@ def take_steps(walker, y, h, hinged, diary):
         for foot in range(2):
             if side[3 * foot] < 0.0 and has_ground[foot]:
                 grounded_at = t
-        if t - last > 10.0 * tau:
+        if t - last > 10.0 * tau - ROUNDING:
             outcome = NO_HEEL_STRIKE
             break
         if t - grounded_at > 0.25 * tau - ROUNDING:
