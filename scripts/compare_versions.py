@@ -86,7 +86,7 @@ def span(over: str, first: float, last: float) -> tuple[str, ...]:
 # What a name's last part is compared by: the first row that fits. None: exempt.
 TOLERANCES: tuple[tuple[str, tuple[float, float] | None], ...] = (
     # counts of work, and what is rounding or wall clock by nature
-    (r"rhs_evaluations|evaluations|accepted|rejected|newton|work|solves|steps_tried|trajectories_per_s", None),
+    (r".*(evaluations|accepted|rejected|jacobians|newton|solves).*|work|steps_tried|trajectories_per_s", None),
     (r".*residual.*|.*drift.*|.*wall.*|.*(_per_s|seconds)$|.*cpu.*|iterations|rounding|spent.*|.*saves.*", None),
     (r"lyapunov.*|exponent_uncertainty|uncertainty|.*attractor.*|chaotic.*", None),
     (r"numerical_error.*|.*step_error.*|.*objective.*", None),
