@@ -121,7 +121,7 @@ def answered(result: ContactWalkResult, wall_s: float, touches: int) -> WalkAnsw
 
 
 @dataclass(frozen=True)
-class Measured:
+class EngineExperiment:
     """One engine, or this project beside it, in one experiment on one scene."""
 
     scene: EngineScene
@@ -167,7 +167,7 @@ class Measured:
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
     """Our own method over its ladder of tolerances, on the same walk."""
-    measured = Measured(scene, OURS, version, SAME_LAW, truth)
+    experiment = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
     for rtol in OUR_LADDER:
         walls = []
@@ -175,21 +175,21 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
             begun = time.process_time()
             result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
             walls.append(time.process_time() - begun)
-        yield measured.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answered(result, median(walls), TOUCHES))
+        yield experiment.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answered(result, median(walls), TOUCHES))
 
 
 def same_law_rows(
     engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess
 ) -> Iterator[EngineRow]:
     """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
-    measured = Measured(scene, engine.name, version, SAME_LAW, truth)
+    experiment = EngineExperiment(scene, engine.name, version, SAME_LAW, truth)
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
             continue
         for stepping in ladder_of(name, integrator, truth.until_s):
             task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
-            row = measured.row(name, stepping, answer)
+            row = experiment.row(name, stepping, answer)
             yield row
             late = isinstance(answer, TaskLost) and answer.timed_out
             if late or (row.error is not None and row.error < EXACT_ENOUGH):
@@ -268,7 +268,7 @@ def own_law_rows(
     Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
     would take more is not begun.
     """
-    measured = Measured(scene, engine.name, version, OWN_LAW, truth)
+    experiment = EngineExperiment(scene, engine.name, version, OWN_LAW, truth)
     name = engine.adapter().CONTACTS[contact]
     integrator = engine.adapter().INTEGRATORS[name]
     most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
@@ -276,7 +276,7 @@ def own_law_rows(
     def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
-        row = measured.row(contact, stepping, answer, factor)
+        row = experiment.row(contact, stepping, answer, factor)
         if isinstance(answer, TaskLost):
             return row, most if answer.timed_out else 0
         return row, answer.steps
@@ -305,12 +305,12 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
     """ADAMS's law on the same starts, by our own walk."""
-    measured, tolerance = Measured(scene, OURS, version, OWN_LAW), 1e-7
+    experiment, tolerance = EngineExperiment(scene, OURS, version, OWN_LAW), 1e-7
     for factor in (1.0, *STARTS):
         begun = time.process_time()
         result = walked(scene.started(factor), OUR_METHOD, tolerance, OWN_TOUCHES)
         answer = answered(result, time.process_time() - begun, OWN_TOUCHES)
-        yield measured.row("impact", Stepping(OUR_METHOD, 0.0, tolerance), answer, factor)
+        yield experiment.row("impact", Stepping(OUR_METHOD, 0.0, tolerance), answer, factor)
 
 
 def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
