@@ -3,16 +3,20 @@
     python scripts/kill_campaign.py                      # 200 kills of forced rigid-only runs
     python scripts/kill_campaign.py --stage report --config paper --kills 20 --spread
     python scripts/kill_campaign.py --stage report --config paper --together 2 8   # so many on one folder at once
+    python scripts/kill_campaign.py --sweeps --kills 50                  # a sweep of fixed points, or a worker of it
 
 Half of the moments fall anywhere in a run, half are when a file of the folder has just begun to change.
 With --spread the moments fall on all results alike: each time another one is missing from a whole folder and being made
 when the run is killed, so that a kill takes no longer than its result.
+With --sweeps either the sweeping process or one below it is killed, within a second of a chunk's being kept; the same
+command then goes on, and at the end two such sweeps run on one folder at once.
 Prints a table in Markdown; exits 1 if anything was lost.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import random
@@ -25,9 +29,13 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from walkerlab.store import artifact
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
+from process_table import processes_below
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 LONGEST_S = 600.0
@@ -202,6 +210,49 @@ def together(stage: str, config: str, counts: Sequence[int]) -> list[str]:
     return wrong
 
 
+SWEEP = ("--stage", "fixedpoint", "--over", "slope_deg=0.5:7:400", "--chunk-seconds", "0.1")
+
+
+def sweeps(kills: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Kill a sweep at work, parent or worker, and let it go on; returns what was killed and what went wrong."""
+    drawn, killed, wrong = random.Random(seed), Counter[str](), list[str]()
+    with tempfile.TemporaryDirectory() as place:
+        quiet, runs, both = (Path(place) / name for name in ("quiet", "runs", "both"))
+        finish(command("sweep", "paper", quiet, *SWEEP))
+
+        def judge(folder: Path, what: str) -> None:
+            found = [artifact.read(path).digest() for path in folder.glob("*/sweep-*.h5")]
+            if found != [artifact.read(path).digest() for path in quiet.glob("*/sweep-*.h5")]:
+                wrong.append(f"{what}: not the result of the undisturbed sweep")
+
+        while killed.total() < kills:
+            process = start(command("sweep", "paper", runs, *SWEEP))
+            while process.poll() is None and killed.total() < kills:
+                before = len(list(runs.glob("*/sweep-chunks/*.h5")))
+                while process.poll() is None and len(list(runs.glob("*/sweep-chunks/*.h5"))) <= before:
+                    time.sleep(0.02)
+                time.sleep(drawn.uniform(0.0, 1.0))
+                below = processes_below(process.pid)
+                what, pid = (
+                    ("worker", drawn.choice(below)) if below and drawn.random() < 0.5 else ("parent", process.pid)
+                )
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                killed[what] += 1
+                if what == "parent":
+                    break
+            process.communicate()
+            if process.returncode == 0:  # done before all kills were: begin anew
+                judge(runs, f"after {killed.total()} kills")
+                shutil.rmtree(runs)
+        finish(command("sweep", "paper", runs, *SWEEP))
+        judge(runs, "after all kills")
+        for process in [start(command("sweep", "paper", both, *SWEEP)) for _ in range(2)]:
+            wrong += [said] if (said := process.communicate()[1]) and process.returncode else []
+        judge(both, "two at once")
+    return killed, wrong
+
+
 def main() -> int:
     """Run the campaign that was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -211,6 +262,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--spread", action="store_true", help="kill while each of the results is made in turn")
     parser.add_argument("--together", type=int, nargs="+", metavar="N", help="instead: N runs at once")
+    parser.add_argument("--sweeps", action="store_true", help="kill a sweep of fixed points instead")
     asked = parser.parse_args()
     began = time.perf_counter()
     if asked.together:
@@ -219,8 +271,10 @@ def main() -> int:
         print(f"| {counts} x {asked.stage} ({asked.config}) at once | {len(wrong)} wrong |")
     else:
         kill = spread if asked.spread else campaign
-        moments, wrong = kill(asked.stage, asked.config, asked.kills, asked.seed)
-        print(f"| killed {asked.stage} ({asked.config}) | times |\n|---|---|")
+        what = "sweep" if asked.sweeps else f"{asked.stage} ({asked.config})"
+        asking = sweeps if asked.sweeps else partial(kill, asked.stage, asked.config)
+        moments, wrong = asking(asked.kills, asked.seed)
+        print(f"| killed {what} | times |\n|---|---|")
         for when, times in sorted(moments.items()):
             print(f"| {when} | {times} |")
         print(f"| lost or broken | {len(wrong)} |")

@@ -120,7 +120,7 @@ def outputs(*names: str) -> str:
 
 
 def reductions() -> list[Reduction]:
-    """Every reduction there is, and two that there are not."""
+    """Every reduction there is, and one that there is not."""
     whole, none = contact(), contact(outputs())
     import_stage = "import walkerlab.stages.{}, walkerlab.stages.runner"
     walking, drawing = import_stage.format("simulate"), import_stage.format("plot")
@@ -149,21 +149,10 @@ def reductions() -> list[Reduction]:
             compile=True,
         ),
         Reduction(
-            "force law of a foot out of reach",
-            "evaluated and multiplied by zero",
-            ("swinging foot evaluated", "swinging foot passed over"),
-        ),
-        Reduction(
             "leg inertia",
             "0.1 kg m^2",
             ("contact, inertia", "contact"),
             note="the inertia is summed into constants before anything runs, so that there is no term to leave out",
-        ),
-        Reduction(
-            "a foot's radius",
-            "a radius of zero",
-            ("radius of zero", "no radius"),
-            note="measured by a right-hand side of the script's own; the project has none",
         ),
         Reduction("energies", "all outputs", scenes=(whole, contact(outputs("states", "forces")))),
         Reduction("forces", "all outputs", scenes=(whole, contact(outputs("states", "energies")))),

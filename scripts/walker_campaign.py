@@ -7,7 +7,8 @@ Every search has to end in a gait or in words. Where it finds none, SciPy's `roo
 40 that walk of other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
 to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps these
 walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the multipliers'
-k-th powers.
+k-th powers. `light-hips` are the compasses whose gaits are hardest to follow from a vanishing slope: without any start
+drawn at random both ordinary gaits must be found by name, and each repeat itself in one step of SciPy's DOP853.
 Prints a table in Markdown, then what went wrong; exits 1 if anything did.
 """
 
@@ -32,6 +33,7 @@ from walkerlab.orbits.fixed_point import GaitSearch, Search, SearchSettings, fin
 from walkerlab.orbits.gait import Gait
 from walkerlab.orbits.random_starts import LEAST_START, MOST_START, SHORTEST_STEP
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.orbits.step_map import WALKED, evaluate, on_section, section_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import method_named
@@ -45,11 +47,9 @@ AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
-OTHER_STARTS, TRIED, EVALUATIONS = (
-    3000,
-    40,
-    60,
-)  # drawn where nothing is found, tried of those that walk; steps for each
+FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
+RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11, grown by an unstable gait's multipliers
+OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60  # drawn where nothing is found, tried of those that walk; steps each
 SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
@@ -156,7 +156,19 @@ def parts(draw: Draw) -> PartsWalker:
     })  # fmt: skip
 
 
+def light_hips(draw: Draw) -> CompassWalker:
+    """A hip no heavier than a leg, whose mass lies within a quarter of its length from the foot."""
+    return CompassWalker(
+        leg_length_m=1.0,
+        foot_to_mass_m=draw.uniform(0.02, 0.25),
+        leg_mass_kg=1.0,
+        hip_mass_kg=10.0 ** draw.uniform(-2.0, 0.0),
+        leg_inertia_kg_m2=float(draw.choice((0.0, draw.uniform(0.0, 0.03)))),
+    )
+
+
 TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
+    "light-hips": light_hips,
     "straight-legs": straight_legs,
     "kneed": kneed,
     "kneed-free": kneed_free,
@@ -181,14 +193,15 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
     """Search the gaits of so many random walkers of a type."""
     draw, found = np.random.default_rng(seed), Tally()
     for index in range(walkers):
-        described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(-2.3, -1.0))
+        light = name == "light-hips"
+        described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(*((-3.5, -1.3) if light else (-2.3, -1.0))))
         walker = standing(assembly_of(described, rigid=True), 9.81, slope, knee_locked_at_strike(described))
         start = time.process_time()
-        search = find_gaits(walker, settings=SETTINGS)
+        search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
         # the first of a type compiles
         spent = time.process_time() - start if index else 0.0
         found.slowest_s = max(found.slowest_s, spent)
-        faults, steps = judged(walker, search)
+        faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
         found.steps_seen += steps
         if spent > LONGEST_SEARCH_S:
             faults.append(f"the search took {spent:.0f} s")
@@ -238,6 +251,23 @@ def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
     if steps < STEPS and search.gait.stable and not faults:
         faults.append(f"the stable gait is walked for {steps} steps only")
     return faults, steps
+
+
+def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
+    """What is wrong with the two ordinary gaits, the one chosen among them."""
+    found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
+    faults = [f"no gait from the {name}" for name, gaits in found.items() if not gaits]
+    if not faults and found[LONG_PERIOD] == found[SHORT_PERIOD]:
+        faults.append("both seeds lead to one gait")
+    for gait in search.gaits:
+        method = method_named("scipy-dop853").new(len(gait.state), 1e-11, 1e-13, BUDGET)
+        step = take_walk(walker, method, gait.state, 1)
+        if step.steps < 1 or np.abs(np.subtract(step.final_state, gait.state)).max() > RETURNS_TO:
+            faults.append(f"the gait of {gait.period:.4g} s does not repeat itself")
+    walkable = [gait for gait in search.gaits if not gait.objections]
+    if walkable and search.gait != min(walkable, key=lambda gait: gait.spectral_radius):
+        faults.append("the gait chosen is not the least unstable one")
+    return faults
 
 
 def traces(walker: Standing, gait: Gait) -> Iterator[tuple[float, float, float]]:

@@ -67,7 +67,7 @@ def test_two_runs_at_once_do_not_disturb_each_other(kill):
 
 
 def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
-    assert script("gait_campaign").campaign(25, seed=1) == []
+    assert script("walker_campaign").tally("light-hips", 25, seed=1).wrong == []
 
 
 @pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso"])

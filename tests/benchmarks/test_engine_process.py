@@ -8,7 +8,7 @@ from crashing_tasks import Answers, Crashes, Raises, Sleeps
 
 from walkerlab.benchmarks.engines import process
 from walkerlab.benchmarks.engines.adapter import Stepping
-from walkerlab.benchmarks.engines.experiments import lost_row
+from walkerlab.benchmarks.engines.experiments import EngineExperiment
 from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 
 
@@ -55,6 +55,7 @@ def test_who_stops_waiting_ends_what_runs(own):
 
 def test_a_lost_run_took_no_time_that_anybody_knows():
     scene = SimpleNamespace(name="compass")
-    row = lost_row(scene, "engine", "1.0", "own-law", Stepping("rule", 1e-4), "rule", 1.0, TaskLost("it crashed"))
+    experiment = EngineExperiment(scene, "engine", "1.0", "own-law")
+    row = experiment.row("rule", Stepping("rule", 1e-4), TaskLost("it crashed"))
     assert row.wall_s is None
     assert row.error is None

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from forks import forks
 
 import walkerlab
 
@@ -20,21 +21,12 @@ class Program:
     """A program to be run on a folder of runs."""
 
     def __init__(self, module, folder, *paths):
-        self.command = [sys.executable, "-m", module]
+        self.module, self.command = module, [sys.executable, "-m", module]
         self.folder = folder
         self.environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [*paths, ROOT]))}
 
-    def __call__(self, *arguments, **options):
-        return subprocess.run(
-            [*self.command, *map(str, arguments)],
-            cwd=self.folder,
-            env={**self.environment, **options.pop("environment", {})},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            **options,
-        )
+    def __call__(self, *arguments, environment=None):
+        return forks().run(self.module, arguments, self.folder, {**self.environment, **(environment or {})})
 
     def start(self, *arguments, environment=None, **options):
         """Start it as a terminal does: where the tests are a script's background job they ignore Ctrl-C."""

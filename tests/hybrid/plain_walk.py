@@ -6,10 +6,13 @@ package: what the two agree on is in the rules. Angles are absolute, from the ve
 slope. A state is (hip, angles, their velocities, work lost to damping, work lost to friction).
 """
 
+from functools import partial
 from typing import NamedTuple
 
+import numba
 import numpy as np
-from numba import njit
+
+njit = partial(numba.njit, cache=True)  # all in one file, by whose time and size numba knows what is stale
 
 CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
 WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE = 0, 1, 2, 3, 4, 5, 9

@@ -12,36 +12,19 @@ from walkerlab.stages.walk_columns import legs, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
-from walkerlab.store.provenance import Provenance
 
 sys.path.append(str(Path(__file__).parent.parent / "figures"))
 from synthetic_families import families
+from synthetic_walks import ORIGIN
 
 STEPS, PERIOD, LENGTH, SLOPE = 4, 0.7, 0.37, 0.0174
 COORDINATES = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 
 
 def stored(stage, groups=None, summary=None, **provenance):
-    made = Provenance(
-        config="name: paper\n",
-        command_line="walkerlab report",
-        seed=0,
-        started_utc="2024-05-01T10:00:00.000+00:00",
-        ended_utc="2024-05-01T10:00:01.250+00:00",
-        platform="Linux",
-        package_version="0.1.0",
-        library_versions={"numpy": "2.0.0"},
-        git_commit="0123456789abcdef",
-    )
+    made = replace(ORIGIN, **{"command_line": "walkerlab report", **provenance})
     identity = Identity(stage, {"slope_rad": SLOPE}, {}, "c0de")
-    return Stored(
-        groups or {},
-        summary or {},
-        identity=identity,
-        provenance=replace(made, **provenance),
-        complete=True,
-        seal="5ea1",
-    )
+    return Stored(groups or {}, summary or {}, identity=identity, provenance=made, complete=True, seal="5ea1")
 
 
 def column(values, dim, units="1", long_name="number"):

@@ -88,7 +88,8 @@ def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_de
     assert np.ptp(group["mark_step_period"][0]) == 0.0
 
 
-def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value():
+def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value(monkeypatch):
+    monkeypatch.setattr(regions, "CELLS", (2, 2))  # the plane beside them is not looked at
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=9.5", "second.to=10.5",

@@ -6,9 +6,8 @@ from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
 from walkerlab.verification.catalogue import config_of, shipped, without_doubles
 from walkerlab.verification.cells import CaseCell
-from walkerlab.verification.contact_case import judge_contact
-from walkerlab.verification.contact_start import HEIGHT, prepared
-from walkerlab.verification.rigid_case import judge_rigid
+from walkerlab.verification.judge import judge
+from walkerlab.verification.starts import HEIGHT, prepared
 
 CASES = {case.name: case for case in shipped()}
 QUICK = (
@@ -57,23 +56,23 @@ def test_case_ends_as_expected_and_passes_every_measure(name):
 
 def test_another_outcome_than_expected_is_told():
     case = Case(name="wrong", expected=("fell",), reason="to be wrong", steps=2)
-    result = judge_contact(case, config_of(case))
+    result = judge(case, config_of(case))
     assert not result.ok
     assert "ended as walked, not fell" in result.failures
 
 
 def test_a_budget_too_small_is_told_with_what_there_was():
     case = Case(name="small", expected=("walked",), reason="to be cut short", steps=4, budget=10_000)
-    result = judge_contact(case, config_of(case))
+    result = judge(case, config_of(case))
     assert result.outcome == "budget-exhausted"
     assert 10_000 <= result.rhs_evaluations < 10_100
     assert 0 < result.steps < 4
 
 
 def test_a_rigid_case_too_ends_with_its_budget():
-    needed = judge_rigid(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"])).rhs_evaluations
+    needed = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"])).rhs_evaluations
     case = CASES["rigid-single-stride"].model_copy(update={"budget": needed // 2, "expected": ("budget-exhausted",)})
-    result = judge_rigid(case, config_of(case))
+    result = judge(case, config_of(case))
     assert result.failures == ()
     assert result.outcome == "budget-exhausted"
     assert case.budget <= result.rhs_evaluations < needed
@@ -90,7 +89,7 @@ def test_a_start_is_lowered_by_metres_whatever_the_leg():
 
 def test_disagreement_with_a_sharper_tolerance_is_told():
     case = Case(name="sharp", expected=("walked",), reason="to be inexact", steps=2, agreement=1e-15)
-    result = judge_contact(case, config_of(case))
+    result = judge(case, config_of(case))
     assert any("tenfold tolerance" in failure for failure in result.failures)
     assert any("dop853" in failure for failure in result.failures)
 

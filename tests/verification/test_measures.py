@@ -6,26 +6,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walkerlab.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.paper.appendix_a import impact
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import compass, rigid_scene, rigid_walker
+from walkerlab.scene.rigid import compass
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.rigid_case import time_difference
-from walkerlab.verification.rigid_momentum import RigidMasses
+from walkerlab.verification.judge import time_difference
+from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import TwinScale, scaled, to_twin
+from walkerlab.verification.starts import configured, prepared
 from walkerlab.verification.verdict import Measure, finite
 
-PAPER = config_of(next(case for case in shipped() if case.name == "paper"))
-WALKER = rigid_walker(PAPER, "corrected")
+CASE = next(case for case in shipped() if case.name == "paper").model_copy(update={"model": "rigid"})
+PAPER = config_of(CASE)
 COMPASS = compass(PAPER, "corrected")
 MASSES = RigidMasses(assembly_of(PAPER.walker, rigid=True), PAPER.slope_rad)
 
 
 @pytest.fixture(scope="module")
-def walk():
-    return take_walk(WALKER, rigid_scene(PAPER).method, as_state(find_gaits(WALKER).gait.state), 4)
+def judged_walk():
+    start = prepared(PAPER, CASE)
+    return start.walk(CASE, configured(start, CASE))
+
+
+@pytest.fixture(scope="module")
+def walk(judged_walk):
+    return judged_walk.record
 
 
 def test_a_heel_strike_keeps_momentum(walk):
@@ -39,11 +44,10 @@ def test_a_heel_strike_that_is_a_little_wrong_does_not(walk, index):
     assert MASSES.momentum_change(walk.before, wrong) > 1e-8
 
 
-def test_walks_without_a_heel_strike_are_not_called_equal(walk):
-    case = next(case for case in shipped() if case.name == "paper")
-    none = replace(walk, heel_strikes=np.zeros(0))
-    assert time_difference("a walk", none, 1.0, walk, 1.0, case, PAPER) == []
-    (found,) = time_difference("itself", walk, 1.0, walk, 1.0, case, PAPER)
+def test_walks_without_a_heel_strike_are_not_called_equal(judged_walk):
+    none = replace(judged_walk, touches=np.zeros(0))
+    assert time_difference("a walk", none, judged_walk, CASE, 1e-9) == []
+    (found,) = time_difference("itself", judged_walk, judged_walk, CASE, 1e-9)
     assert found.value == 0.0
 
 

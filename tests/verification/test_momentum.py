@@ -6,7 +6,6 @@ import pytest
 from walkerlab.config.stability import Case
 from walkerlab.verification import momentum
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.contact_start import prepared
 from walkerlab.verification.momentum import (
     MEASURE,
     MOST_UNKNOWN,
@@ -17,21 +16,25 @@ from walkerlab.verification.momentum import (
     unsettled,
     with_middles,
 )
+from walkerlab.verification.starts import prepared
 from walkerlab.verification.verdict import NotMeasured
 
 CASES = {case.name: case for case in shipped()}
 
 
 def ready_for(name):
-    case = CASES[name]
+    return prepared_for(CASES[name])
+
+
+def prepared_for(case):
     config = config_of(case)
-    return prepared(config, case), config, case
+    start = prepared(config, case)
+    return config, start.scene, start.start, case
 
 
 @pytest.mark.parametrize("name", ["paper", "leg-inertia", "foot-40-percent", "friction-0", "dropped-1-cm", "moon"])
 def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
-    ready, config, case = ready_for(name)
-    found = momentum_balance(ready, config, case)
+    found = momentum_balance(*ready_for(name))
     assert found.residual <= 1e-7 + found.unsure
     assert found.unsure < 1e-5
 
@@ -40,30 +43,27 @@ def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
     "changed", [{"hip_mass_kg": 10.01}, {"leg_mass_kg": 5.005}, {"foot_to_mass_m": 0.501}, {"leg_inertia_kg_m2": 0.05}]
 )
 def test_a_walker_that_is_a_little_another_one_does_not_balance(changed):
-    ready, config, case = ready_for("paper")
+    config, *ready = ready_for("paper")
     other = config.model_copy(update={"walker": config.walker.model_copy(update=changed)})
-    finding = momentum_finding(ready, other, case)
-    assert not finding.ok
+    assert not momentum_finding(other, *ready).ok
 
 
 def test_a_ground_that_pushes_a_little_more_does_not_balance():
-    ready, config, case = ready_for("paper")
+    config, *ready = ready_for("paper")
     heavier = config.model_copy(update={"gravity_m_s2": 1.001 * config.gravity_m_s2})
-    finding = momentum_finding(ready, heavier, case)
-    assert not finding.ok
+    assert not momentum_finding(heavier, *ready).ok
 
 
 def test_beside_a_hinge_that_pushes_too_it_is_not_measured():
     case = Case(name="x", expected=("walked",), reason="r", config={"contact": {"stance": "pinned"}})
-    config = config_of(case)
-    assert momentum_finding(prepared(config, case), config, case) == NotMeasured(MEASURE, "the hinge pushes too")
+    assert momentum_finding(*prepared_for(case)) == NotMeasured(MEASURE, "the hinge pushes too")
 
 
 def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():
-    ready, config, case = ready_for("stiction-1e-7")
-    found = momentum_balance(ready, config, case)
+    ready = ready_for("stiction-1e-7")
+    found = momentum_balance(*ready)
     assert found.unresolved > MOST_UNKNOWN > found.unsure
-    said = momentum_finding(ready, config, case)
+    said = momentum_finding(*ready)
     assert isinstance(said, NotMeasured)
     assert "below the tolerance" in said.why
 
@@ -77,9 +77,7 @@ def test_where_the_sums_do_not_settle_it_is_not_measured(monkeypatch):
 
 def test_feet_at_a_thousand_kilometres_a_second_are_measured_by_their_own_momentum():
     case = Case(name="x", expected=("lifted-off",), reason="r", config={"start": [-0.2, 0.16, 1e6, 1e6]})
-    config = config_of(case)
-    finding = momentum_finding(prepared(config, case), config, case)
-    assert finding.ok
+    assert momentum_finding(*prepared_for(case)).ok
 
 
 def test_sums_are_simpsons_and_know_where_they_are_unsure():

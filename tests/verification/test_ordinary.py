@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.ordinary import CAP, choices, judged
+from walkerlab.verification.ordinary import CAP, Arrival, choices
 
 PAPER = next(case for case in shipped() if case.name == "paper")
-UNITS = np.ones(8)
+ARRIVAL = Arrival("c", 1.0, np.zeros(8), np.ones(8))
 
 
 def test_ordinary_methods_on_the_paper_walker():
@@ -40,9 +40,9 @@ def test_the_reference_is_sharp_whatever_the_case_asks_for():
     ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
 )
 def test_verdict_follows_from_the_error(off, verdict):
-    assert judged("c", "m", np.full(8, off), np.zeros(8), UNITS, 1, 0.0).verdict == verdict
+    assert ARRIVAL.judged("m", np.full(8, off), 1, 0.0).verdict == verdict
 
 
 def test_what_did_not_arrive_has_no_error():
-    choice = judged("c", "m", None, np.zeros(8), UNITS, CAP, 0.0)
+    choice = ARRIVAL.judged("m", None, CAP, 0.0)
     assert (choice.verdict, choice.error) == ("gives up", None)

@@ -19,7 +19,7 @@ from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.cells import CaseCell
 from walkerlab.verification.known import Known
-from walkerlab.verification.rigid_momentum import RigidMasses
+from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import TwinScale, scaled, to_twin
 from walkerlab.verification.scene_catalogue import ENDS, STOPS, scene_cases
 

@@ -7,9 +7,8 @@ import pytest
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.contact_case import judge_contact
-from walkerlab.verification.rigid_case import judge_rigid
-from walkerlab.verification.second_method import LIBRARY_BUDGET, others, promised, second_walk
+from walkerlab.verification.judge import LIBRARY_BUDGET, judge, others, second_walk
+from walkerlab.verification.verdict import promised
 
 CASES = {case.name: case for case in shipped()}
 
@@ -45,21 +44,21 @@ def test_that_none_answers_is_told():
 
 
 def test_stiff_ground_is_walked_by_a_multistep_method():
-    result = judge_contact(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
+    result = judge(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
     assert result.ok
     assert (result.second_method, result.second_tried) == ("scipy-bdf", "dop853 budget-exhausted")
     assert any("from scipy-bdf" in finding.measure for finding in result.findings)
 
 
 def test_a_rigid_walk_too():
-    result = judge_rigid(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
+    result = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
     (finding,) = [finding for finding in result.findings if "from radau5" in finding.measure]
     assert 0.0 < finding.value < finding.limit < 1e-6
 
 
 def test_what_has_no_answer_is_not_compared_and_says_so():
     case = CASES["no-budget"]
-    result = judge_contact(case, config_of(case))
+    result = judge(case, config_of(case))
     assert (result.second_method, result.second_tried) == ("", "the walk itself ended budget-exhausted")
 
 

@@ -15,9 +15,9 @@ from walkerlab.report.tables import Table
 from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.cells import CaseCell, cells_of, run_cells
-from walkerlab.verification.contact_case import judge_contact
-from walkerlab.verification.contact_start import prepared
+from walkerlab.verification.judge import judge
 from walkerlab.verification.known import Known
+from walkerlab.verification.starts import prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
 
 GOOD = CaseResult(
@@ -170,7 +170,7 @@ def test_lines_of_a_case_in_the_config_itself_are_told_with_their_place(tmp_path
 
 def test_a_case_may_have_pads_of_the_contact_gaits_own_pitch():
     case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": {"pad_pitch": "own"}})
-    assert judge_contact(case, config_of(case)).failures == ()
+    assert judge(case, config_of(case)).failures == ()
 
 
 @pytest.mark.parametrize("lines", [{"stance": "pinned"}, {"terrain": "after-mid-swing"}])

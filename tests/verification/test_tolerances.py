@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.contact_case import prepared, walked
+from walkerlab.verification.starts import configured, prepared
 
 
 @pytest.fixture(scope="module")
@@ -16,9 +16,8 @@ def case():
 
 def test_the_lightest_walker_takes_the_same_steps_at_every_tolerance(case):
     """Its feet are damped hardest for their mass: a velocity got as a difference ends such walks by chance."""
-    config = config_of(case)
-    ready = prepared(config, case)
-    walks = [walked(ready, config, case, sharper, sampled=False) for sharper in (2.0, 1.0, 0.7, 0.3, 0.15, 0.05, 0.01)]
+    start = prepared(config_of(case), case)
+    walks = [start.walk(case, configured(start, case, tighter)) for tighter in (2.0, 1.0, 0.7, 0.3, 0.15, 0.05, 0.01)]
     assert {walk.outcome for walk in walks} == {Outcome.WALKED}
-    touches = np.array([walk.touch_time_s for walk in walks])
+    touches = np.array([walk.touches for walk in walks])
     assert np.abs(touches - touches[-1]).max() < 1e-6

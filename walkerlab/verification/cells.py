@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.verification.catalogue import config_of
-from walkerlab.verification.contact_case import judge_contact
+from walkerlab.verification.judge import judge
 from walkerlab.verification.ordinary import Choice, choices
-from walkerlab.verification.rigid_case import judge_rigid
 from walkerlab.verification.verdict import CaseResult
 from walkerlab.workers import in_order
 
@@ -28,7 +27,6 @@ class CaseCell:
     def run(self) -> tuple[CaseResult | Choice, ...]:
         """The verdict, then the ordinary methods."""
         config = self.config or config_of(self.case)
-        judge = judge_rigid if self.case.model == "rigid" else judge_contact
         return (judge(self.case, config), *choices(self.case, config))
 
 

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
+from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.solvers.registry import method_named
 from walkerlab.verification.catalogue import config_of
-from walkerlab.verification.contact_case import TENFOLD, walked, walked_with
-from walkerlab.verification.contact_start import ContactStart, prepared
-from walkerlab.verification.ordinary import REFERENCE, STEPS, fixed, natural_units
-from walkerlab.verification.scaling import pendulum_time
+from walkerlab.verification.judge import TENFOLD
+from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
+from walkerlab.verification.starts import ContactStart, JudgedWalk, configured, prepared
 from walkerlab.verification.verdict import finite
 
 PAPER_STIFFNESS: Final = 1.0e5 * 1000.0**2.2  # N/m^e
@@ -69,29 +68,28 @@ class StictionCell:
     def run(self) -> Numbers:
         """Walk it twice."""
         case, config = on_ground(self.stiffness, self.stiction_velocity, WALK_STEPS, BUDGET)
-        ready = prepared(config, case)
-        assert ready is not None, "the paper's slope has a gait"
-        walk = walked(ready, config, case, 1.0, sampled=False)
-        again = walk
+        start = prepared_on_ground(config, case)
+        walk = again = start.walk(case, configured(start, case))
         if walk.outcome.answered:
             sharper = case.model_copy(update={"budget": SHARPER_BUDGET})
-            again = walked(ready, config, sharper, TENFOLD, sampled=False)
-        return [
-            float(walk.outcome),
-            float(walk.touch_time_s.size),
-            float(again.outcome),
-            apart(walk, again, config),
-            float(walk.work[0]),
-        ]
+            again = start.walk(case, configured(start, sharper, TENFOLD))
+        numbers = (walk.outcome, walk.touches.size, again.outcome, apart(walk, again, config), walk.rhs_evaluations)
+        return [float(number) for number in numbers]
 
 
-def apart(one: ContactWalkResult, other: ContactWalkResult, config: RigidConfig) -> float:
+def prepared_on_ground(config: Config, case: Case) -> ContactStart:
+    """The start of a cell."""
+    start = prepared(config, case)
+    assert isinstance(start, ContactStart), "the paper's slope has a gait"
+    return start
+
+
+def apart(one: JudgedWalk, other: JudgedWalk, config: RigidConfig) -> float:
     """How far two walks' touches and ends are apart, in legs, radians and pendulum times; `NONE` if they end unlike."""
-    if one.outcome is not other.outcome or one.touch_time_s.size != other.touch_time_s.size:
+    if one.outcome is not other.outcome or one.touches.size != other.touches.size:
         return NONE
-    times = np.abs(one.touch_time_s - other.touch_time_s) / pendulum_time(config)
-    ends = np.abs(np.array(one.end_state) - np.array(other.end_state)) / natural_units(config)
-    return finite(float(np.max(np.concatenate([times, ends]))))
+    ends = np.abs(np.subtract(one.record.end_state, other.record.end_state)) / natural_units(config)
+    return finite(float(np.max(np.concatenate([np.abs(one.touches - other.touches), ends]))))
 
 
 @dataclass(frozen=True)
@@ -113,21 +111,18 @@ class StepColumn:
     def run(self) -> Numbers:
         """Walk it sharply, then with each step."""
         case, config = on_ground(self.stiffness, None, STEPS, REFERENCE_BUDGET)
-        ready = prepared(config, case)
-        assert ready is not None, "the paper's slope has a gait"
+        start = prepared_on_ground(config, case)
         name, rtol, atol = REFERENCE
-        walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)
+        walk = start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget))
         if not walk.outcome.answered:
             return [float(VERDICTS.index("no reference")), NONE] * self.cells
-        return [number for h in self.steps_s for number in step_cell(h, ready, walk, natural_units(config))]
-
-
-def step_cell(
-    h: float, ready: ContactStart, walk: ContactWalkResult, units: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Verdict and error of one step; the error is `NONE` where there is none to speak of."""
-    choice = fixed("map", h, ready, walk.end_time_s, np.array(walk.end_state), units, MOST_EVALUATIONS)
-    return float(VERDICTS.index(choice.verdict)), NONE if choice.error is None else choice.error
+        arrival = arrival_of("map", walk.record, natural_units(config))
+        found = [fixed(arrival, start, h, MOST_EVALUATIONS) for h in self.steps_s]
+        return [
+            number
+            for one in found
+            for number in (float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error)
+        ]
 
 
 MapPiece = StictionCell | StepColumn

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,18 +22,17 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
-from walkerlab.hybrid.contact_run import MethodSettings
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
+from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
-from walkerlab.verification.contact_case import walked_with
-from walkerlab.verification.contact_start import ContactStart, prepared
-from walkerlab.verification.rigid_case import prepared as rigid_prepared
 from walkerlab.verification.scaling import pendulum_time
+from walkerlab.verification.starts import ContactStart, RigidStart, prepared
 from walkerlab.verification.verdict import finite
 
+Floats = NDArray[np.float64]
 CAP: Final = 20_000  # right-hand sides
 FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
@@ -77,57 +78,91 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
-    ready = prepared(config, case)
-    if ready is None or ready.scene.pinned is not None or ready.scene.terrain.order_matters:
+    start = prepared(config, case)
+    if not isinstance(start, ContactStart) or start.scene.pinned is not None or start.scene.terrain.order_matters:
         return ()
     name, rtol, atol = REFERENCE
-    walk = walked_with(MethodSettings(method_named(name), rtol, atol, case.budget), ready, case)
-    end, reference = walk.end_time_s, np.array(walk.end_state)
-    if end == 0.0:
+    arrival = arrival_of(
+        case.name,
+        start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget)).record,
+        natural_units(config),
+    )
+    if arrival.time_s == 0.0:
         return ()
-    units = natural_units(config)
-    found = [library(case.name, name, ready, end, reference, units) for name in LIBRARY]
-    found += [fixed(case.name, h, ready, end, reference, units) for h in FIXED_STEPS_S]
-    return tuple(found)
+    found = [library(arrival, start, name) for name in LIBRARY]
+    return (*found, *(fixed(arrival, start, h) for h in FIXED_STEPS_S))
 
 
 def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """SciPy's methods in a script that walks a case of the rigid model, after as many steps as it takes."""
-    ready = rigid_prepared(config)
-    if ready is None or ready.compass is None:
+    start = prepared(config, case)
+    if not isinstance(start, RigidStart) or start.compass is None:
         return ()
     name, rtol, atol = RIGID_REFERENCE
-    walk = take_walk(
-        ready.walker, method_named(name).new(len(ready.walker.blank), rtol, atol, case.budget), ready.start, case.steps
-    )
+    walk = start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget)).record
     if not walk.steps:
         return ()
     units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
-    return tuple(script(case.name, name, ready.compass, walk, units) for name in LIBRARY)
+    arrival = Arrival(case.name, float(walk.heel_strikes[-1]), np.array(walk.final_state), units)
+    return tuple(script(arrival, start.compass, walk, name) for name in LIBRARY)
 
 
-def script(case: str, method: str, compass: RigidWalker, walk: RecordedWalk, units: NDArray[np.float64]) -> Choice:
-    """A method of SciPy's solve_ivp with nothing but its name given, its event function at every heel strike."""
-    began = time.perf_counter()
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        try:
-            y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
-        except (ValueError, np.linalg.LinAlgError):
-            y, count = None, CAP
-    wall_s = time.perf_counter() - began
-    return judged(case, f"SciPy {method}", y, np.array(walk.final_state), units, count, wall_s)
+@dataclass(frozen=True)
+class Arrival:
+    """Where a case's walk arrives, by which methods are judged.
+
+    units  what each number of the state is measured in
+    """
+
+    case: str
+    time_s: float
+    state: Floats
+    units: Floats
+
+    def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
+        """What is to be said of where a method arrived, None if it did not; it says none of that itself."""
+        if y is None:
+            return Choice(self.case, method, "gives up", None, count, wall_s)
+        error = finite(float(np.max(np.abs((y - self.state) / self.units))))
+        scale = max(1.0, float(np.max(np.abs(self.state / self.units))))
+        if error > RUNS_AWAY * scale or float(np.max(np.abs(y[: y.size // 2]))) >= RUNAWAY:
+            return Choice(self.case, method, "diverges", None, count, wall_s)
+        return Choice(self.case, method, "fine" if error <= FINE * scale else "wrong silently", error, count, wall_s)
 
 
-def natural_units(config: RigidConfig) -> NDArray[np.float64]:
+def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
+    """Where a walk on the ground arrives."""
+    return Arrival(case, walk.end_time_s, np.array(walk.end_state), units)
+
+
+def natural_units(config: RigidConfig) -> Floats:
     """What each number of the state is measured in: legs, radians, and these in pendulum times."""
     lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
     return np.concatenate([lengths, lengths / pendulum_time(config)])
 
 
-def library(
-    case: str, method: str, ready: ContactStart, end: float, reference: NDArray[np.float64], units: NDArray[np.float64]
-) -> Choice:
+@contextmanager
+def in_silence() -> Iterator[None]:
+    """What libraries warn of is not listened to; what they raise where they give up ends the block."""
+    with (
+        warnings.catch_warnings(),
+        np.errstate(all="ignore"),
+        suppress(CapReachedError, ValueError, np.linalg.LinAlgError),
+    ):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def script(arrival: Arrival, compass: RigidWalker, walk: RecordedWalk, method: str) -> Choice:
+    """A method of SciPy's solve_ivp with nothing but its name given, its event function at every heel strike."""
+    began = time.perf_counter()
+    y, count = None, CAP
+    with in_silence():
+        y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
+    return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
+
+
+def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     """A method of SciPy's solve_ivp with nothing but its name given."""
     from scipy.integrate import solve_ivp
 
@@ -147,53 +182,19 @@ def library(
 
     began = time.perf_counter()
     y = None
-    try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            solution = solve_ivp(fun, (0.0, end), start, method=method)
+    with in_silence():
+        solution = solve_ivp(fun, (0.0, arrival.time_s), start, method=method)
         if solution.success:
             y = solution.y[:, -1]
-    except (CapReachedError, ValueError, np.linalg.LinAlgError):
-        pass
-    wall_s = time.perf_counter() - began
-    return judged(case, f"SciPy {method}", y, reference, units, count, wall_s)
+    return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
 
 
-def fixed(
-    case: str,
-    h: float,
-    ready: ContactStart,
-    end: float,
-    reference: NDArray[np.float64],
-    units: NDArray[np.float64],
-    cap: int = CAP,
-) -> Choice:
+def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:
     """Semi-implicit Euler with a fixed step, at most `cap` of them."""
     system = OnPads(ready.scene.walker, ready.scene.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
-    taken = int(semi_implicit_euler(system, y, np.empty_like(y), end, h, cap))
+    taken = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
-    arrived: NDArray[np.float64] | None = y
-    if taken == cap and taken * h < end * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY)):
-        arrived = None
-    return judged(case, f"semi-implicit Euler, {h:g} s", arrived, reference, units, taken, wall_s)
-
-
-def judged(
-    case: str,
-    method: str,
-    y: NDArray[np.float64] | None,
-    reference: NDArray[np.float64],
-    units: NDArray[np.float64],
-    count: int,
-    wall_s: float,
-) -> Choice:
-    """What is to be said of where a method arrived; it says none of that itself."""
-    if y is None:
-        return Choice(case, method, "gives up", None, count, wall_s)
-    error = finite(float(np.max(np.abs((y - reference) / units))))
-    scale = max(1.0, float(np.max(np.abs(reference / units))))
-    if error > RUNS_AWAY * scale or float(np.max(np.abs(y[: y.size // 2]))) >= RUNAWAY:
-        return Choice(case, method, "diverges", None, count, wall_s)
-    return Choice(case, method, "fine" if error <= FINE * scale else "wrong silently", error, count, wall_s)
+    late = taken == cap and taken * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY))
+    return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, taken, wall_s)

@@ -6,10 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Final
 
+from walkerlab.config.stability import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
 """A measure of work, which would hide those of what is right where the largest of all is shown."""
+
+MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its steps
 
 
 @dataclass(frozen=True)
@@ -82,3 +85,14 @@ class CaseResult:
 def finite(value: float) -> float:
     """The value, or a large number in the place of one that is not finite: results hold no NaN."""
     return float(value) if math.isfinite(value) else 1e300
+
+
+def promised(case: Case, rtol: float, steps: int) -> float:
+    """How far two walks' times may be apart, in pendulum times.
+
+    rtol   the looser of their tolerances
+    steps  of the solver, both together
+
+    A tolerance lets every step be wrong by its share of numbers of the order of one.
+    """
+    return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -70,11 +70,9 @@ def slip_share(model: str, load: float) -> float:
     """The slip over the stiction tolerance at which a model gives a share `load` of full friction."""
     if model in APPROXIMATIONS:
         return load / math.sqrt(1.0 - load * load)
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        s = 0.5 * (low + high)
-        low, high = (s, high) if s**3 * (10.0 - 15.0 * s + 6.0 * s * s) < load else (low, s)
-    return high
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15))
 
 
 class EngineRun(Simulation):

@@ -120,8 +120,54 @@ def answered(result: ContactWalkResult, wall_s: float, touches: int) -> WalkAnsw
     )
 
 
+@dataclass(frozen=True)
+class EngineExperiment:
+    """One engine, or this project beside it, in one experiment on one scene."""
+
+    scene: EngineScene
+    engine: str
+    version: str
+    experiment: str
+    truth: Truth | None = None  # what runs are compared with, if they are
+
+    def row(self, integrator: str, stepping: Stepping, answer: WalkAnswer | TaskLost, start: float = 1.0) -> EngineRow:
+        """A run with its errors, or that it was lost with its process or refused by the engine.
+
+        integrator  or contact model on an engine's own law
+        start       velocities of the start over those of the gait
+        """
+        head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
+        step_s, tolerance = stepping.step_s, stepping.tolerance
+        if isinstance(answer, TaskLost):
+            outcome = Outcome.BUDGET_EXHAUSTED if answer.timed_out else Outcome.SOLVER_FAILED
+            nothing = (None, None, None, None, None, None)
+            return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.why)
+        last = last_step(answer)
+        errors = (None, None) if self.truth is None else self.errors(answer, self.truth, last[0], start)
+        if tolerance is not None or self.experiment == SAME_LAW:
+            step_s = answer.time_s / max(1, answer.steps)
+        numbers = (*errors, answer.wall_s, *last)
+        return EngineRow(*head, step_s, tolerance, *numbers, answer.touches_s.size, answer.outcome)
+
+    def errors(
+        self, answer: WalkAnswer, truth: Truth, period_s: float | None, start: float
+    ) -> tuple[float | None, float | None]:
+        """Of the end state and of the touches, None where there is none; on an engine's own law, of the last period.
+
+        On its own law only a walk to the end from the gait itself is compared.
+        """
+        if self.experiment == OWN_LAW:
+            whole = answer.outcome == Outcome.WALKED.label and start == 1.0
+            return (None if period_s is None or not whole else abs(period_s - truth.walk.periods_s[-1])), None
+        error = math.inf if answer.end is None else float(np.max(np.abs(answer.end - truth.end)))
+        enough = answer.touches_s.size >= TOUCHES
+        touch = float(np.max(np.abs(answer.touches_s[:TOUCHES] - truth.touches_s))) if enough else None
+        return (error if math.isfinite(error) else None), touch
+
+
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
     """Our own method over its ladder of tolerances, on the same walk."""
+    experiment = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
     for rtol in OUR_LADDER:
         walls = []
@@ -129,65 +175,42 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
             begun = time.process_time()
             result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
             walls.append(time.process_time() - begun)
-        answer = answered(result, median(walls), TOUCHES)
-        mean = answer.time_s / max(1, answer.steps)
-        yield same_law_row(scene, OURS, version, OUR_METHOD, mean, rtol, truth, answer)
+        yield experiment.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answered(result, median(walls), TOUCHES))
 
 
 def same_law_rows(
     engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess
 ) -> Iterator[EngineRow]:
     """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
+    experiment = EngineExperiment(scene, engine.name, version, SAME_LAW, truth)
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
             continue
         for stepping in ladder_of(name, integrator, truth.until_s):
             task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
-            if isinstance(answer, TaskLost):
-                yield lost_row(scene, engine.name, version, SAME_LAW, stepping, name, 1.0, answer)
-                if answer.timed_out:
-                    break
-                continue
-            mean = answer.time_s / max(1, answer.steps)
-            row = same_law_row(scene, engine.name, version, name, mean, stepping.tolerance, truth, answer)
+            row = experiment.row(name, stepping, answer)
             yield row
-            if row.error is not None and row.error < EXACT_ENOUGH:
+            late = isinstance(answer, TaskLost) and answer.timed_out
+            if late or (row.error is not None and row.error < EXACT_ENOUGH):
                 break
 
 
 def ladder_of(name: str, integrator: Integrator, until_s: float) -> Iterator[Stepping]:
-    """The runs of one integrator, from coarse to fine; a whole number of steps leads to the end."""
-    if integrator.adapts:
-        for tolerance in TOLERANCES:
-            yield Stepping(name, LARGEST_STEP_S, tolerance)
-        return
-    for nominal in SAME_LAW_STEPS:
-        steps = math.ceil(until_s / nominal)
-        if steps <= integrator.most_steps:
+    """The runs of one integrator on our law, from coarse to fine; a whole number of steps leads to the end."""
+    for stepping in steppings(name, integrator, SAME_LAW_STEPS):
+        steps = math.ceil(until_s / stepping.step_s)
+        if integrator.adapts:
+            yield stepping
+        elif steps <= integrator.most_steps:
             yield Stepping(name, until_s / steps)
 
 
-def same_law_row(
-    scene: EngineScene,
-    engine: str,
-    version: str,
-    integrator: str,
-    step_s: float,
-    tolerance: float | None,
-    truth: Truth,
-    answer: WalkAnswer,
-) -> EngineRow:
-    """A run with its errors; without an end state it has none."""
-    error = None if answer.end is None else float(np.max(np.abs(answer.end - truth.end)))
-    if error is not None and not math.isfinite(error):
-        error = None
-    enough = answer.touches_s.size >= TOUCHES
-    touch = float(np.max(np.abs(answer.touches_s[:TOUCHES] - truth.touches_s))) if enough else None
-    return EngineRow(
-        scene.name, engine, version, SAME_LAW, integrator, 1.0, step_s, tolerance, error, touch, answer.wall_s,
-        *last_step(answer), answer.touches_s.size, answer.outcome,
-    )  # fmt: skip
+def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
+    """How an integrator is to step, from coarse to fine: by these steps, or where it adapts them by its tolerance."""
+    if integrator.adapts:
+        return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES]
+    return [Stepping(name, h) for h in steps_s]
 
 
 def last_step(answer: WalkAnswer) -> tuple[float | None, float | None, float | None]:
@@ -202,26 +225,10 @@ def last_step(answer: WalkAnswer) -> tuple[float | None, float | None, float | N
     return float(period), float(length), slip
 
 
-def lost_row(
-    scene: EngineScene,
-    engine: str,
-    version: str,
-    experiment: str,
-    stepping: Stepping,
-    integrator: str,
-    start: float,
-    lost: TaskLost,
-) -> EngineRow:
-    """A run that was lost with its process, or that the engine refused."""
-    outcome = Outcome.BUDGET_EXHAUSTED if lost.timed_out else Outcome.SOLVER_FAILED
-    return EngineRow(
-        scene.name, engine, version, experiment, integrator, start, stepping.step_s, stepping.tolerance, None, None,
-        None, None, None, None, 0, outcome.label, lost.why,
-    )  # fmt: skip
-
-
 def target_of(scene: EngineScene) -> EngineContact | None:
     """What the walker's own contact is, linearised under its weight on one foot; None on frictionless ground."""
+    from scipy.optimize import brentq
+
     walker = scene.ours
     law, friction = walker.normal, walker.friction
     if friction.largest == 0.0:
@@ -229,18 +236,10 @@ def target_of(scene: EngineScene) -> EngineContact | None:
     mass, g = walker.tree.mass, walker.gravity_down
     depth = (mass * g / law.stiffness) ** (1.0 / law.exponent)
     stiffness = law.exponent * mass * g / depth
-    creep = bisected(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until)
+    creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
     return EngineContact(mass, g, depth, law.exponent, ratio, sliding, CREEP_LOAD, creep)
-
-
-def bisected(function: Any, low: float, high: float) -> float:
-    """Where a rising function is zero."""
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if function(middle) > 0.0 else (middle, high)
-    return high
 
 
 def tuned(
@@ -269,6 +268,7 @@ def own_law_rows(
     Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
     would take more is not begun.
     """
+    experiment = EngineExperiment(scene, engine.name, version, OWN_LAW, truth)
     name = engine.adapter().CONTACTS[contact]
     integrator = engine.adapter().INTEGRATORS[name]
     most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
@@ -276,15 +276,14 @@ def own_law_rows(
     def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
         task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
+        row = experiment.row(contact, stepping, answer, factor)
         if isinstance(answer, TaskLost):
-            lost = lost_row(scene, engine.name, version, OWN_LAW, stepping, contact, factor, answer)
-            return lost, most if answer.timed_out else 0
-        step = answer.time_s / max(1, answer.steps) if integrator.adapts else stepping.step_s
-        row = own_law_row(scene, engine.name, version, contact, factor, step, stepping.tolerance, truth, answer)
+            return row, most if answer.timed_out else 0
         return row, answer.steps
 
     before, done, spent = None, [], 0
-    for stepping in own_law_ladder(name, integrator, float(truth.walk.touch_time_s[-1])):
+    usual_s = float(truth.walk.touch_time_s[-1])
+    for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
         row, steps = walk(stepping, 1.0)
         yield row
         done.append(stepping)
@@ -297,14 +296,6 @@ def own_law_rows(
     yield from (walk(stepping, factor)[0] for stepping in done[-2:][:1] for factor in STARTS)
 
 
-def own_law_ladder(name: str, integrator: Integrator, usual_s: float) -> Iterator[Stepping]:
-    """The walks with one contact, from coarse to fine, that usually take `usual_s`."""
-    if integrator.adapts:
-        yield from (Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES)
-    else:
-        yield from (Stepping(name, h) for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps)
-
-
 def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
     """Whether two walks to the end have one period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
@@ -312,39 +303,14 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
     return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED
 
 
-def own_law_row(
-    scene: EngineScene,
-    engine: str,
-    version: str,
-    contact: str,
-    start: float,
-    step_s: float,
-    tolerance: float | None,
-    truth: Truth,
-    answer: WalkAnswer,
-) -> EngineRow:
-    """A run with how far its last step's period is from that of ADAMS's law."""
-    period, length, slip = last_step(answer)
-    walked_all = answer.outcome == Outcome.WALKED.label and start == 1.0
-    error = abs(period - truth.walk.periods_s[-1]) if period is not None and walked_all else None
-    return EngineRow(
-        scene.name, engine, version, OWN_LAW, contact, start, step_s, tolerance, error, None, answer.wall_s,
-        period, length, slip, answer.touches_s.size, answer.outcome,
-    )  # fmt: skip
-
-
 def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
     """ADAMS's law on the same starts, by our own walk."""
+    experiment, tolerance = EngineExperiment(scene, OURS, version, OWN_LAW), 1e-7
     for factor in (1.0, *STARTS):
         begun = time.process_time()
-        result = walked(scene.started(factor), OUR_METHOD, 1e-7, OWN_TOUCHES)
-        wall = time.process_time() - begun
-        answer = answered(result, wall, OWN_TOUCHES)
-        mean = answer.time_s / max(1, answer.steps)
-        yield EngineRow(
-            scene.name, OURS, version, OWN_LAW, "impact", factor, mean, 1e-7, None, None, wall,
-            *last_step(answer), answer.touches_s.size, answer.outcome,
-        )  # fmt: skip
+        result = walked(scene.started(factor), OUR_METHOD, tolerance, OWN_TOUCHES)
+        answer = answered(result, time.process_time() - begun, OWN_TOUCHES)
+        yield experiment.row("impact", Stepping(OUR_METHOD, 0.0, tolerance), answer, factor)
 
 
 def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
@@ -357,7 +323,7 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     lost: list[TaskLost] = []
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         before = None
-        for stepping in swing_ladder(integrator, entry):
+        for stepping in steppings(integrator, entry, SWING_STEPS):
             task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps)
             answer: SwingAnswer | TaskLost = process.do(task, PATIENCE_S)
             if isinstance(answer, TaskLost):
@@ -366,30 +332,10 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
             error = float(np.max(np.abs(answer.end - truth)))
             drift = abs(energy(answer.end) - energy(start))
             order: float | None = None if before is None or error == 0.0 or entry.adapts else math.log2(before / error)
-            rows.append(
-                SwingRow(
-                    scene.name,
-                    engine.name,
-                    integrator,
-                    entry.order,
-                    stepping.step_s,
-                    stepping.tolerance,
-                    error,
-                    drift,
-                    order,
-                    answer.wall_s,
-                )
-            )
+            who, how = (scene.name, engine.name, integrator, entry.order), (stepping.step_s, stepping.tolerance)
+            rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
             before = error
     return rows, lost
-
-
-def swing_ladder(name: str, integrator: Integrator) -> Iterator[Stepping]:
-    """The swings of one integrator, from coarse to fine."""
-    if integrator.adapts:
-        yield from (Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES)
-    else:
-        yield from (Stepping(name, h) for h in SWING_STEPS)
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:

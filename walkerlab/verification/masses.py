@@ -1,4 +1,4 @@
-"""Momentum and energy of the rigid model from its masses, whatever the walker: not from its equations of motion."""
+"""Momentum and energy of walkers from their masses, place by place: not from their equations of motion."""
 
 from __future__ import annotations
 
@@ -14,6 +14,37 @@ from walkerlab.mechanics.standing import STANCE, SWING
 from walkerlab.verification.verdict import finite
 
 Array = NDArray[np.float64]
+
+
+class Masses:
+    """A walker's masses about a point that moves with it: the centre of mass unless told.
+
+    mass     (masses,) kg
+    levers   (masses, bodies, 2) m, from the point
+    inertia  (bodies,) kg m^2, of the bodies about their own centres of mass
+    """
+
+    def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
+        """Sum up the levers."""
+        found = list(masses(assembly))
+        root = about or found[0][1]
+        self.mass = np.array([mass for mass, _ in found])
+        self.levers = np.array([levers(assembly, root, at) for _, at in found])
+        if about is None:
+            self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
+        self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
+
+    def moving(self, psi: Array, rate: Array) -> tuple[Array, Array]:
+        """Places and velocities (..., masses, 2) against the point, at angles and rates (..., bodies)."""
+        arms = turned(self.levers, psi[..., None, :])
+        swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
+        return arms.sum(axis=-2), swept.sum(axis=-2)
+
+
+def turned(d: Array, psi: Array) -> Array:
+    """Levers (..., bodies, 2) turned with their bodies."""
+    s, c = np.sin(psi), np.cos(psi)
+    return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -53,39 +84,30 @@ class RigidMasses:
     """A walker's masses, and where states of the rigid model put them."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
-        """Sum up the levers from the centre of the stance foot's arc; slope in rad."""
+        """About the centre of the stance foot's arc; slope in rad."""
         foot, other, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
         self.members = places_of(assembly).members
-        found = list(masses(assembly))
-        self.mass = np.array([mass for mass, _ in found])
-        self.owner = [assembly.index(at.body) for _, at in found]
-        self.levers = np.array([levers(assembly, root, at) for _, at in found])
+        self.masses = Masses(assembly, root)
+        self.owner = [assembly.index(at.body) for _, at in masses(assembly)]
         self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
         self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
-        self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def at(self, state: Array) -> Moving:
         """The masses in a state of the rigid model (2 n)."""
         n = self.members.shape[1]
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
-        s, c = np.sin(psi), np.cos(psi)
         centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
-
-        def turned(d: Array) -> Array:
-            return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
-
-        arms = turned(self.levers)
-        swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[:, None]
+        place, velocity = self.masses.moving(psi, rate)
         return Moving(
-            self.mass,
-            centre + arms.sum(axis=1),
-            rolling + swept.sum(axis=1),
-            self.inertia,
+            self.masses.mass,
+            centre + place,
+            rolling + velocity,
+            self.masses.inertia,
             rate,
-            centre + turned(self.to_hip).sum(axis=0),
-            turned(self.to_foot).sum(axis=0),
+            centre + turned(self.to_hip, psi).sum(axis=0),
+            turned(self.to_foot, psi).sum(axis=0),
         )
 
     def share_of(self, leg: int) -> Array:
@@ -110,7 +132,7 @@ class RigidMasses:
         moving = self.at(state)
         foothold = np.zeros(2) if new else moving.contact
         share = self.share_of(SWING if new else STANCE)
-        whole = moving.about(foothold, np.ones(self.mass.size), np.ones(share.size))
+        whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return whole, moving.about(moving.hip, share[self.owner], share)
 
     def momentum_change(self, before: Array, after: Array) -> float:

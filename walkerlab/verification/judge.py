@@ -1,0 +1,150 @@
+"""One case: walked, again with a tenfold tolerance and by another method, and as its twin."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.solvers.registry import METHODS, Method, method_named
+from walkerlab.verification.scaling import scaled, to_twin
+from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, configured, prepared
+from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
+
+TENFOLD = 0.1
+SAMPLED_STEPS = 100  # longer walks are not sampled
+LIBRARY: Final = ("scipy-bdf", "scipy-radau")
+"""Asked where our other method gives up; multistep first, since its formulas are neither of ours."""
+LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Python
+
+
+@dataclass(frozen=True)
+class Second:
+    """A case walked by another method.
+
+    method  that reached an answer; empty if none did
+    walk    of it
+    tried   what became of those asked before, in words; empty if the first answered
+    """
+
+    method: str
+    walk: JudgedWalk | None
+    tried: str
+
+
+def judge(case: Case, config: Config) -> CaseResult:
+    """Run a case of either model and judge it."""
+    start = prepared(config, case)
+    if start is None:
+        rejected, none = Outcome.REJECTED.label, "there is no start"
+        return CaseResult(
+            case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, 0.0, (), (), "", none
+        )
+    methods = configured(start, case)
+    began = time.perf_counter()
+    walk = first_walk(start, case)
+    wall_s = time.perf_counter() - began
+    found: list[Measure | NotMeasured] = [*of_one_walk(walk, start, case)]
+    remarks: list[str] = []
+    second = Second("", None, f"the walk itself ended {walk.outcome.label}")
+    if walk.outcome.answered:
+        short = start.again(case)
+        second = second_walk(
+            start.settings.method,
+            case.budget,
+            lambda method, budget: start.walk(short, replace(methods, method=method, budget=budget)),
+        )
+        for what, again in walked_again(start, config, short, second):
+            found += time_difference(what, walk, again, case, methods.rtol)
+            differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected
+            if differs and short.steps == case.steps:
+                remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
+    found += start.momentum(walk, case)
+    return CaseResult(
+        name=case.name,
+        family=case.family,
+        model=case.model,
+        reason=case.reason,
+        expected=case.expected,
+        outcome=walk.outcome.label,
+        steps=int(walk.touches.size),
+        energy_balance_residual_J=finite(walk.residual_J),
+        rhs_evaluations=walk.rhs_evaluations,
+        wall_s=wall_s,
+        findings=tuple(one for one in found if isinstance(one, Measure)),
+        remarks=tuple(remarks),
+        second_method=second.method,
+        second_tried=second.tried,
+        not_measured=tuple(one for one in found if isinstance(one, NotMeasured)),
+    )
+
+
+def first_walk(start: Start, case: Case) -> JudgedWalk:
+    """The walk that is judged, sampled on the ground unless it is long."""
+    if isinstance(start, ContactStart):
+        return start.walk(case, configured(start, case), sampled=case.steps <= SAMPLED_STEPS)
+    return start.walk(case, configured(start, case))
+
+
+def of_one_walk(walk: JudgedWalk, start: Start, case: Case) -> list[Measure]:
+    """Measures that need no second walk."""
+    return [
+        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        start.balance(walk, case),
+        Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+        *start.measures(walk, case),
+    ]
+
+
+def walked_again(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
+    """The walks that must do the same, and what they are."""
+    again = [("tenfold tolerance", start.walk(case, configured(start, case, TENFOLD)))]
+    if second.walk is not None:
+        again.append((second.method, second.walk))
+    if case.twin:
+        scale = to_twin(config)
+        twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
+        twin = prepared(scaled(config, scale), twin_case)
+        if twin is not None:
+            again.append(("twin", twin.walk(case, configured(twin, case))))
+    return again
+
+
+def time_difference(what: str, one: JudgedWalk, other: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
+    """How far two walks' touches are apart; their ends if there are none; nothing where they have none either."""
+    steps = min(one.touches.size, other.touches.size, case.compared_steps)
+    if steps:
+        apart = float(np.max(np.abs(one.touches[:steps] - other.touches[:steps])))
+    elif one.end is None or other.end is None:
+        return []
+    else:
+        apart = abs(one.end - other.end)
+    limit = promised(case, rtol, one.accepted + other.accepted)
+    return [Measure(f"time apart from {what}, in pendulum times", finite(apart), limit)]
+
+
+def others(configured: str) -> tuple[Method, ...]:
+    """Whom to ask besides the configured method: our own first, then the libraries'."""
+    own = [name for name, method in METHODS.items() if method.compiled]
+    return tuple(method_named(name) for name in dict.fromkeys((*own, *LIBRARY)) if name != configured)
+
+
+def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
+    """The first other method's walk that answers.
+
+    budget  right-hand sides of our own methods
+    walk    walks the case with a method and a budget
+    """
+    tried: list[str] = []
+    for method in others(configured):
+        found = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))
+        if found.outcome.answered:
+            return Second(method.name, found, ", ".join(tried))
+        tried.append(f"{method.name} {found.outcome.label}")
+    return Second("", None, ", ".join(tried))

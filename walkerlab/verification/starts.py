@@ -1,0 +1,235 @@
+"""Walkers in the states that cases start from: how either model walks from there, and what its walk must keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.reads import ContactConfig, WalksConfig
+from walkerlab.config.schema import SolverSettings
+from walkerlab.config.stability import Case
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.mechanics.standing import Standing, swing_foot
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.gait import Gait
+from walkerlab.paper.appendix_a import RigidWalker
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import compass_or_none, rigid_walker
+from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.stepping import ACCEPTED, RHS
+from walkerlab.solvers.system import State
+from walkerlab.verification.masses import RigidMasses
+from walkerlab.verification.momentum import MEASURE, momentum_finding
+from walkerlab.verification.scaling import pendulum_time
+from walkerlab.verification.verdict import Measure, NotMeasured, finite
+
+HEIGHT = 1  # index into the state of the free walker
+ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
+SAMPLES_PER_PENDULUM_TIME = 40
+NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
+
+
+@dataclass(frozen=True)
+class JudgedWalk:
+    """A walk of either model as cases are judged by it, times in pendulum times of its walker.
+
+    end         when it was over; None in the rigid model, whose walks are over at a heel strike
+    residual_J  of the energy balance, or the drift of the energy within a swing
+    numbers     everything that must be finite
+    """
+
+    outcome: Outcome
+    touches: NDArray[np.float64]
+    end: float | None
+    residual_J: float  # noqa: N815
+    rhs_evaluations: int
+    accepted: int
+    numbers: NDArray[np.float64]
+    record: Any
+
+
+@dataclass(frozen=True)
+class RigidStart:
+    """A walker of the rigid model and the state that it starts from."""
+
+    config: WalksConfig
+    walker: Standing
+    start: State
+
+    @property
+    def settings(self) -> SolverSettings:
+        """Method and tolerances of the config."""
+        return self.config.solver.rigid
+
+    @property
+    def energy(self) -> float:
+        """What residuals are measured by (J): m g L and the kinetic energy of the start."""
+        walker, start = self.walker, self.start
+        speed = walker.leg_length * max(abs(rate) for rate in start[len(start) // 2 :])
+        return float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
+
+    @property
+    def compass(self) -> RigidWalker | None:
+        """The walker of Appendix A, if it is that."""
+        return compass_or_none(self.config, self.config.equations)
+
+    def again(self, case: Case) -> Case:
+        """As far as a case is walked again: no further than times are compared."""
+        return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
+
+    def walk(self, case: Case, methods: MethodSettings) -> JudgedWalk:
+        """Walk a case by a method."""
+        solver = methods.new(len(self.walker.blank))
+        walk = take_walk(self.walker, solver, self.start, case.steps, budget=methods.budget)
+        numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
+        touches = walk.heel_strikes / pendulum_time(self.config)
+        work = walk.work
+        return JudgedWalk(
+            walk.outcome, touches, None, walk.energy_drift, work.rhs_evaluations, work.accepted, numbers, walk
+        )
+
+    def balance(self, walk: JudgedWalk, case: Case) -> Measure:
+        """How well the energy is kept."""
+        return Measure("energy drift within a swing over energy", finite(walk.residual_J / self.energy), case.balance)
+
+    def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
+        """What heel strikes must keep."""
+        record: RecordedWalk = walk.record
+        if not record.steps:
+            return []
+        strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
+        off = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
+        changed = strikes.momentum_change(record.before, record.after)
+        won = strikes.energy_won(record.before, record.after) / self.energy
+        return [
+            Measure("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
+            Measure("momentum changed by a heel strike", changed, ROUNDING),
+            Measure("energy won at a heel strike", finite(won), ROUNDING),
+        ]
+
+    def momentum(self, _walk: JudgedWalk, _case: Case) -> list[Measure | NotMeasured]:
+        """Nothing beside what heel strikes keep: no force of the ground is known here but by the equations."""
+        return []
+
+
+@dataclass(frozen=True)
+class ContactStart:
+    """A walker on its ground, in the state that it starts from.
+
+    energy  m g L and the energy of the start (J): what residuals are measured by
+    """
+
+    config: WalksConfig
+    scene: ContactScene
+    start: State
+    energy: float
+
+    @property
+    def settings(self) -> SolverSettings:
+        """Method and tolerances of the config."""
+        return self.config.solver.contact
+
+    def again(self, case: Case) -> Case:
+        """As far as a case is walked again: all the way, since how it ends is compared too."""
+        return case
+
+    def walk(self, case: Case, methods: MethodSettings, sampled: bool = False) -> JudgedWalk:
+        """Walk a case by a method."""
+        scene, unit = self.scene, pendulum_time(self.config)
+        interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+        walk = walk_contact(
+            scene.walker, scene.ground, scene.pinned, STANCE_FOOT, self.start, methods, case.steps, interval
+        )
+        numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
+        return JudgedWalk(
+            walk.outcome,
+            walk.touch_time_s / unit,
+            walk.end_time_s / unit,
+            walk.energy_balance_residual_J,
+            int(walk.work[RHS]),
+            int(walk.work[ACCEPTED]),
+            numbers,
+            walk,
+        )
+
+    def balance(self, walk: JudgedWalk, case: Case) -> Measure:
+        """How well the energy balance closes."""
+        return Measure("energy balance residual over energy", finite(walk.residual_J / self.energy), case.balance)
+
+    def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
+        """That friction and damping give nothing back, of a walk that was sampled."""
+        record: ContactWalkResult = walk.record
+        if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
+            return []
+        falls = -np.diff(record.samples.dissipated_J[:, :2], axis=0)
+        back = finite(max(0.0, float(np.max(falls))) / self.energy)
+        return [Measure("energy won back from friction and damping", back, NEVER_LESS * case.balance)]
+
+    def momentum(self, walk: JudgedWalk, case: Case) -> list[Measure | NotMeasured]:
+        """The momentum's balance of a walk that has an outcome and a length."""
+        if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
+            return [NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")]
+        return [momentum_finding(self.config, self.scene, self.start, case)]
+
+
+Start = RigidStart | ContactStart
+
+
+def configured(start: Start, case: Case, tighter: float = 1.0) -> MethodSettings:
+    """The config's method, at tolerances so many times its own, within the case's budget."""
+    settings = start.settings
+    return MethodSettings(method_named(settings.method), tighter * settings.rtol, tighter * settings.atol, case.budget)
+
+
+@cache
+def gait_of(walker: Standing, seed: int) -> Gait | None:
+    """The gait that a search finds, once: most cases of a catalogue are one walker on other ground."""
+    return find_gaits(walker, seed).gait
+
+
+def prepared(config: WalksConfig, case: Case) -> Start | None:
+    """The start of a case; None if it starts from a gait that there is not."""
+    walker = rigid_walker(config, config.equations)
+    if isinstance(config.start, str):
+        gait = gait_of(walker, config.seed)
+        if gait is None:
+            return None
+        state, length = as_state(gait.state), float(gait.step_length)
+    else:
+        state, length = config.start, abs(float(swing_foot(walker, config.start)[1]))
+    if case.model == "rigid":
+        return RigidStart(config, walker, state)
+    return on_ground(config, state, length, case.lowered_m)
+
+
+def on_ground(config: WalksConfig, rigid_state: State, length: float, lowered: float) -> ContactStart | None:
+    """The start on compliant ground, from a rigid state of a step length, lowered into it (all m)."""
+    own = own_pitch(config, length, rigid_state)
+    if own is None:
+        return None
+    scene = contact_scene(config, length, own)
+    y = start_state(scene, rigid_state)
+    y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
+    leg, rates = config.walker.leg_length_m, len(y) // 2  # where the velocities begin
+    speed = float(np.max(np.abs([*y[rates : rates + 2], *(leg * rate for rate in y[rates + 2 :])])))
+    law = scene.walker.normal
+    stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    energy = scene.walker.tree.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
+    return ContactStart(config, scene, y, energy)
+
+
+def own_pitch(config: ContactConfig, rigid_step_m: float, rigid_state: State) -> float | None:
+    """What pads of the contact gait's own pitch are laid for (m), if the case wants them; None if there is no gait."""
+    contact = config.contact
+    if contact is None or not wants_own_pitch(contact):
+        return rigid_step_m
+    found = contact_gait(config, rigid_step_m, rigid_state).gait
+    return None if found is None else found.step.length_m
