@@ -5,7 +5,8 @@ import pytest
 from synthetic_walks import stored
 
 from walkerlab.config.loader import load
-from walkerlab.figures.figure_15 import FIGURE, attractor_name, sides_of
+from walkerlab.figures.maps import FIGURE_15 as FIGURE
+from walkerlab.figures.maps import attractor_name, sides_of
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results

@@ -47,14 +47,14 @@ def write_film(folder: RunFolder, path: Path, film: Film, console: Console) -> P
     if path.suffix == ".mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     # Imported here: what cannot be written is told before anything is loaded that draws.
-    from walkerlab.figures.film import pictures, sticks_of, times, why_not
+    from walkerlab.figures.stick_diagram import OF_STAGE, film_times, pictures, sticks_of
 
     results = {film.model: result_in(folder, film.model)}
-    why = why_not(results, film.model)
+    why = OF_STAGE[film.model].why_left_out(results, {})
     if why is not None:
         raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
-    sticks = sticks_of(results, film.model)
-    at = times(sticks, film.steps, film.rate, film.slower)
+    sticks = sticks_of(results[film.model])
+    at = film_times(sticks, film.steps, film.rate, film.slower)
     line = console.begin("animate", f"{at.size} pictures")
     line.start("drawing", int(at.size))
     drawn = told(pictures(sticks, at), line)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
-from walkerlab.figures.canvas import blank, settle, styled, svg_of
+from walkerlab.figures.canvas import as_file, blank, settle, styled
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -164,7 +164,7 @@ def drawn(walker: AnyWalker, name: str) -> bytes:
     with styled():
         figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
         settle(figure)
-        return svg_of(figure, name, title)
+        return as_file(figure, "svg", name, title)
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:

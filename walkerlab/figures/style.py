@@ -7,7 +7,7 @@ brightness too, and in the line's style, so that figures survive a grey printer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
@@ -76,6 +76,11 @@ class Look:
     width: float
     marker: str
     order: int = 3
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """What matplotlib is told of its line."""
+        return {"color": self.colour, "linestyle": self.style, "linewidth": self.width}
 
 
 RIGID: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)

@@ -12,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank, png_of, settle, styled, svg_of
+from walkerlab.figures.canvas import as_file, blank, settle, styled
+from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
 from walkerlab.store.content import Group, Variable
 
@@ -27,9 +28,6 @@ PREFERRED: Final[tuple[str, ...]] = (
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
 LABELS: Final = {RADIUS: "largest multiplier (1)"}
-WHITE: Final = "#FFFFFF"
-LOG_SPAN: Final = 50.0
-"""Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ def draw(
     with styled():
         figure = maps(group, parameters, names) if len(dims) == 2 else panels(group, parameters, dims, names)
         settle(figure)
-        svg, png = svg_of(figure, f"sweep-{stage}", title), png_of(figure, title)
+        svg, png = (as_file(figure, kind, f"sweep-{stage}", title) for kind in ("svg", "png"))
     return SweepFigure(svg, png, title, caption(group, dims, parameters, names))
 
 
@@ -160,14 +158,6 @@ def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
         getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
 
 
-def is_logarithmic(values: NDArray[Any]) -> bool:
-    """Whether values are evenly spaced powers over a wide range."""
-    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < LOG_SPAN:
-        return False
-    gaps = np.diff(np.log(np.sort(values)))
-    return bool(gaps.max() < 1.01 * gaps.min())
-
-
 def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
     """A map for each number, two in a row; the second parameter runs upward."""
     columns = min(2, len(names))
@@ -202,14 +192,3 @@ def numbers(group: Group, parameter: str) -> NDArray[Any]:
     """A parameter's values as numbers; places of words."""
     values = group[parameter]
     return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)
-
-
-def edges(centres: NDArray[Any]) -> NDArray[Any]:
-    """Bounds of cells about values, halfway between neighbours, on their own scale."""
-    scale = np.log(centres) if is_logarithmic(centres) else centres
-    if scale.size == 1:
-        found = np.array([scale[0] - 0.5, scale[0] + 0.5])
-    else:
-        middle = 0.5 * (scale[1:] + scale[:-1])
-        found = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
-    return np.exp(found) if is_logarithmic(centres) else found
