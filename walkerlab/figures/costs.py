@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -66,10 +66,10 @@ class MethodSeries:
     @property
     def reached(self) -> NDArray[np.bool_]:
         """Which of the runs came to the end."""
-        return self.runs["reached"] != 0
+        return np.asarray(self.runs["reached"] != 0)
 
     @property
-    def line(self) -> dict[str, object]:
+    def line(self) -> dict[str, Any]:
         """What matplotlib is told of its line; filled marks are those of methods that are compiled as a whole."""
         filled = self.look.colour if self.look.style == "-" else "none"
         return {**self.look.line, "marker": self.look.marker, "markersize": 4.0, "markerfacecolor": filled}
@@ -203,7 +203,7 @@ class EngineSeries:
     @property
     def walked(self) -> NDArray[np.bool_]:
         """Which of the runs walked to the end."""
-        return self.runs["outcome"] == "walked"
+        return np.asarray(self.runs["outcome"] == "walked")
 
     @property
     def line(self) -> Line2D:
@@ -277,8 +277,8 @@ def plot_periods(scene: str, results: Results) -> Figure:
     reference = results[ENGINES_STAGE].summary["reference"][scene]
     levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
-        look = {"color": RIGID.colour, "linewidth": 1.2, "linestyle": ":"}
-        levels.append(axes.axhline(reference["rigid_period_s"], **look, label="rigid gait"))
+        level, look = reference["rigid_period_s"], RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
+        levels.append(axes.axhline(level, **look, label="rigid gait"))
     few_ticks(axes)
     axes.set_xlabel("step size (s)")
     axes.set_ylabel("period of the last step (s)")
