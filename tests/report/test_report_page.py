@@ -15,9 +15,10 @@ from walkerlab.report.blocks import MAIN, Paragraph, Picture, Section, Shares, S
 from walkerlab.report.page import Page as Sheet
 from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
 from walkerlab.report.words import words
+from walkerlab.scene.left_out import LeftOut
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"
@@ -132,7 +133,8 @@ def test_texts_of_results_never_become_markup():
             "compare": compare([row]),
         },
         (Picture(NASTY, NASTY, NASTY, None, PIXELS, 1, 1, NASTY, ((NASTY, NASTY),)),),
-        (Absent(NASTY, NASTY, failed=True), Absent("tune", NASTY)),
+        (LeftOut(NASTY, NASTY), LeftOut("tune", NASTY)),
+        failed=frozenset({NASTY}),
     )
     for one in pages_of(results, f"paper@{NASTY}"):
         html = render(one)

@@ -29,25 +29,26 @@ from walkerlab.config.loader import load
 from walkerlab.report.blocks import PAPER, Code, Paragraph, Player, Section, Shares, Statements
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.results import Results
 from walkerlab.report.sections import assumptions
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.content import Group, Variable
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
-    Absent("fixedpoint", NO_GAIT, failed=True),
-    Absent("simulate", f"it needs fixedpoint: {NO_GAIT}"),
-    Absent("contact-sim", f"it needs fixedpoint: {NO_GAIT}"),
+    LeftOut("fixedpoint", NO_GAIT),
+    LeftOut("simulate", f"it needs fixedpoint: {NO_GAIT}"),
+    LeftOut("contact-sim", f"it needs fixedpoint: {NO_GAIT}"),
 )
 
 
-def sections(stages=None, *, absent=(), sets=(), **changed):
+def sections(stages=None, *, absent=(), failed=(), sets=(), **changed):
     made = {name: make() for name, make in EVERYTHING.items() if stages is None or name in stages} | changed
-    found = sections_of(Results(config(*sets), made, (), absent))
+    found = sections_of(Results(config(*sets), made, (), absent, failed=frozenset(failed)))
     return {section.anchor: section for section in found}
 
 
@@ -94,7 +95,7 @@ def test_without_contact_nothing_is_said_of_contact():
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():
-    first = sections([], absent=WITHOUT_GAIT)["verdict"].blocks[0]
+    first = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"])["verdict"].blocks[0]
     assert isinstance(first, Paragraph)
     assert first.tone == "bad"
     assert NO_GAIT in first.text
@@ -102,13 +103,13 @@ def test_a_slope_without_a_gait_is_said_in_words_first():
 
 
 def test_what_was_never_wanted_is_no_failure():
-    absent = [Absent("contact-sim", "the config has no contact block")]
+    absent = [LeftOut("contact-sim", "the config has no contact block")]
     assert not blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
 
 
 def test_all_that_is_missing_is_listed_with_its_reason():
     walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs", "saves": "2 numbers"}])
-    found = sections([], absent=WITHOUT_GAIT, simulate=walk)["left-out"]
+    found = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"], simulate=walk)["left-out"]
     assert rows(found) == {
         "fixedpoint": [NO_GAIT, ""],
         "simulate and contact-sim": ["for want of fixedpoint", ""],
@@ -118,8 +119,8 @@ def test_all_that_is_missing_is_listed_with_its_reason():
 
 def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
     why = "the config has no contact block"
-    absent = [Absent(name, why, saves="contact code") for name in ("contact-sim", "compare")]
-    absent.append(Absent("figure 6", f"it needs contact-sim: {why}"))
+    absent = [LeftOut(name, why, saves="contact code") for name in ("contact-sim", "compare")]
+    absent.append(LeftOut("figure 6", f"it needs contact-sim: {why}"))
     found = sections([], absent=absent)["left-out"]
     assert rows(found) == {
         "contact-sim and compare": [why, "contact code"],

@@ -8,8 +8,8 @@ from pathlib import Path
 from walkerlab.config.reads import NamedConfig
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored

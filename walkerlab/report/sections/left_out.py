@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.numbers import count, listed
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
+from walkerlab.scene.left_out import LeftOut
 
 
 def section(results: Results) -> Section:
@@ -21,7 +22,7 @@ def section(results: Results) -> Section:
     return Section("left-out", "Left out", (missing,), f"{count(len(rows), 'thing')}, each with its reason.")
 
 
-def rows_of(missing: Sequence[Absent]) -> list[list[str]]:
+def rows_of(missing: Sequence[LeftOut]) -> list[list[str]]:
     """What is missing for one reason in a row, and in a row below it what is missing for want of that."""
     causes = dict.fromkeys(cause(absent.why, missing) for absent in missing)
     rows = []
@@ -33,15 +34,14 @@ def rows_of(missing: Sequence[Absent]) -> list[list[str]]:
     return rows
 
 
-def cause(why: str, missing: Sequence[Absent]) -> str:
+def cause(why: str, missing: Sequence[LeftOut]) -> str:
     """The reason at the bottom of a reason, such as 'it needs simulate: it needs fixedpoint: no gait'."""
     return min((absent.why for absent in missing if why.endswith(absent.why)), key=len)
 
 
-def everything_absent(results: Results) -> list[Absent]:
+def everything_absent(results: Results) -> list[LeftOut]:
     """What is missing as a whole, then what results say that they left out."""
     found = list(results.absent)
     for result in results.stored.values():
-        said = result.summary.get("left_out", [])
-        found += [Absent(str(one["what"]), str(one["why"]), saves=str(one.get("saves", ""))) for one in said]
+        found += [LeftOut(**one) for one in result.summary.get("left_out", [])]
     return list(dict.fromkeys(found))

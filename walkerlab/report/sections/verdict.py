@@ -10,11 +10,12 @@ from typing import Any
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.outcomes import MODELS, tone
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper import TONES, errata, paper_numbers
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.words import words
+from walkerlab.scene.left_out import LeftOut
 
 HEADLINES = {
     "A.5 row 2": "The equations of motion have a sign error",
@@ -51,13 +52,13 @@ def section(results: Results) -> Section:
 def failures(results: Results) -> list[str]:
     """What has no answer, and what is missing for that reason; then results that are there and say that they fail."""
     told = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
-    missing = [failure(results, absent) for absent in results.absent if absent.failed]
+    missing = [failure(results, absent) for absent in results.absent if absent.what in results.failed]
     return [*missing, *(f"{name}: {said['message'].rstrip('.')}." for name, said in told.items() if said is not None)]
 
 
-def failure(results: Results, absent: Absent) -> str:
+def failure(results: Results, absent: LeftOut) -> str:
     """Why a stage has no answer, and which others have none for that reason."""
-    lost = [other.what for other in results.absent if not other.failed and absent.why in other.why]
+    lost = [other.what for other in results.absent if other.what not in results.failed and absent.why in other.why]
     without = f" What needs it is left out: {listed(lost)}." if lost else ""
     return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
 
