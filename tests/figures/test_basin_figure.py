@@ -10,7 +10,7 @@ from walkerlab.figures.maps import attractor_name, sides_of
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results
-from walkerlab.report.sections.basin import section
+from walkerlab.report.sections.families import basin as section
 from walkerlab.stages.basin import group_of, summary, window_of
 from walkerlab.stages.basin_pieces import WalkEnds
 

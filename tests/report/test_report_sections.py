@@ -30,9 +30,9 @@ from walkerlab.report.blocks import PAPER, Code, Paragraph, Player, Section, Sha
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Results
-from walkerlab.report.sections import assumptions
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
+from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.scene.left_out import LeftOut
@@ -400,7 +400,7 @@ def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
 def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
-    made = assumptions.section(Results(config("contact=null"), {"simulate": walk}))
+    made = assumptions(Results(config("contact=null"), {"simulate": walk}))
     assert "The stance foot does not slip: needs friction (0.203)" in made.finding
 
 

@@ -12,7 +12,7 @@ from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Results
-from walkerlab.report.sections.further import TITLES
+from walkerlab.report.sections.closing import TITLES
 from walkerlab.report.tables import Table
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE

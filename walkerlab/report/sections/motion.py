@@ -1,4 +1,4 @@
-"""The walk, moving: all models that walked on their ground, with a foot in close-up and three views on one clock."""
+"""What is seen: the walk, moving, with a foot in close-up and three views on one clock; and the figures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.report.blocks import Pad, PageBlock, Player, Section, Walker
+from walkerlab.report.blocks import MAIN, Gallery, Pad, PageBlock, Paragraph, Player, Section, Walker
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
@@ -162,3 +162,14 @@ def alt(results: Results, stages: tuple[str, ...]) -> str:
         f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: "
         + "; ".join(walked)
     )
+
+
+def figures(results: Results) -> Section | None:
+    """The figures of the walks and gaits."""
+    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    if not shown:
+        return None
+    blocks: list[PageBlock] = [Gallery(shown)]
+    if results.of_the_paper:
+        blocks.insert(0, Paragraph("Figures have the numbers that they have in the paper. A click enlarges one."))
+    return Section("figures", "Figures", tuple(blocks))
