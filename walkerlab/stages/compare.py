@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.config.schema import Equations
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_the_papers
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Array, Motion, sampled_at_strikes
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
@@ -54,7 +54,7 @@ EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
 def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
-    if not is_plain_compass(config.walker):
+    if not is_the_papers(config.walker):
         return models_compared(config, inputs, progress)
     progress.start("compare", 3)
     study = study_the_paper()
@@ -109,7 +109,7 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
     return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": left_out})
 
 
-NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's compass"}
+NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
