@@ -16,10 +16,10 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import NoAnswer
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
     STILL_COMPUTED,
-    LeftOut,
     Planner,
     Step,
     input_digest,
