@@ -15,7 +15,6 @@ from walkerlab.paper.measured import (
     ContactModel,
     Departures,
     EnergyRecord,
-    Errors,
     LegErrors,
     Measured,
     characteristics,
@@ -39,8 +38,7 @@ from walkerlab.paper.printed import (
     slope_of,
     walker_of_the_paper,
 )
-from walkerlab.paper.result_rows import result_rows
-from walkerlab.paper.start_rows import start_rows
+from walkerlab.paper.rows import paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.solvers.scipy_methods import right_hand_side
 
@@ -135,7 +133,7 @@ def contact_model(**changed):
     return replace(model, **changed)
 
 
-PAPERS_OWN, NO_ERRORS = Departures((), ()), Errors()
+PAPERS_OWN, NO_ERRORS = Departures((), ()), {}
 
 
 @pytest.fixture
@@ -151,7 +149,7 @@ def rows(study):
             errors=errors,
             departures=departures,
         )
-        return {row.printed: row for row in (*start_rows(measured, study), *result_rows(measured, study))}
+        return {row.printed: row for row in paper_rows(measured, study)}
 
     return judged
 
@@ -232,9 +230,9 @@ def test_percentages_are_refuted_unless_one_of_the_bases_gives_them(rows):
 
 def test_an_error_as_small_as_the_printed_one_is_no_refutation(rows):
     small, large = LegErrors((9e-5, 1e-4), (1e-4, 1e-4)), LegErrors((0.1, 0.1), (1.0, 1.0))
-    assert rows(errors=Errors(raw=large, aligned=large))[ANGLE_ERROR].verdict == Verdict.REFUTED
-    assert rows(errors=Errors(raw=large, aligned=small))[ANGLE_ERROR].verdict == Verdict.EXPLAINED
-    assert rows(errors=Errors(raw=small, aligned=small))[ANGLE_ERROR].verdict == Verdict.REPRODUCED
+    assert rows(errors={"raw": large, "aligned": large})[ANGLE_ERROR].verdict == Verdict.REFUTED
+    assert rows(errors={"raw": large, "aligned": small})[ANGLE_ERROR].verdict == Verdict.EXPLAINED
+    assert rows(errors={"raw": small, "aligned": small})[ANGLE_ERROR].verdict == Verdict.REPRODUCED
 
 
 def test_five_gait_cycles_are_refuted_by_a_fall_and_not_by_a_short_request(rows):

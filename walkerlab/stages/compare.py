@@ -30,8 +30,7 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.result_rows import result_rows
-from walkerlab.paper.start_rows import start_rows
+from walkerlab.paper.rows import paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.scene.contact import GAIT_ATOL, GAIT_METHOD, GAIT_RTOL, contact_scene, start_state
@@ -62,7 +61,7 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     progress.advance()
     measured = measure(config, inputs, motion)
-    rows = (*start_rows(measured, study), *result_rows(measured, study))
+    rows = tuple(paper_rows(measured, study))
     progress.advance()
     found = errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
