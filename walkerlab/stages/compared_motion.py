@@ -123,10 +123,8 @@ def in_phase(phases: Array, aligned: WalkDifference) -> Group:
             **numbered(len(aligned.angle), STEP, "step number"),
             PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
             **legs(),
-            "aligned_angle_error_rad": Variable(aligned.angle, dims, "rad", f"angle, {SENSE}, at the same phase"),
-            "aligned_velocity_error_rad_s": Variable(
-                aligned.velocity, dims, "rad/s", f"velocity, {SENSE}, at the same phase"
-            ),
+            "aligned_angle_error_rad": Variable(aligned.angle, dims, "rad", f"angle, {said}"),
+            "aligned_velocity_error_rad_s": Variable(aligned.velocity, dims, "rad/s", f"velocity, {said}"),
         },
         {"impact_phase": IMPACT_PHASE},
     )
