@@ -22,17 +22,10 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
-    tracks: dict[str, Track] = {}
-    for stage in MODELS:
-        result = results.stored.get(stage)
-        track = None if result is None else track_of(result)
-        if track is not None:
-            tracks[stage] = track
-    if not tracks:
-        return None
+    found = {stage: track_of(results.stored[stage]) for stage in MODELS if stage in results.stored}
     end = first_steps(results)
-    tracks = {stage: track.until(end) for stage, track in tracks.items()}
-    return Section("motion", "The walk", (player(results, tracks),))
+    tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
+    return Section("motion", "The walk", (player(results, tracks),)) if tracks else None
 
 
 def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
@@ -58,12 +51,8 @@ def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
 
 def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
-    times = []
-    for stage in MODELS:
-        touches = (results.summary(stage) or {}).get("touch_times_s", [])
-        if len(touches) >= MAX_STEPS:
-            times.append(touches[MAX_STEPS - 1])
-    return max(times) if times else math.inf
+    touches = [(results.summary(stage) or {}).get("touch_times_s", []) for stage in MODELS]
+    return max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
 
 
 def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
@@ -89,13 +78,7 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
     times: Any = np.array([0.0, *strikes])
     wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
-    names = [
-        "f0",
-        *(["k0"] if "kx0" in track.channels else []),
-        "h",
-        *(["k1"] if "kx1" in track.channels else []),
-        "f1",
-    ]
+    names = ["f0", "k0", "h", "k1", "f1"] if "kx0" in track.channels else ["f0", "h", "f1"]
     return tuple(tuple(point(track, name, int(row)) for name in names) for row in rows)
 
 
