@@ -15,32 +15,29 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from walkerlab.figures.style import ONE_COLUMN, PNG_DPI, RC, WIDTH
+from walkerlab.figures.style import LEGEND_LETTERS, NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 LETTER, BESIDE_LABEL = 0.07, 0.65
-"""Width of a legend's letter, and of all that is beside a label, in."""
+"""Width of a legend's letter, and of all that is beside a label, in, at the ordinary size of its letters."""
+SHRINKS = 0.7
+"""Power of its width that a figure's height follows: letters keep their size."""
 
 
 @contextlib.contextmanager
-def styled(columns: int = 2) -> Iterator[None]:
+def styled(width: float = WIDTH) -> Iterator[None]:
     """Matplotlib's defaults and this project's style on top, whatever the user's own settings are.
 
-    columns  of a journal that a figure is to fill: in one, letters are smaller and lines thinner
+    width  of the figures, in; in narrow ones, letters are smaller and lines thinner
     """
-    with matplotlib.style.context(["default", RC, *([ONE_COLUMN] if columns == 1 else [])]):
+    size = {"figure.figsize": (width, width)}
+    with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
 
 
-def resize(figure: Figure, columns: int) -> None:
-    """Make a figure as wide as one column, and not as much lower; as it is for two."""
-    if columns == 1:
-        _, height = figure.get_size_inches()
-        figure.set_size_inches(WIDTH / 2, max(0.62 * height, 2.0))
-
-
 def blank(height: float) -> Figure:
-    """A figure of the common width and of `height` in."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
+    width = matplotlib.rcParams["figure.figsize"][0]
+    figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -53,7 +50,8 @@ def entry(label: str, **look: Any) -> Line2D:
 def legend_above(figure: Figure, handles: Sequence[Artist]) -> None:
     """A legend in a band of its own above all axes, in as few rows as fit into the figure's width."""
     labels = [str(handle.get_label()) for handle in handles]
-    fitting = (columns for columns in range(len(labels), 1, -1) if legend_width(labels, columns) < WIDTH)
+    room = figure.get_figwidth() * LEGEND_LETTERS / matplotlib.rcParams["legend.fontsize"]
+    fitting = (columns for columns in range(len(labels), 1, -1) if legend_width(labels, columns) < room)
     rows = -(-len(labels) // next(fitting, 1))
     figure.legend(handles=list(handles), loc="outside upper center", ncols=-(-len(labels) // rows))
 

@@ -18,7 +18,20 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
 from walkerlab.figures.canvas import blank, entry, legend_above
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, RIGID, VERMILLION, Look
+from walkerlab.figures.style import (
+    BLACK,
+    BLUE,
+    CONTACT,
+    GREEN,
+    GREY,
+    NARROW_BELOW,
+    ORANGE,
+    PALE,
+    PURPLE,
+    RIGID,
+    VERMILLION,
+    Look,
+)
 from walkerlab.figures.walk_figures import TUNE_STAGE
 from walkerlab.figures.walks import Array, redoes_the_paper
 from walkerlab.paper.printed import ANGLE_ERROR
@@ -32,9 +45,11 @@ METHODS_HEIGHT, ENGINES_HEIGHT = 3.9, 4.2  # in
 
 
 def decades(axes: Axes) -> None:
-    """A logarithmic axis of errors with a label at every decade."""
+    """A logarithmic axis of errors with a label at every decade, or at fewer where letters would meet."""
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(numticks=20))
+    axes.yaxis.set_major_locator(
+        LogLocator(numticks=20 if axes.figure.bbox.width > NARROW_BELOW * axes.figure.dpi else 8)
+    )
     axes.yaxis.set_minor_locator(NullLocator())
 
 

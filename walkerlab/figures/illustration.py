@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import as_file, resize, settle, styled
+from walkerlab.figures.canvas import as_file, settle, styled
+from walkerlab.figures.style import POINT
 from walkerlab.store.artifact import Stored
 
 Results = Mapping[str, Stored]
@@ -97,11 +98,10 @@ class Illustration:
             svg, png = (as_file(figure, kind, self.name, self.heading) for kind in ("svg", "png"))
             return Drawing(svg, png, self.caption(results))
 
-    def as_file(self, results: Results, kind: str, columns: int) -> bytes:
-        """The figure as PDF, SVG or PNG, as wide as one or two columns of a journal."""
-        with styled(columns):
+    def as_file(self, results: Results, kind: str, width: float) -> bytes:
+        """The figure as PDF, SVG or PNG, of a width in pt."""
+        with styled(POINT * width):
             figure = self.plot(results)
-            resize(figure, columns)
             settle(figure)
             return as_file(figure, kind, self.name, self.heading)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -216,7 +217,7 @@ def mark_landings(axes: Axes, sticks: Sticks) -> None:
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
             f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
-            arrowprops=arrow, ha="center", va="top", fontsize=8.0,
+            arrowprops=arrow, ha="center", va="top", fontsize=matplotlib.rcParams["xtick.labelsize"],
         )  # fmt: skip
 
 
