@@ -26,10 +26,11 @@ from synthetic_results import (
 )
 
 from walkerlab.config.loader import load
-from walkerlab.report.blocks import PAPER, Code, Paragraph, Player, Section, Shares, Statements
+from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
 from walkerlab.report.results import Results
+from walkerlab.report.sections import motion
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.sections.walks import assumptions
@@ -104,7 +105,40 @@ def test_a_slope_without_a_gait_is_said_in_words_first():
 
 def test_what_was_never_wanted_is_no_failure():
     absent = [LeftOut("contact-sim", "the config has no contact block")]
-    assert not blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
+    said = blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
+    assert [one.tone for one in said] == ["plain"]
+
+
+def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
+    def opening(**changed):
+        return plain(sections(**changed)["verdict"].blocks[0].text)
+
+    assert opening() == (
+        "Both models walk all 4 steps, and the gait is stable; 1 of the 4 numbers that the paper prints come out and 2 "
+        "are refuted, and as its equations have a sign error (A.5), the corrected ones are to be used."
+    )
+    slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
+    other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
+    said = opening(compare=other, **{"contact-sim": contact_sim(**slower)})
+    assert "takes 1 % more time than in the rigid gait" in said
+    fallen = opening(compare=other, **{"contact-sim": contact_sim("fell", 3)})
+    assert fallen == (
+        "The rigid model walks all 4 steps, the contact model walks 3 steps and then falls, and the gait is stable. "
+        "Start nearer to a gait."
+    )
+
+
+def test_figures_of_the_paper_that_are_not_drawn_are_explained():
+    figure = Picture("Figure 2. Sticks.", "As walked.", "Legs.")
+    made = {name: make() for name, make in EVERYTHING.items()}
+    (said,) = blocks(motion.figures(Results(config(), made, (figure,))), Paragraph)
+    assert "figures 1, 3 and 4 show no results" in said.text
+
+
+def test_the_papers_third_table_says_whose_periods_it_has_and_over_which_time_it_takes_means():
+    (_, third) = blocks(sections()["tables"], Table)
+    for part in ("last completed stride", "first step is the left one", "last five"):
+        assert part in third.note
 
 
 def test_all_that_is_missing_is_listed_with_its_reason():

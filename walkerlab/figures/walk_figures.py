@@ -351,9 +351,10 @@ def say_energies(results: Results) -> str:
     walks = walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES)
     cut, extent = shown(walks)
     means = ", ".join(f"{walk.look.label} {mean_energy(walk):.5g} J" for walk in cut)
+    last = "; Table 3 has that of the contact model's last five steps" if redoes_the_paper(results) else ""
     return (
         f"Energies of the whole walker{extent}, the potential one from the current stance foot. "
-        f"Time mean of the mechanical energy: {means}. "
+        f"Time mean of the mechanical energy over all that is shown: {means}{last}. "
         f"{IMPACTS if any(walk.look is CONTACT for walk in walks) else ''}{sentence(walks)}"
     )
 

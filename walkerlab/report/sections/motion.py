@@ -11,6 +11,7 @@ from walkerlab.report.blocks import MAIN, Gallery, Pad, PageBlock, Paragraph, Pl
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
+from walkerlab.report.words import words
 
 MAX_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
@@ -154,5 +155,5 @@ def figures(results: Results) -> Section | None:
         return None
     blocks: list[PageBlock] = [Gallery(shown)]
     if results.of_the_paper:
-        blocks.insert(0, Paragraph("Figures have the numbers that they have in the paper. A click enlarges one."))
+        blocks.insert(0, Paragraph(words("figures.numbered")))
     return Section("figures", "Figures", tuple(blocks))

@@ -9,7 +9,7 @@ from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, listed
-from walkerlab.report.outcomes import MODELS, tone
+from walkerlab.report.outcomes import CONTACT, MODELS, WALKED, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper import TONES, errata, paper_numbers
@@ -34,6 +34,7 @@ Rows = Sequence[Mapping[str, Any]]
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
     blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
+    blocks += opening(results)
     told = (*(walk(results, stage) for stage in MODELS), gait(results), adjustment(results))
     fared = [found for found in told if found is not None]
     if fared:
@@ -47,6 +48,21 @@ def section(results: Results) -> Section:
     elif not blocks:
         blocks.append(Paragraph("There are no results to judge."))
     return Section("verdict", "Verdict", tuple(blocks))
+
+
+def opening(results: Results) -> list[PageBlock]:
+    """What holds, what fails and what follows; nothing without a walk."""
+    found = {model.lower(): results.summary(stage) for stage, model in MODELS.items()}
+    walked = {model: summary for model, summary in found.items() if summary is not None}
+    if not walked:
+        return []
+    verdicts = Counter(str(row["verdict"]) for row in paper_numbers(results)) if results.of_the_paper else Counter()
+    misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
+    gait, contact = results.summary("fixedpoint"), results.summary(CONTACT)
+    slower = None
+    if gait and contact and contact["outcome"] == WALKED and gait.get("period_s"):
+        slower = 100.0 * (contact["step_periods_s"][-1] / gait["period_s"] - 1.0)
+    return [Paragraph(words("verdict.opening", walked, gait, verdicts, misprint, slower))]
 
 
 def failures(results: Results) -> list[str]:
