@@ -134,7 +134,7 @@ def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
 @pytest.mark.parametrize(
     ("what", "kind", "error", "said"),
     [
-        ("tabl", "tex", ConfigError, "there is no tabl. Did you mean table"),
+        ("tabl", "tex", ConfigError, "nothing is called tabl. Did you mean table"),
         ("table-1", "tex", ConfigError, "compares with the paper's walker"),
         ("figure-07", "csv", ConfigError, "cannot be written as csv"),
         ("figure-11", "pdf", StaleError, "cannot be drawn"),

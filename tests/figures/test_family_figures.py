@@ -56,6 +56,6 @@ def test_the_captions_say_where_gaits_change():
 def test_the_plane_is_shaded_by_what_walks_settle_on():
     regions = families()["continuation"]["rigid/regions"]
     kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
-    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "none goes on": 1}
+    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "no walk goes on": 1}
     assert "1 step in 50 %" in FIGURE_16.caption(families())
     assert len(plotted(FIGURE_16).axes[0].collections) == 1

@@ -46,6 +46,6 @@ def test_every_length_of_the_walker_is_named_with_its_value():
 
 @pytest.mark.parametrize("walker", [KNEED, StraightLegs(type="straight-legs", foot_centre_ahead_m=0.02)])
 def test_measures_are_as_long_as_they_say(walker):
-    for measure in upright(walker).measures:
+    for measure in upright(walker).lengths:
         gaps = np.abs(np.subtract(measure.end, measure.start))
         assert np.abs(gaps - abs(measure.value)).min() < 1e-12

@@ -146,7 +146,7 @@ def test_all_that_is_missing_is_listed_with_its_reason():
     found = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"], simulate=walk)["left-out"]
     assert rows(found) == {
         "fixedpoint": [NO_GAIT, ""],
-        "simulate and contact-sim": ["for want of fixedpoint", ""],
+        "simulate and contact-sim": ["needs fixedpoint", ""],
         "forces": ["not among the outputs", "2 numbers"],
     }
 
@@ -158,7 +158,7 @@ def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
     found = sections([], absent=absent)["left-out"]
     assert rows(found) == {
         "contact-sim and compare": [why, "contact code"],
-        "figure 6": ["for want of contact-sim and compare", ""],
+        "figure 6": ["needs contact-sim and compare", ""],
     }
 
 

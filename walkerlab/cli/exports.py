@@ -109,7 +109,7 @@ def figure_in(folder: RunFolder, name: str) -> Illustration:
         near = nearest(name, (*named, *TABLES, TRAJECTORY))
         meant = f" Did you mean {near}?" if near else ""
         drawable = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
-        raise ConfigError(f"there is no {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
+        raise ConfigError(f"nothing is called {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
     return named[name]
 
 

@@ -339,7 +339,7 @@ def region_kinds(regions: Group) -> list[Kind]:
     kinds += [
         (OTHER_PERIOD, "another number of steps", other),
         (APERIODIC, "never repeats itself", period == 0),
-        (NOTHING, "none goes on", period < 0),
+        (NOTHING, "no walk goes on", period < 0),
     ]
     return [kind for kind in kinds if kind[2].any()]
 

@@ -333,7 +333,7 @@ def plot_stiction(results: Results) -> Figure:
     unanswered = np.isin(outcomes, UNANSWERED)
     otherwise = (cells["compared"] == 0) & ~unanswered
     colour_errors(figure, right, cells, VELOCITY, cells["compared"] == 1, SHARP)
-    right.set_title("(b) against a tenfold tolerance")
+    right.set_title("(b) against a tolerance ten times tighter")
     for mask, colour in ((unanswered, BLACK), (otherwise, VERMILLION)):
         overlay(right, cells, VELOCITY, mask, colour)
     for axes in (left, right):
@@ -420,8 +420,8 @@ def caption_stiction(results: Results) -> str:
         f"{cells.attrs['steps_wanted']} steps of the paper's walk by the default method, at most "
         f"{cells.attrs['budget']:,} right-hand sides, over the ground's stiffness and the stiction velocity (friction "
         f"velocity ten times that), all else the paper's: {counted(summary['outcomes'])}. (b) Difference of touches "
-        f"and end from a run at a tenfold tolerance, in legs, radians and pendulum times: {sizes}{otherwise} cells end "
-        "otherwise there."
+        "and end from a run at a tolerance ten times tighter, in legs, radians and pendulum times: "
+        f"{sizes}{otherwise} cells end otherwise there."
     )
 
 

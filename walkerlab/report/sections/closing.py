@@ -91,7 +91,7 @@ def left_out(results: Results) -> Section:
     """Results that were not computed, and parts of results that were left out."""
     rows = rows_of(everything_absent(results))
     if not rows:
-        said = Paragraph("Nothing: every result that the pipeline has is there.")
+        said = Paragraph("Nothing is left out: every result of the pipeline is there.")
         return Section("left-out", "Left out", (said,), "Nothing.")
     columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
     missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
@@ -106,7 +106,7 @@ def rows_of(missing: Sequence[LeftOut]) -> list[list[str]]:
         first = listed(absent.what for absent in missing if absent.why == why)
         saves = "; ".join(dict.fromkeys(absent.saves for absent in missing if absent.why == why and absent.saves))
         further = listed(absent.what for absent in missing if absent.why != why and cause(absent.why, missing) == why)
-        rows += [[first, why, saves], *([[further, f"for want of {first}", ""]] if further else [])]
+        rows += [[first, why, saves], *([[further, f"needs {first}", ""]] if further else [])]
     return rows
 
 

@@ -172,7 +172,7 @@ def errors(results: Results) -> Section | None:
     if not rows:
         return None
     found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
-    finding = f"{count(len(rows), 'place')} where the paper does not say what is right."
+    finding = f"{count(len(rows), 'error')} and gaps of the paper, each with its evidence."
     return Section("errata", "Errata of the paper", (found,), finding, PAPER)
 
 

@@ -115,7 +115,9 @@ def adjustment(results: Results) -> Statement | None:
     found = (results.summary("tune") or {}).get("adjustment")
     if found is None or found["found"]:
         return None
-    return Statement("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
+    return Statement(
+        "Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "no start helps", "bad"
+    )
 
 
 def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:

@@ -127,7 +127,7 @@ def judged_assumptions(results: Results, summary: Mapping[str, Any]) -> list[tup
         measured = "largest change of the mechanical energy within a swing, from its start"
         verdict = HOLDS if drift <= ROUNDING * abs(summary.get("mean_energy_J") or 1.0) else FAILS
         value = f"{number(drift, 3) if drift >= 1e-3 or drift == 0 else power_of_ten(drift, 2)} J"
-        rows.append(("No energy is lost or won while a leg swings", measured, value, verdict))
+        rows.append(("Energy is conserved while a leg swings", measured, value, verdict))
     return rows
 
 
