@@ -98,6 +98,19 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             folder, points = run_named(run, runs), width or COLUMNS[columns]
             print(export_from(folder, what, Target(to, output), points, walk_in(folder, model), Console()))
 
+    @app.command("draw")
+    def draw(
+        file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
+        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
+        output: Output = None,
+    ) -> None:
+        """Draw a config's walker to scale, with its measures named as the config names them."""
+        with exit_on_failure("draw", as_json=False):
+            from walkerlab.cli.console import Console
+            from walkerlab.cli.exports import Target, draw_walker
+
+            print(draw_walker(file, Target(to, output), Console()))
+
     @app.command("animate")
     def animate(
         run: RunArgument,

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from walkerlab.figures.illustration import Illustration
 
 FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
+DRAWING_KINDS = ("svg", "pdf", "png")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 TRAJECTORY = "trajectory"
 COLUMNS = {1: 252.0, 2: 516.0}
@@ -90,6 +91,17 @@ def export_from(folder: RunFolder, what: str, target: Target, width: float, mode
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
     return put(path, make(kind), console)
+
+
+def draw_walker(config: Path, target: Target, console: Console) -> Path:
+    """Draw the walker of a config with its measures; ConfigError for a bad config or format."""
+    # Imported here: other exports draw no walker.
+    from walkerlab.config.loader import load
+    from walkerlab.figures.measures import drawn
+
+    loaded = load(config, ())
+    path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
+    return put(path, drawn(loaded.config.walker, path.stem, kind), console)
 
 
 def figure_named(what: str) -> str:

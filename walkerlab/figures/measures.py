@@ -135,13 +135,13 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     return UprightLeg(tuple(joints), centre, radius, tuple(lengths), tuple(masses), top)
 
 
-def drawn(walker: AnyWalker, name: str) -> bytes:
-    """The walker's measures as SVG; the same walker and name give the same bytes."""
+def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
+    """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
     title = f"The measures of a walker of type {walker.type}"
     with styled():
         figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
         settle(figure)
-        return as_file(figure, "svg", name, title)
+        return as_file(figure, kind, name, title)
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
