@@ -29,6 +29,19 @@ class JudgedNumber:
     verdict: Verdict
     evidence: str
 
+    @property
+    def summary(self) -> dict[str, str | float | None]:
+        """As commands print it."""
+        printed = {name: getattr(self.printed, name) for name in ("where", "quantity", "unit")}
+        models = {name: getattr(self, name) for name in ("as_printed", "corrected", "contact")}
+        return {
+            **printed,
+            "printed": self.printed.text,
+            **models,
+            "verdict": self.verdict.value,
+            "evidence": self.evidence,
+        }
+
 
 def judged(
     entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[Verdict, str]

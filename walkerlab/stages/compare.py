@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import ContactConfig, RigidConfig
+from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_the_papers
 from walkerlab.ground.compliant import STANCE_FOOT
@@ -18,7 +17,7 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
-from walkerlab.paper.judged import JudgedNumber, Verdict
+from walkerlab.paper.judged import Verdict
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -66,12 +65,12 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
     found = errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: table_group(table) for name, table in tables.items()}
-    numbers, stored = [row_summary(row) for row in rows], rows_group(found, labels_of(Erratum))
+    numbers, stored = [row.summary for row in rows], rows_group(found, labels_of(Erratum))
     return Content(
         {"paper_numbers": numbers_group(numbers), "errata": stored, **groups, **motion.groups},
         {
             "paper_numbers": numbers,
-            "verdicts": verdicts(rows),
+            "verdicts": {verdict.value: [row.verdict for row in rows].count(verdict) for verdict in Verdict},
             **tables,
             **motion.summary,
             "errata": [vars(erratum) for erratum in found],
@@ -121,27 +120,6 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
 
 
-def row_summary(row: JudgedNumber) -> dict[str, Any]:
-    """A row of `paper_numbers` as the command prints it."""
-    return {
-        "where": row.printed.where,
-        "quantity": row.printed.quantity,
-        "unit": row.printed.unit,
-        "printed": row.printed.text,
-        "as_printed": row.as_printed,
-        "corrected": row.corrected,
-        "contact": row.contact,
-        "verdict": row.verdict.value,
-        "evidence": row.evidence,
-    }
-
-
-def verdicts(rows: tuple[JudgedNumber, ...]) -> dict[str, int]:
-    """How many numbers fared how."""
-    count = Counter(row.verdict for row in rows)
-    return {verdict.value: count[verdict] for verdict in Verdict}
-
-
 def motion_of(walk: Content) -> Motion | None:
     """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
     trajectory = walk.groups.get("trajectory")
@@ -168,22 +146,17 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
     """Everything that the paper's numbers are held against."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
-    models: dict[str, RigidModel] = {name: walk_gait(config, name, gait) for name, gait in found.items()}
+    models = {name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()}
     contact = contact_model(config, inputs["contact-sim"])
     return Measured(
         walker=compass(config, config.equations),
         equations=config.equations,
-        models=dict(models),
+        models=models,
         spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
         contact=contact,
         errors=motion.errors,
         departures=departures(config, start_moved(models.get(config.equations), contact.start)),
     )
-
-
-def walk_gait(config: RigidConfig, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
-    """The rigid model walked from a stored fixed point."""
-    return rigid_model(compass(config, equations), as_state(gait["state"]))
 
 
 def start_moved(model: RigidModel | None, start: State | None) -> bool:
