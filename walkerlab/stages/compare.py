@@ -146,7 +146,9 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
     """Everything that the paper's numbers are held against."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
-    models = {name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()}
+    models: dict[str, RigidModel] = {
+        name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()
+    }
     contact = contact_model(config, inputs["contact-sim"])
     return Measured(
         walker=compass(config, config.equations),
