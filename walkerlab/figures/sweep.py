@@ -189,10 +189,10 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
         one.set_ylabel(label(group, name))
     axes[-1].set_xlabel(label(group, across))
     said = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
-    name, _, unit = label(group, few).rstrip(")").rpartition(" (")
+    spoken, _, unit = label(group, few).rstrip(")").rpartition(" (")
     unit = "" if unit == "1" else f" {unit}"
     key = [
-        entry(f"{name} {value}{unit}", color=colour, linestyle=style)
+        entry(f"{spoken} {value}{unit}", color=colour, linestyle=style)
         for value, (colour, style) in zip(said, looks, strict=True)
     ]
     legend_above(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
