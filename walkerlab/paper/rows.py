@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
-from walkerlab.paper.judged import JudgedNumber, Verdict, agreement, judged, regardless, weigh
+from walkerlab.paper.judged import JudgedNumber, NumberVerdict, agreement, judged, regardless, weigh
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import (
     ANGLE_ERROR,
@@ -77,7 +77,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
 def input_of_both(entry: Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
     """A parameter of both models."""
     text = prose("evidence.input", value, entry.unit)
-    verdict, evidence = weigh(value == entry.value, Verdict.EXPLAINED, departures, text)
+    verdict, evidence = weigh(value == entry.value, NumberVerdict.EXPLAINED, departures, text)
     return JudgedNumber(entry, value, value, value, verdict, evidence)
 
 
@@ -85,7 +85,7 @@ def input_of_contact(entry: Printed, value: float, measured: Measured) -> Judged
     """A parameter of the contact model alone."""
     agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
     text = prose("evidence.input", value, entry.unit)
-    return judged(entry, {}, value, weigh(agrees, Verdict.EXPLAINED, measured.departures.contact, text))
+    return judged(entry, {}, value, weigh(agrees, NumberVerdict.EXPLAINED, measured.departures.contact, text))
 
 
 def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> JudgedNumber:
@@ -93,7 +93,9 @@ def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> Judg
     values = {name: model.state[coordinate] for name, model in measured.models.items()}
     found = {name: agreement(entry, value) for name, value in values.items()}
     text = prose("evidence.fixed_point", values, found)
-    return judged(entry, values, None, weigh(any(found.values()), Verdict.REFUTED, measured.departures.rigid, text))
+    return judged(
+        entry, values, None, weigh(any(found.values()), NumberVerdict.REFUTED, measured.departures.rigid, text)
+    )
 
 
 def eigenvalue_row(measured: Measured) -> JudgedNumber:
@@ -101,13 +103,13 @@ def eigenvalue_row(measured: Measured) -> JudgedNumber:
     radii = measured.spectral_radii
     stable = bool(radii) and all(radius < EIGENVALUES.value for radius in radii.values())
     text = prose("evidence.eigenvalue", radii)
-    return judged(EIGENVALUES, radii, None, weigh(stable, Verdict.REFUTED, measured.departures.rigid, text))
+    return judged(EIGENVALUES, radii, None, weigh(stable, NumberVerdict.REFUTED, measured.departures.rigid, text))
 
 
 def unitless_row(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
     """Stiffness or damping, which are printed without a unit."""
     text = prose("evidence.unitless", measured.contact)
-    return judged(entry, {}, value, weigh(False, Verdict.EXPLAINED, measured.departures.contact, text))
+    return judged(entry, {}, value, weigh(False, NumberVerdict.EXPLAINED, measured.departures.contact, text))
 
 
 def lost_balance_row(measured: Measured) -> JudgedNumber:
@@ -117,7 +119,9 @@ def lost_balance_row(measured: Measured) -> JudgedNumber:
     short = None if right is None else 100.0 * (1.0 - X_P[3].value / right.state[3])
     text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
     agrees = outcome != "walked" and steps == LOST_BALANCE.value
-    return judged(LOST_BALANCE, {}, float(steps), weigh(agrees, Verdict.REFUTED, measured.departures.contact, text))
+    return judged(
+        LOST_BALANCE, {}, float(steps), weigh(agrees, NumberVerdict.REFUTED, measured.departures.contact, text)
+    )
 
 
 def raised_percent(measured: Measured, coordinate: int) -> float | None:
@@ -137,7 +141,7 @@ def velocities_raised(measured: Measured) -> list[float | None]:
 def raised_row(entry: Printed, table_row: StartRow, measured: Measured) -> JudgedNumber:
     """An increase of a velocity that section 4 claims: arithmetic, whatever the config."""
     agrees = bool(agreement(entry, percent_of(table_row).of_matlab))
-    verdict = Verdict.REPRODUCED if agrees else Verdict.REFUTED
+    verdict = NumberVerdict.REPRODUCED if agrees else NumberVerdict.REFUTED
     text = prose("evidence.raised", measured.contact, velocities_raised(measured))
     text = regardless(measured.departures.contact, text)
     return judged(entry, {}, raised_percent(measured, TABLE_2.index(table_row)), (verdict, text))
@@ -147,8 +151,8 @@ def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> Jud
     """A percentage of Table 2: arithmetic, whatever the config."""
     entry, percent = table_row.percent, percent_of(table_row)
     agrees = bool(agreement(entry, percent.of_matlab))
-    otherwise = Verdict.EXPLAINED if agreement(entry, percent.of_adams) else Verdict.REFUTED
-    verdict = Verdict.REPRODUCED if agrees else otherwise
+    otherwise = NumberVerdict.EXPLAINED if agreement(entry, percent.of_adams) else NumberVerdict.REFUTED
+    verdict = NumberVerdict.REPRODUCED if agrees else otherwise
     text = regardless(measured.departures.contact, prose("evidence.percent", percent, verdict))
     return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
 
@@ -159,8 +163,8 @@ def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: 
     value = None if start is None else start[coordinate]
     is_angle = coordinate < 2
     text = prose("evidence.adams_start", study, is_angle, measured.contact, velocities_raised(measured))
-    otherwise = Verdict.EXPLAINED if is_angle or study.adams.starts_a_gait else Verdict.REFUTED
-    verdict = Verdict.REPRODUCED if agreement(entry, value) else otherwise
+    otherwise = NumberVerdict.EXPLAINED if is_angle or study.adams.starts_a_gait else NumberVerdict.REFUTED
+    verdict = NumberVerdict.REPRODUCED if agreement(entry, value) else otherwise
     return judged(entry, {}, value, (verdict, regardless(measured.departures.contact, text)))
 
 
@@ -171,7 +175,7 @@ def strides_row(measured: Measured) -> JudgedNumber:
     done = contact.steps // STEPS_OF_A_STRIDE
     went_on = contact.outcome == "walked"
     text = prose("evidence.strides", contact, done, went_on and done < STRIDES.value)
-    otherwise = Verdict.EXPLAINED if went_on else Verdict.REFUTED
+    otherwise = NumberVerdict.EXPLAINED if went_on else NumberVerdict.REFUTED
     return judged(
         STRIDES, strides, float(done), weigh(done >= STRIDES.value, otherwise, measured.departures.contact, text)
     )
@@ -192,8 +196,8 @@ def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str)
     text = prose("evidence.error", entry, late, off, measured.equations, found)
     raw, aligned = (max(getattr(errors[way], which)) if way in errors else None for way in ("raw", "aligned"))
     limit = AROUND * entry.value
-    otherwise = Verdict.EXPLAINED if aligned is not None and aligned <= limit else Verdict.REFUTED
-    verdict = Verdict.REPRODUCED if raw is not None and raw <= limit else otherwise
+    otherwise = NumberVerdict.EXPLAINED if aligned is not None and aligned <= limit else NumberVerdict.REFUTED
+    verdict = NumberVerdict.REPRODUCED if raw is not None and raw <= limit else otherwise
     text = regardless(measured.departures.contact, text)
     return judged(entry, {}, raw if aligned is None else aligned, (verdict, text))
 
@@ -205,7 +209,7 @@ def step_length_row(measured: Measured) -> JudgedNumber:
     found = [*lengths.values(), *([] if contact is None else [contact])]
     text = prose("evidence.step_length", lengths, contact, max(found, default=None))
     agrees = any(agreement(STEP_LENGTH, length) for length in lengths.values())
-    return judged(STEP_LENGTH, lengths, contact, weigh(agrees, Verdict.REFUTED, measured.departures.rigid, text))
+    return judged(STEP_LENGTH, lengths, contact, weigh(agrees, NumberVerdict.REFUTED, measured.departures.rigid, text))
 
 
 def velocity_difference_row(measured: Measured) -> JudgedNumber:
@@ -220,8 +224,8 @@ def velocity_difference_row(measured: Measured) -> JudgedNumber:
     printed = speed_difference(T_CYCLE.matlab.value, T_CYCLE.adams.value)
     text = regardless(measured.departures.contact, prose("evidence.velocity_difference", found, printed, sums))
     agrees = bool(found) and max(found.values()) < VELOCITY_DIFFERENCE.value
-    refuted = Verdict.REFUTED if sums >= VELOCITY_DIFFERENCE.value else Verdict.EXPLAINED
-    verdict = Verdict.REPRODUCED if agrees else refuted
+    refuted = NumberVerdict.REFUTED if sums >= VELOCITY_DIFFERENCE.value else NumberVerdict.EXPLAINED
+    verdict = NumberVerdict.REPRODUCED if agrees else refuted
     return judged(VELOCITY_DIFFERENCE, found, None, (verdict, text))
 
 
@@ -243,7 +247,7 @@ def matlab_row(entry: ResultRow, measured: Measured, study: PaperStudy) -> Judge
     means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is E_AVG else {}
     taken = [steps for steps, mean in means.items() if agreement(E_AVG.matlab, mean)]
     # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
-    otherwise = Verdict.EXPLAINED if taken else Verdict.REFUTED
+    otherwise = NumberVerdict.EXPLAINED if taken else NumberVerdict.REFUTED
     text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
     agrees = any(agreement(entry.matlab, value) for value in rigid.values())
     return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
@@ -253,6 +257,6 @@ def adams_row(entry: ResultRow, measured: Measured) -> JudgedNumber:
     """A number of Table 3's ADAMS column against the contact model."""
     rigid, contact = columns(entry, measured)
     text = prose("evidence.adams", entry, measured, names_of(entry))
-    otherwise = Verdict.EXPLAINED if contact is None else Verdict.REFUTED
+    otherwise = NumberVerdict.EXPLAINED if contact is None else NumberVerdict.REFUTED
     agrees = bool(agreement(entry.adams, contact))
     return judged(entry.adams, rigid, contact, weigh(agrees, otherwise, measured.departures.contact, text))

@@ -17,7 +17,7 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
-from walkerlab.paper.judged import Verdict
+from walkerlab.paper.judged import NumberVerdict
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -70,7 +70,7 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
         {"paper_numbers": numbers_group(numbers), "errata": stored, **groups, **motion.groups},
         {
             "paper_numbers": numbers,
-            "verdicts": {verdict.value: [row.verdict for row in rows].count(verdict) for verdict in Verdict},
+            "verdicts": {verdict.value: [row.verdict for row in rows].count(verdict) for verdict in NumberVerdict},
             **tables,
             **motion.summary,
             "errata": [vars(erratum) for erratum in found],
