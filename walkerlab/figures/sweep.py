@@ -22,7 +22,7 @@ from walkerlab.store.content import Group, Variable
 PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MOST_PANELS: Final = 4
-MOST_LINES: Final = 6
+MOST_LINES: Final = 5
 """Values of a second parameter, each of which is a line; of more, there is a map."""
 DASHES: Final = ("-", "--", "-.")
 ONE: Final = "largest multiplier 1"
