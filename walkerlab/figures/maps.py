@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from walkerlab.config.contact import Contact
 from walkerlab.figures.canvas import blank, entry, legend_above
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
@@ -23,8 +24,6 @@ from walkerlab.figures.walk_figures import TUNE_STAGE, redoes_the_procedure
 from walkerlab.figures.walks import redoes_the_paper
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.labels import with_unit
-from walkerlab.paper.arithmetic import ADAMS_EXPONENT, MM
-from walkerlab.paper.printed import STIFFNESS as PAPERS_STIFFNESS
 from walkerlab.store.content import Group
 
 WHITE: Final = "#FFFFFF"
@@ -307,8 +306,8 @@ FIGURE_15 = paper_figure(
 
 MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
-PAPER: Final = {STIFFNESS: PAPERS_STIFFNESS.value * MM**ADAMS_EXPONENT, VELOCITY: 0.1}
-"""Its stiffness, and ADAMS's own stiction velocity, which it does not change; SI."""
+_LAW: Final = Contact().in_si()
+PAPER: Final = {STIFFNESS: _LAW.stiffness_N_per_m_e, VELOCITY: _LAW.stiction_velocity_m_s}
 HEIGHT: Final = 3.9  # in
 ERROR_LABEL: Final = "error (1)"
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # errors told apart by colour
