@@ -1,16 +1,9 @@
-"""Draw the measures of walkers to scale, as docs/walkers.md shows them for each type.
-
-python scripts/draw_walkers.py                          # the pictures of docs/walkers.md
-python scripts/draw_walkers.py my.yaml --to mine.svg    # your own walker
-"""
+"""Draw the pictures of docs/walkers.md: the measures of each type of walker; `walkerlab draw` draws your own."""
 
 from __future__ import annotations
 
-import argparse
 import re
-import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 from walkerlab.config.loader import load
@@ -49,19 +42,6 @@ def own_parts() -> Config:
         return load(path, ()).config
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw one walker or all of the page's; the exit code."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("config", nargs="?", help="a config's file or built-in name; default: those of the page")
-    parser.add_argument("--to", type=Path, default=Path("walker.svg"), help="file of the picture")
-    options = parser.parse_args(arguments)
-    if options.config is not None:
-        options.to.write_bytes(drawn(load(Path(options.config), ()).config.walker, options.to.stem))
-        return 0
+if __name__ == "__main__":
     for name, picture in pictures().items():
         (IMAGES / name).write_bytes(picture)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

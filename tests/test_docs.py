@@ -19,7 +19,7 @@ MAKER = runpy.run_path(str(ROOT / "scripts" / "refresh_docs.py"))
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 COMMAND = re.compile(r"\bwalkerlab (?:[a-z-]+)(?: [^`&|\n#]*)?")
 ANSWER_AT_ONCE = ("status", "show", "schema")
-ONLY_READ = ("init", "open", "rerun", "export", "animate")
+ONLY_READ = ("init", "open", "rerun", "export", "animate", "draw")
 BUG, USAGE, BAD_CONFIG = 1, 2, 3
 
 

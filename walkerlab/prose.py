@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,21 +16,35 @@ BLANKS = re.compile(r"[ \n]+")
 """Where a template's lines end; the narrow and the unbreakable blanks of numbers are others."""
 
 
-def environment(folder: Path, filters: Iterable[Callable[..., Any]]) -> Environment:
-    """The templates of a folder, which may call some functions by their names; an unknown name is an error."""
-    # Imported here: what says nothing needs no templates.
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+@dataclass(frozen=True)
+class Prose:
+    """The paragraphs of a folder, as plain text.
 
-    made = Environment(loader=FileSystemLoader(folder), undefined=StrictUndefined)  # plain text: pages escape it
-    made.filters |= {function.__name__: function for function in filters}
-    return made
-
-
-def paragraph(templates: Environment, name: str, *values: Any) -> str:
-    """A paragraph as plain text on one line.
-
-    name    file.macro
-    values  what the macro takes
+    filters  what templates may call, by its name; an unknown name is an error
+    known    what they know besides what they are given
     """
-    file, _, macro = name.partition(".")
-    return BLANKS.sub(" ", getattr(templates.get_template(f"{file}.j2").module, macro)(*values)).strip()
+
+    folder: Path
+    filters: Sequence[Callable[..., Any]]
+    known: Mapping[str, Any]
+
+    @cached_property
+    def templates(self) -> Environment:
+        """Its templates."""
+        # Imported here: what says nothing needs no templates.
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # plain: pages escape it
+        made.filters |= {function.__name__: function for function in self.filters}
+        made.globals |= self.known
+        return made
+
+    def __call__(self, name: str, *values: Any) -> str:
+        """A paragraph on one line.
+
+        name    file.macro
+        values  what the macro takes
+        """
+        file, _, macro = name.partition(".")
+        said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
+        return BLANKS.sub(" ", said).strip()

@@ -218,3 +218,8 @@ def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
     wrong = walker("continuation", "--over", "strides", "--from", "1", "--to", "2", "--json")
     assert wrong.returncode == 3
     assert "touches no model" in json.loads(wrong.stdout)["error"]["message"]
+
+
+def test_what_was_left_out_is_told_to_those_who_ask(toy):
+    assert "left out" not in toy("page", "--config", "rigid-only").stdout
+    assert "left out: bounce (the config has no contact block)" in toy("page", "--config", "rigid-only", "-v").stdout

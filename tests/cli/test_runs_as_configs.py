@@ -160,7 +160,7 @@ def test_what_an_export_needs_is_made_by_the_command_that_it_advises(walker):
     advised = re.search(r"`walkerlab ([^`]*)`", done.stderr)[1]
     assert walker(*shlex.split(advised)).returncode == 0
     assert walker(*export).returncode == 0
-    assert names_in(there) == ["rigid-only-trajectory.csv"]
+    assert names_in(there) == ["rigid-only-simulate-trajectory.csv"]
 
 
 @pytest.mark.parametrize(

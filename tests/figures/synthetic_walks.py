@@ -9,6 +9,8 @@ from walkerlab.store.key import Identity
 from walkerlab.store.provenance import Provenance
 
 LEG_LENGTH, SLOPE, HALF_ANGLE = 1.0, 0.0174, 0.187
+WEIGHT = 196.2
+LAW = {"terrain": "after-mid-swing", "static_friction": 0.9, "dynamic_friction": 0.7}
 STEP_LENGTH = 2.0 * LEG_LENGTH * np.sin(HALF_ANGLE)
 SAMPLES = 40  # of a step
 ORIGIN = Provenance(
@@ -26,7 +28,7 @@ ORIGIN = Provenance(
 
 def stored(stage, groups, summary):
     walker = {"type": "compass", "leg_length_m": LEG_LENGTH, "foot_radius_m": 0.001}
-    asked = {"walker": walker, "slope_rad": SLOPE, "contact": {"terrain": "after-mid-swing"}}
+    asked = {"walker": walker, "slope_rad": SLOPE, "contact": LAW}
     identity = Identity(stage, asked, {}, "c0de")
     return Stored(groups, summary, identity=identity, provenance=ORIGIN, complete=True, seal="5ea1")
 
@@ -94,11 +96,27 @@ def rigid(steps=10, period=0.7, outcome="walked", completed=None):
 def contact(steps=10, period=0.71, outcome="walked", pads=True):
     """The result of `contact-sim`."""
     time, step, angle, velocity = motion(steps, period, jumps=False)
-    groups = {"trajectory": Group(trajectory(step, time, angle, velocity, 150.0)), **walked(period, steps)}
+    moving = trajectory(step, time, angle, velocity, 150.0) | ground(step, time, period)
+    groups = {"trajectory": Group(moving), **walked(period, steps)}
     if pads:
         groups["terrain"] = pads_group(steps)
     summary = {"outcome": outcome, "steps": steps, "slope_rad": SLOPE, "pitch_m": STEP_LENGTH}
     return stored("contact-sim", groups, summary)
+
+
+def ground(step, time, period):
+    """Forces on the stance foot, and energy that goes where a step begins: 1 J to damping, 0.1 J to friction."""
+    load = np.zeros((time.size, 2))
+    load[np.arange(time.size), 1 - step % 2] = WEIGHT
+    begun = np.searchsorted(period * np.arange(1, steps_of(step) + 1), time, side="left").astype(float)
+    gone = {"dissipated_damping_J": begun, "dissipated_friction_J": 0.1 * begun, "lost_at_edges_J": 0.0 * begun}
+    gone["book_mechanical_J"] = 150.0 - 1.1 * begun
+    energies = {name: Variable(values, ("time",), "J", name) for name, values in gone.items()}
+    return over_time(normal_force_N=load, friction_force_N=0.2 * load) | energies
+
+
+def steps_of(step):
+    return int(step.max()) + 1
 
 
 def pads_group(steps):

@@ -5,8 +5,9 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_methods import RUNS, SCENES, measured_methods
 
-from walkerlab.figures.accuracy import FIGURES, LOOKS, entries, series_of
 from walkerlab.figures.canvas import styled
+from walkerlab.figures.costs import ACCURACY as FIGURES
+from walkerlab.figures.costs import LOOKS, entries, series_of
 from walkerlab.solvers.registry import METHODS
 
 RIGID = FIGURES[0]

@@ -5,13 +5,17 @@ import pytest
 from synthetic_walks import stored
 
 from walkerlab.config.loader import load
-from walkerlab.figures.figure_15 import FIGURE, attractor_name, sides_of
+from walkerlab.figures.maps import FIGURE_15 as FIGURE
+from walkerlab.figures.maps import attractor_name, sides_of
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results
-from walkerlab.report.sections.basin import section
+from walkerlab.report.sections.families import basin as section
+from walkerlab.stages import plot
 from walkerlab.stages.basin import group_of, summary, window_of
 from walkerlab.stages.basin_pieces import WalkEnds
+from walkerlab.store import artifact
+from walkerlab.store.content import Content
 
 CONFIG = load(None, ["basin.cells=[4,3]"]).config
 Z = [0.17, -0.6, -0.86]
@@ -81,3 +85,14 @@ def test_drawings_take_it_in_once_it_is_there(stage):
     from walkerlab.stages.graph import PIPELINE
 
     assert "basin" in PIPELINE[stage].if_current
+
+
+def test_its_own_command_draws_it_at_once(tmp_path):
+    made = basin([0, 0, 1, NONE])["basin"]
+    artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
+    (path,) = plot.draw_at_once("basin", tmp_path, anew=True)
+    assert path == tmp_path / "figures" / "figure-15.svg"
+    assert path.read_bytes() == FIGURE.drawn({"basin": made}).svg
+    path.write_text("as it was")
+    assert plot.draw_at_once("basin", tmp_path, anew=False) == [path]
+    assert path.read_text() == "as it was"

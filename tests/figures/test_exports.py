@@ -11,11 +11,12 @@ from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
-from walkerlab.cli.exports import export_from
+from walkerlab.cli.exports import Target, export_from
 from walkerlab.cli.films import Film, write_film
 from walkerlab.cli.named import walk_in
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.figures.style import PNG_DPI
 from walkerlab.report.tables import in_tex
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
@@ -39,21 +40,47 @@ def run(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")])
 def test_a_figure_in_every_format(run, kind, start):
-    path = export_from(run, "figure-07", kind, None, 2, "")
+    path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
     assert path.name == f"paper-figure-07.{kind}"
     assert path.read_bytes().startswith(start)
 
 
-def test_a_figure_for_one_column_is_half_as_wide(run, tmp_path):
-    widths = []
-    for columns in (1, 2):
-        with Image.open(export_from(run, "figure-07", "png", tmp_path / f"{columns}.png", columns, "")) as image:
-            widths.append(image.size[0])
-    assert 2 * widths[0] == widths[1]
+def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
+    for points in (252.0, 300.0):
+        file = Target("png", tmp_path / f"{points}.png")
+        with Image.open(export_from(run, "figure-07", file, points, "", QUIET)) as image:
+            assert image.size[0] == pytest.approx(points / 72.0 * PNG_DPI, abs=1.0)
+
+
+def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
+    data = export_from(run, "figure-07", Target("pdf", None), 252.0, "", QUIET).read_bytes()
+    assert b"/Type3" not in data.replace(b" ", b"")
+    assert b"/FontFile2" in data.replace(b" ", b"")
+
+
+def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
+    assert export_from(run, "trajectory", Target(None, None), 252.0, "simulate", QUIET).name == (
+        "paper-simulate-trajectory.csv"
+    )
+    for target in (Target("svg", tmp_path / "mine"), Target(None, tmp_path / "mine.svg")):
+        path = export_from(run, "figure-07", target, 252.0, "", QUIET)
+        assert path == target.output
+        assert path.read_bytes().startswith(b"<?xml")
+    with pytest.raises(ConfigError, match="two formats"):
+        export_from(run, "figure-07", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
+    film = write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
+    assert film.name == "paper-simulate.gif"
+
+
+def test_nothing_is_overwritten_in_silence(run, capsys):
+    target = Target("csv", Path("walk.csv"))
+    for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv was there and is replaced.")):
+        export_from(run, "trajectory", target, 252.0, model, Console())
+        assert told in capsys.readouterr().err
 
 
 def test_a_trajectory_as_csv_is_the_stored_one(run):
-    path = export_from(run, "trajectory", "csv", None, 2, "simulate")
+    path = export_from(run, "trajectory", Target("csv", None), 516.0, "simulate", QUIET)
     with path.open() as file:
         head, *rows = csv.reader(file)
     stored = both_models()["simulate"]["trajectory"]
@@ -64,14 +91,14 @@ def test_a_trajectory_as_csv_is_the_stored_one(run):
 
 
 def test_a_trajectory_as_netcdf_opens_without_a_group(run):
-    path = export_from(run, "trajectory", "nc", None, 2, "contact-sim")
+    path = export_from(run, "trajectory", Target("nc", None), 516.0, "contact-sim", QUIET)
     with xarray.open_dataset(path, engine="h5netcdf") as dataset:
         assert dataset["angle"].dims == ("time", "leg")
         assert dataset["time"].attrs["units"] == "s"
 
 
 def test_a_table_for_latex_guards_its_letters(run):
-    text = export_from(run, "table-3", "tex", None, 2, "").read_text()
+    text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
     assert r"t\_left & s & $0.7$ \\" in text
     assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert in_tex("50 %") == r"50 \%"
@@ -80,12 +107,12 @@ def test_a_table_for_latex_guards_its_letters(run):
 
 @pytest.mark.parametrize("name", ["7", "07", "figure-7", "fig 7"])
 def test_a_figure_is_known_by_its_number(run, name):
-    assert export_from(run, name, "svg", None, 2, "").name == "paper-figure-07.svg"
+    assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-07.svg"
 
 
 def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     with pytest.raises(ConfigError) as refused:
-        export_from(run, "figur", "pdf", None, 2, "")
+        export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
     assert "figure-07" in refused.value.advice
     assert refused.value.advice.endswith("table-3 and trajectory.")
     assert "figure-13" not in refused.value.advice
@@ -94,7 +121,7 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
 def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
-            export_from(run, name, "pdf", None, 2, "")
+            export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
         assert refused.value.advice == f"`walkerlab {command} -c {run.typed}` makes what it needs."
 
 
@@ -107,7 +134,7 @@ def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
 @pytest.mark.parametrize(
     ("what", "kind", "error", "said"),
     [
-        ("tabl", "tex", ConfigError, "there is no tabl. Did you mean table"),
+        ("tabl", "tex", ConfigError, "nothing is called tabl. Did you mean table"),
         ("table-1", "tex", ConfigError, "compares with the paper's walker"),
         ("figure-07", "csv", ConfigError, "cannot be written as csv"),
         ("figure-11", "pdf", StaleError, "cannot be drawn"),
@@ -115,11 +142,13 @@ def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
 )
 def test_what_cannot_be_exported_is_told(run, what, kind, error, said):
     with pytest.raises(error, match=said):
-        export_from(run, what, kind, None, 2, "")
+        export_from(run, what, Target(kind, None), 516.0, "", QUIET)
 
 
 def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
-    path = write_film(run, tmp_path / "walk.gif", Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET)
+    path = write_film(
+        run, Target(str(tmp_path / "walk.gif"), None), Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET
+    )
     with Image.open(path) as film:
         assert film.n_frames == pytest.approx(7, abs=1)
         assert film.size == (640, 360)
@@ -130,9 +159,9 @@ def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
 
 def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    for name, said in (("walk.avi", "is no film"), ("walk.mp4", "needs ffmpeg")):
+    for name, said in (("walk.avi", "a film cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):
         with pytest.raises(ConfigError, match=said):
-            write_film(run, tmp_path / name, Film("simulate", 1, 10, 1.0), QUIET)
+            write_film(run, Target(str(tmp_path / name), None), Film("simulate", 1, 10, 1.0), QUIET)
 
 
 def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
@@ -140,7 +169,7 @@ def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
     tool.write_text("#!/bin/sh\n/bin/cat | /usr/bin/wc -c\n")
     tool.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    path = write_film(run, tmp_path / "walk.mp4", Film("simulate", 1, 5, 1.0), QUIET)
+    path = write_film(run, Target("mp4", tmp_path / "walk.mp4"), Film("simulate", 1, 5, 1.0), QUIET)
     assert int(path.read_bytes()) % (640 * 360 * 3) == 0
 
 
@@ -150,9 +179,9 @@ DAMAGES = {
     "a bit flipped": lambda data: data[:600] + bytes([data[600] ^ 1]) + data[601:],
 }
 READERS = {
-    "figure": lambda run: export_from(run, "figure-06", "svg", None, 2, ""),
-    "trajectory": lambda run: export_from(run, "trajectory", "csv", None, 2, "contact-sim"),
-    "film": lambda run: write_film(run, Path("walk.gif"), Film("contact-sim", 1, 10, 1.0), QUIET),
+    "figure": lambda run: export_from(run, "figure-06", Target("svg", None), 516.0, "", QUIET),
+    "trajectory": lambda run: export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET),
+    "film": lambda run: write_film(run, Target(None, Path("walk.gif")), Film("contact-sim", 1, 10, 1.0), QUIET),
 }
 
 
@@ -170,7 +199,7 @@ def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, d
 
 def test_damage_of_what_is_not_needed_does_not_matter(run):
     run.artifact("simulate").write_bytes(b"")
-    assert export_from(run, "trajectory", "csv", None, 2, "contact-sim").is_file()
+    assert export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET).is_file()
 
 
 def test_a_damaged_result_is_told_from_python_too(run):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from synthetic_families import END, FLIP, families
 
-from walkerlab.figures import figure_13, figure_14, figure_16
-from walkerlab.figures.bifurcation_diagram import MODELS, STYLES, curve_of
 from walkerlab.figures.canvas import styled
+from walkerlab.figures.families import FIGURE_13, FIGURE_14, FIGURE_16, MODELS, STYLES, curve_of, region_kinds
 
-FIGURES = [figure_13.FIGURE, figure_14.FIGURE, figure_16.FIGURE]
+FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
 
 
 def plotted(figure):
@@ -22,12 +21,12 @@ def test_the_same_families_give_the_same_bytes(figure):
 
 
 def test_curves_over_two_parameters_are_left_out_where_none_were_asked_for():
-    why = figure_16.FIGURE.why_left_out(families(curves=False), {})
+    why = FIGURE_16.why_left_out(families(curves=False), {})
     assert why == "continuation: no curves over two parameters (continuation.second)"
 
 
 def test_a_branch_is_solid_up_to_its_flip_and_dashed_beyond():
-    axes = plotted(figure_13.FIGURE).axes[0]
+    axes = plotted(FIGURE_13).axes[0]
     solid, dashed = (
         [line for line in axes.lines if line.get_color() == MODELS["rigid"] and line.get_linestyle() == style]
         for style in ("-", "--")
@@ -49,14 +48,14 @@ def test_a_doubled_branch_begins_at_its_parents_flip_with_equal_steps():
 
 def test_the_captions_say_where_gaits_change():
     results = families()
-    assert "first doubles its period at 4 deg" in figure_13.FIGURE.caption(results)
-    assert "a flip at 4." in figure_14.FIGURE.caption(results)
-    assert figure_16.FIGURE.caption(results).startswith("Curves of flips of the rigid model's gaits")
+    assert "first doubles its period at 4 deg" in FIGURE_13.caption(results)
+    assert "a flip at 4." in FIGURE_14.caption(results)
+    assert FIGURE_16.caption(results).startswith("Curves of flips of the rigid model's gaits")
 
 
 def test_the_plane_is_shaded_by_what_walks_settle_on():
     regions = families()["continuation"]["rigid/regions"]
-    kinds = {name: where.sum() for _, name, where in figure_16.region_kinds(regions)}
-    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "none goes on": 1}
-    assert "1 step in 50 %" in figure_16.FIGURE.caption(families())
-    assert len(plotted(figure_16.FIGURE).axes[0].collections) == 1
+    kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
+    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "no walk goes on": 1}
+    assert "1 step in 50 %" in FIGURE_16.caption(families())
+    assert len(plotted(FIGURE_16).axes[0].collections) == 1

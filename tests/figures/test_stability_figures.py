@@ -5,10 +5,9 @@ from matplotlib.colors import to_hex
 from synthetic_maps import ENDS, stability_maps
 
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.figure_11 import COLOURS
-from walkerlab.figures.stability_maps import FIGURES, VERDICT_COLOURS, edges
+from walkerlab.figures.maps import COLOURS, STABILITY, VERDICT_COLOURS, edges
 
-STICTION, STEP = FIGURES
+STICTION, STEP = STABILITY
 
 
 def meshes(figure):

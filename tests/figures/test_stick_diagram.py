@@ -7,18 +7,16 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
 
-from walkerlab.figures import figure_02, figure_06
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.stick_diagram import entries, stick_diagram
+from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, stick_diagram, sticks_of
 from walkerlab.figures.style import LEGS
 
 ROUNDING = 1e-12
 
 
-@pytest.fixture(params=["rigid", "contact"])
+@pytest.fixture(params=["simulate", "contact-sim"])
 def sticks(request):
-    module = figure_02 if request.param == "rigid" else figure_06
-    return module.sticks_of(both_models())
+    return sticks_of(both_models()[request.param])
 
 
 def test_legs_keep_their_length(sticks):
@@ -41,7 +39,7 @@ def test_feet_come_down_one_step_length_ahead(sticks):
 
 
 def test_the_plane_descends_in_walking_direction():
-    sticks = figure_02.sticks_of(rigid_alone())
+    sticks = sticks_of(rigid_alone()["simulate"])
     x, y = sticks.in_plane(np.array([STEP_LENGTH, 0.0]))
     assert np.arctan2(-y, x) == pytest.approx(SLOPE)
     assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
@@ -49,15 +47,15 @@ def test_the_plane_descends_in_walking_direction():
 
 def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
     results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
-    sticks = figure_02.sticks_of(results)
+    sticks = sticks_of(results["simulate"])
     at_strikes, between = sticks.postures()
     assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
     assert sticks.time[between].max() == sticks.time[-1]
-    assert "not completed" in figure_02.FIGURE.caption(results)
+    assert "not completed" in FIGURE_2.caption(results)
 
 
 def test_the_slope_is_told_above_the_torso_which_has_a_name():
-    bare = figure_02.sticks_of(rigid_alone())
+    bare = sticks_of(rigid_alone()["simulate"])
     sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
     with styled():
         figure, axes = stick_diagram(sticks)
@@ -76,18 +74,18 @@ def drawn(figure, results):
 
 
 def test_lengths_are_drawn_to_scale():
-    assert drawn(figure_02.FIGURE, rigid_alone()).get_aspect() == 1.0
+    assert drawn(FIGURE_2, rigid_alone()).get_aspect() == 1.0
 
 
 def test_both_legs_of_every_posture_are_drawn_in_their_colours():
-    axes = drawn(figure_02.FIGURE, rigid_alone())
-    at_strikes, between = figure_02.sticks_of(rigid_alone()).postures()
+    axes = drawn(FIGURE_2, rigid_alone())
+    at_strikes, between = sticks_of(rigid_alone()["simulate"]).postures()
     for look in LEGS:
         assert sum(line.get_color() == look.colour for line in axes.lines) == at_strikes.size + between.size
 
 
 def test_pads_in_sight_are_drawn_in_their_legs_colours():
-    axes = drawn(figure_06.FIGURE, both_models())
+    axes = drawn(FIGURE_6, both_models())
     left, right = axes.get_xlim()
     pads = both_models()["contact-sim"]["terrain"]
     for leg, look in enumerate(LEGS):
@@ -106,6 +104,6 @@ def of(patch, look):
 
 def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
     results = both_models(**{"contact-sim": contact(pads=False)})
-    assert not [patch for patch in drawn(figure_06.FIGURE, results).patches if patch.get_hatch()]
-    assert "once it has passed the stance foot" in figure_06.FIGURE.caption(results)
-    assert "lane of pads" in figure_06.FIGURE.caption(both_models())
+    assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
+    assert "once it has passed the stance foot" in FIGURE_6.caption(results)
+    assert "lane of pads" in FIGURE_6.caption(both_models())

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from walkerlab.cli.console import Console
+from walkerlab.cli.exports import Target, draw_walker
 from walkerlab.config.walkers import Kneed, StraightLegs
 from walkerlab.figures.measures import drawn, upright
 
@@ -46,6 +48,15 @@ def test_every_length_of_the_walker_is_named_with_its_value():
 
 @pytest.mark.parametrize("walker", [KNEED, StraightLegs(type="straight-legs", foot_centre_ahead_m=0.02)])
 def test_measures_are_as_long_as_they_say(walker):
-    for measure in upright(walker).measures:
+    for measure in upright(walker).lengths:
         gaps = np.abs(np.subtract(measure.end, measure.start))
         assert np.abs(gaps - abs(measure.value)).min() < 1e-12
+
+
+def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text("extends: kneed\nname: mine\nwalker: {hip_mass_kg: 0.75}\n")
+    path = draw_walker(Path("mine.yaml"), Target(None, None), Console(quiet=True))
+    assert path.name == "mine-walker.svg"
+    assert "hip_mass_kg: 0.75" in path.read_text()
+    assert draw_walker(Path("kneed"), Target("png", Path("it")), Console()).read_bytes().startswith(b"\x89PNG")

@@ -9,13 +9,12 @@ from scipy.integrate import solve_ivp
 from walkerlab.config.schema import Contact
 from walkerlab.mechanics.standing import BENT, Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
-from walkerlab.paper.judged import Verdict, agreement, weigh
+from walkerlab.paper.judged import NumberVerdict, agreement, weigh
 from walkerlab.paper.measured import (
     Characteristics,
     ContactModel,
     Departures,
     EnergyRecord,
-    Errors,
     LegErrors,
     Measured,
     characteristics,
@@ -39,8 +38,7 @@ from walkerlab.paper.printed import (
     slope_of,
     walker_of_the_paper,
 )
-from walkerlab.paper.result_rows import result_rows
-from walkerlab.paper.start_rows import start_rows
+from walkerlab.paper.rows import paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.solvers.scipy_methods import right_hand_side
 
@@ -80,11 +78,11 @@ def test_agreement_goes_by_the_printed_digits(text, value, found):
 
 
 def test_nothing_is_refuted_by_another_scene():
-    verdict, evidence = weigh(False, Verdict.REFUTED, ("slope_rad 0.05 instead of 0.0174",), "0.7 s.")
-    assert verdict == Verdict.EXPLAINED
+    verdict, evidence = weigh(False, NumberVerdict.REFUTED, ("slope_rad 0.05 instead of 0.0174",), "0.7 s.")
+    assert verdict == NumberVerdict.EXPLAINED
     assert "slope_rad 0.05" in evidence
-    assert weigh(True, Verdict.REFUTED, ("any",), "")[0] == Verdict.REPRODUCED
-    assert weigh(False, Verdict.REFUTED, (), "")[0] == Verdict.REFUTED
+    assert weigh(True, NumberVerdict.REFUTED, ("any",), "")[0] == NumberVerdict.REPRODUCED
+    assert weigh(False, NumberVerdict.REFUTED, (), "")[0] == NumberVerdict.REFUTED
 
 
 def test_both_feet_of_x_p_stand_on_the_papers_slope():
@@ -135,7 +133,7 @@ def contact_model(**changed):
     return replace(model, **changed)
 
 
-PAPERS_OWN, NO_ERRORS = Departures((), ()), Errors()
+PAPERS_OWN, NO_ERRORS = Departures((), ()), {}
 
 
 @pytest.fixture
@@ -151,7 +149,7 @@ def rows(study):
             errors=errors,
             departures=departures,
         )
-        return {row.printed: row for row in (*start_rows(measured, study), *result_rows(measured, study))}
+        return {row.printed: row for row in paper_rows(measured, study)}
 
     return judged
 
@@ -166,7 +164,7 @@ def test_every_number_of_tables_and_of_eq_11_has_a_row(rows):
 
 def test_x_p_is_reproduced_by_the_equations_as_printed(rows):
     for entry in X_P:
-        assert rows()[entry].verdict == Verdict.REPRODUCED
+        assert rows()[entry].verdict == NumberVerdict.REPRODUCED
         assert agreement(entry, rows()[entry].as_printed)
 
 
@@ -174,25 +172,25 @@ def test_step_periods_that_differ_are_refuted(rows):
     found = rows()
     for row in TABLE_3:
         if row is not E_AVG:
-            assert found[row.matlab].verdict == found[row.adams].verdict == Verdict.REFUTED
+            assert found[row.matlab].verdict == found[row.adams].verdict == NumberVerdict.REFUTED
 
 
 def test_the_energy_of_matlab_is_that_of_ten_steps_and_that_of_adams_is_nobodys(rows):
     found = rows()
     assert "(5 steps)" in E_AVG.matlab.quantity
-    assert found[E_AVG.matlab].verdict == Verdict.EXPLAINED
+    assert found[E_AVG.matlab].verdict == NumberVerdict.EXPLAINED
     for said in ("150.110 J over five steps", "150.127 J over ten", "its number is that of ten"):
         assert said in found[E_AVG.matlab].evidence
     # 150.03 J, with samples to either side of the printed number, and it between the means of all models
-    assert found[E_AVG.adams].verdict == Verdict.REFUTED
+    assert found[E_AVG.adams].verdict == NumberVerdict.REFUTED
     assert "-0.110 J off the printed one" in found[E_AVG.adams].evidence
 
 
 def test_a_start_that_walks_does_not_explain_a_fall(rows):
     row = rows()[LOST_BALANCE]
-    assert (row.verdict, row.contact) == (Verdict.REFUTED, 10.0)
+    assert (row.verdict, row.contact) == (NumberVerdict.REFUTED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence
-    assert rows(from_x_p=(1, "fell"))[LOST_BALANCE].verdict == Verdict.REPRODUCED
+    assert rows(from_x_p=(1, "fell"))[LOST_BALANCE].verdict == NumberVerdict.REPRODUCED
 
 
 def test_the_adams_start_falls_when_another_integration_says_so(study):
@@ -220,27 +218,27 @@ def test_another_scene_refutes_only_what_the_paper_itself_contradicts(rows):
     elsewhere = ("slope_rad 0.05 instead of 0.0174",)
     found = rows(Departures(elsewhere, elsewhere))
     of_the_walk = [entry for row in TABLE_3 for entry in (row.matlab, row.adams)]
-    assert {found[entry].verdict for entry in of_the_walk} == {Verdict.EXPLAINED}
+    assert {found[entry].verdict for entry in of_the_walk} == {NumberVerdict.EXPLAINED}
     assert all("Not the paper's scene" in found[entry].evidence for entry in of_the_walk)
-    assert {found[entry].verdict for entry in RAISED} == {Verdict.REFUTED}
+    assert {found[entry].verdict for entry in RAISED} == {NumberVerdict.REFUTED}
 
 
 def test_percentages_are_refuted_unless_one_of_the_bases_gives_them(rows):
     verdicts = [rows()[row.percent].verdict for row in TABLE_2]
-    assert verdicts == [Verdict.REFUTED, Verdict.REFUTED, Verdict.EXPLAINED, Verdict.EXPLAINED]
+    assert verdicts == [NumberVerdict.REFUTED, NumberVerdict.REFUTED, NumberVerdict.EXPLAINED, NumberVerdict.EXPLAINED]
 
 
 def test_an_error_as_small_as_the_printed_one_is_no_refutation(rows):
     small, large = LegErrors((9e-5, 1e-4), (1e-4, 1e-4)), LegErrors((0.1, 0.1), (1.0, 1.0))
-    assert rows(errors=Errors(raw=large, aligned=large))[ANGLE_ERROR].verdict == Verdict.REFUTED
-    assert rows(errors=Errors(raw=large, aligned=small))[ANGLE_ERROR].verdict == Verdict.EXPLAINED
-    assert rows(errors=Errors(raw=small, aligned=small))[ANGLE_ERROR].verdict == Verdict.REPRODUCED
+    assert rows(errors={"raw": large, "aligned": large})[ANGLE_ERROR].verdict == NumberVerdict.REFUTED
+    assert rows(errors={"raw": large, "aligned": small})[ANGLE_ERROR].verdict == NumberVerdict.EXPLAINED
+    assert rows(errors={"raw": small, "aligned": small})[ANGLE_ERROR].verdict == NumberVerdict.REPRODUCED
 
 
 def test_five_gait_cycles_are_refuted_by_a_fall_and_not_by_a_short_request(rows):
-    assert rows()[STRIDES].verdict == Verdict.REPRODUCED
-    assert rows(steps=3, outcome="fell")[STRIDES].verdict == Verdict.REFUTED
-    assert rows(steps=4)[STRIDES].verdict == Verdict.EXPLAINED
+    assert rows()[STRIDES].verdict == NumberVerdict.REPRODUCED
+    assert rows(steps=3, outcome="fell")[STRIDES].verdict == NumberVerdict.REFUTED
+    assert rows(steps=4)[STRIDES].verdict == NumberVerdict.EXPLAINED
 
 
 def test_a_walk_that_fell_at_once_leaves_gaps(rows):
@@ -260,8 +258,11 @@ def test_a_slope_without_gaits_has_no_columns_of_the_rigid_model(rows):
 def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
     elsewhere = Departures(("slope_rad 0.05 instead of 0.0174",), ("slope_rad 0.05 instead of 0.0174",))
     for row in rows(elsewhere).values():
-        assert row.verdict != Verdict.REFUTED or "about the paper's own numbers, not about this scene" in row.evidence
-        assert row.verdict == Verdict.REPRODUCED or "slope_rad 0.05" in row.evidence
+        assert (
+            row.verdict != NumberVerdict.REFUTED
+            or "about the paper's own numbers, not about this scene" in row.evidence
+        )
+        assert row.verdict == NumberVerdict.REPRODUCED or "slope_rad 0.05" in row.evidence
     assert not any("this scene" in row.evidence for row in rows().values())
 
 

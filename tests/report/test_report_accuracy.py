@@ -5,8 +5,9 @@ from synthetic_results import config, fixedpoint, stored
 
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
-from walkerlab.report.sections.accuracy import introduction, section
+from walkerlab.report.sections.accuracy import section
 from walkerlab.report.tables import Table
+from walkerlab.report.words import words
 
 
 def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
@@ -110,5 +111,5 @@ def test_what_was_not_run_is_said_once_for_each_reason(made):
 
 
 def test_that_the_rigid_scene_does_not_start_on_its_gait_is_said():
-    said = introduction({"repeats": 7, "rigid_velocity_factor": 0.98})
+    said = words("accuracy.introduction", {"repeats": 7, "rigid_velocity_factor": 0.98})
     assert "starts with 0.98 of the start’s angular velocities" in said

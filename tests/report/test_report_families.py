@@ -5,9 +5,9 @@ from dataclasses import replace
 from synthetic_results import config, families, families_that_move, simulate, with_motion
 
 from walkerlab.config.loader import load
-from walkerlab.report.gait_diagram import CLEAR, apart, gait_diagram
 from walkerlab.report.results import Results
 from walkerlab.report.sections import families as section
+from walkerlab.report.sections.families import CLEAR, apart, gait_diagram
 
 
 def test_a_run_without_families_has_no_such_section():

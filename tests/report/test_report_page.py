@@ -10,14 +10,15 @@ from html_page import Page
 from jinja2 import UndefinedError
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
-from walkerlab.paper import prose
-from walkerlab.report import words
+from walkerlab.paper.prose import prose
 from walkerlab.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
 from walkerlab.report.page import Page as Sheet
 from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
+from walkerlab.report.words import words
+from walkerlab.scene.left_out import LeftOut
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"
@@ -132,7 +133,8 @@ def test_texts_of_results_never_become_markup():
             "compare": compare([row]),
         },
         (Picture(NASTY, NASTY, NASTY, None, PIXELS, 1, 1, NASTY, ((NASTY, NASTY),)),),
-        (Absent(NASTY, NASTY, failed=True), Absent("tune", NASTY)),
+        (LeftOut(NASTY, NASTY), LeftOut("tune", NASTY)),
+        failed=frozenset({NASTY}),
     )
     for one in pages_of(results, f"paper@{NASTY}"):
         html = render(one)
@@ -191,7 +193,7 @@ def test_the_script_is_small():
     assert len(source("page.js").encode()) + len(source("player.js").encode()) < 30_000
 
 
-@pytest.mark.parametrize("templates", [words.templates(), prose.templates()], ids=["page", "paper"])
+@pytest.mark.parametrize("templates", [words.templates, prose.templates], ids=["page", "paper"])
 def test_sentences_name_only_what_there_is(templates):
     names = templates.list_templates(extensions=["j2"])
     assert names
@@ -202,5 +204,5 @@ def test_sentences_name_only_what_there_is(templates):
 
 
 def test_a_sentence_is_one_line_and_keeps_the_blanks_of_its_numbers():
-    assert words.words("models.locking", 0.3486, 0.3485).count("\u00a0s") == 2
-    assert "\n" not in words.words("stability.judgement")
+    assert words("models.locking", 0.3486, 0.3485).count("\u00a0s") == 2
+    assert "\n" not in words("stability.judgement")

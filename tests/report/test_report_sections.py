@@ -26,28 +26,30 @@ from synthetic_results import (
 )
 
 from walkerlab.config.loader import load
-from walkerlab.report.blocks import PAPER, Code, Paragraph, Player, Section, Shares, Statements
+from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
 from walkerlab.report.lead import lead
 from walkerlab.report.registry import SECTIONS, sections_of
-from walkerlab.report.results import Absent, Results
-from walkerlab.report.sections import assumptions
+from walkerlab.report.results import Results
+from walkerlab.report.sections import motion
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
 from walkerlab.report.sections.verdict import HEADLINES
+from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.content import Group, Variable
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
-    Absent("fixedpoint", NO_GAIT, failed=True),
-    Absent("simulate", f"it needs fixedpoint: {NO_GAIT}"),
-    Absent("contact-sim", f"it needs fixedpoint: {NO_GAIT}"),
+    LeftOut("fixedpoint", NO_GAIT),
+    LeftOut("simulate", f"it needs fixedpoint: {NO_GAIT}"),
+    LeftOut("contact-sim", f"it needs fixedpoint: {NO_GAIT}"),
 )
 
 
-def sections(stages=None, *, absent=(), sets=(), **changed):
+def sections(stages=None, *, absent=(), failed=(), sets=(), **changed):
     made = {name: make() for name, make in EVERYTHING.items() if stages is None or name in stages} | changed
-    found = sections_of(Results(config(*sets), made, (), absent))
+    found = sections_of(Results(config(*sets), made, (), absent, failed=frozenset(failed)))
     return {section.anchor: section for section in found}
 
 
@@ -94,7 +96,7 @@ def test_without_contact_nothing_is_said_of_contact():
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():
-    first = sections([], absent=WITHOUT_GAIT)["verdict"].blocks[0]
+    first = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"])["verdict"].blocks[0]
     assert isinstance(first, Paragraph)
     assert first.tone == "bad"
     assert NO_GAIT in first.text
@@ -102,28 +104,61 @@ def test_a_slope_without_a_gait_is_said_in_words_first():
 
 
 def test_what_was_never_wanted_is_no_failure():
-    absent = [Absent("contact-sim", "the config has no contact block")]
-    assert not blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
+    absent = [LeftOut("contact-sim", "the config has no contact block")]
+    said = blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
+    assert [one.tone for one in said] == ["plain"]
+
+
+def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
+    def opening(**changed):
+        return plain(sections(**changed)["verdict"].blocks[0].text)
+
+    assert opening() == (
+        "Both models walk all 4 steps, and the gait is stable; 1 of the 4 numbers that the paper prints come out and 2 "
+        "are refuted, and as its equations have a sign error (A.5), the corrected ones are to be used."
+    )
+    slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
+    other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
+    said = opening(compare=other, **{"contact-sim": contact_sim(**slower)})
+    assert "takes 1 % more time than in the rigid gait" in said
+    fallen = opening(compare=other, **{"contact-sim": contact_sim("fell", 3)})
+    assert fallen == (
+        "The rigid model walks all 4 steps, the contact model walks 3 steps and then falls, and the gait is stable. "
+        "Start nearer to a gait."
+    )
+
+
+def test_figures_of_the_paper_that_are_not_drawn_are_explained():
+    figure = Picture("Figure 2. Sticks.", "As walked.", "Legs.")
+    made = {name: make() for name, make in EVERYTHING.items()}
+    (said,) = blocks(motion.figures(Results(config(), made, (figure,))), Paragraph)
+    assert "figures 1, 3 and 4 show no results" in said.text
+
+
+def test_the_papers_third_table_says_whose_periods_it_has_and_over_which_time_it_takes_means():
+    (_, third) = blocks(sections()["tables"], Table)
+    for part in ("last completed stride", "first step is the left one", "last five"):
+        assert part in third.note
 
 
 def test_all_that_is_missing_is_listed_with_its_reason():
     walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs", "saves": "2 numbers"}])
-    found = sections([], absent=WITHOUT_GAIT, simulate=walk)["left-out"]
+    found = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"], simulate=walk)["left-out"]
     assert rows(found) == {
         "fixedpoint": [NO_GAIT, ""],
-        "simulate and contact-sim": ["for want of fixedpoint", ""],
+        "simulate and contact-sim": ["needs fixedpoint", ""],
         "forces": ["not among the outputs", "2 numbers"],
     }
 
 
 def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
     why = "the config has no contact block"
-    absent = [Absent(name, why, saves="contact code") for name in ("contact-sim", "compare")]
-    absent.append(Absent("figure 6", f"it needs contact-sim: {why}"))
+    absent = [LeftOut(name, why, saves="contact code") for name in ("contact-sim", "compare")]
+    absent.append(LeftOut("figure 6", f"it needs contact-sim: {why}"))
     found = sections([], absent=absent)["left-out"]
     assert rows(found) == {
         "contact-sim and compare": [why, "contact code"],
-        "figure 6": ["for want of contact-sim and compare", ""],
+        "figure 6": ["needs contact-sim and compare", ""],
     }
 
 
@@ -399,7 +434,7 @@ def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
 def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
-    made = assumptions.section(Results(config("contact=null"), {"simulate": walk}))
+    made = assumptions(Results(config("contact=null"), {"simulate": walk}))
     assert "The stance foot does not slip: needs friction (0.203)" in made.finding
 
 

@@ -8,7 +8,7 @@ from synthetic_results import EVERYTHING, config, stored
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
-from walkerlab.report.images import fitting
+from walkerlab.report.pictures import fitting
 from walkerlab.stages import report
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.plan import STILL_COMPUTED, LeftOut

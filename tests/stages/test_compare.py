@@ -78,6 +78,8 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
             "pitch_m": 0.3714,
             "static_penetration_m": 5.9e-5,
             "damping_ratio": 3.7,
+            "slip_per_step_m": 0.0,
+            "dissipated_J": {"damping": 1.0},
         },
     )
 
@@ -155,12 +157,14 @@ def test_x_p_is_reproduced_and_its_misprint_told(compared):
     assert "cut off" in rows["x_p, dtheta_2"]["evidence"]
 
 
-def test_another_walker_refutes_nothing_of_the_papers_walk(compared):
-    content = compared("walker.hip_mass_kg=12")
-    assert "hip_mass_kg 12 instead of 10" in content.summary["departures"]
-    verdicts = {row["verdict"] for row in rows_of(content, "Table 3").values()}
-    assert "refuted" not in verdicts
-    assert rows_of(content, "Table 1")["mass of hip, MH"]["verdict"] == "explained"
+@pytest.mark.parametrize("change", ["hip_mass_kg=12", "foot_radius_m=0.01"])
+def test_another_walker_is_not_judged_by_the_paper(compared, change):
+    content = compared(f"walker.{change}")
+    assert change.replace("=", " ") in " ".join(content.summary["departures"])
+    assert not {"verdicts", "paper_numbers", "table1", "errata"} & content.summary.keys()
+    assert set(content.groups) == {"errors", "aligned", "orbit"}
+    assert "they are of the paper's own walker" in [entry["why"] for entry in content.summary["left_out"]]
+    assert content.summary["steps"]["gait"]["period_s"] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -168,7 +172,6 @@ def test_another_walker_refutes_nothing_of_the_papers_walk(compared):
     [
         ("contact.stiffness=2e5", "stiffness_N_per_m_e"),
         ("contact.terrain=after-mid-swing", "contact.terrain after-mid-swing instead of checkerboard"),
-        ("walker.foot_radius_m=0.01", "foot_radius_m 0.01 instead of 0.001"),
         ("slope_deg=3", "slope_rad 0.0523599 instead of 0.0174"),
     ],
 )

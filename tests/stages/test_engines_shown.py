@@ -8,14 +8,14 @@ from synthetic_engines import PERIOD, ROWS, content
 from walkerlab.benchmarks.engines.rows import EngineRow
 from walkerlab.config.loader import load
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.engines import COLOURS, FIGURES, series_of
+from walkerlab.figures.costs import COLOURS, ENGINES, engines_of
 from walkerlab.labels import labels_of
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections.engines import section
 from walkerlab.report.tables import Table
 
-ERRORS, PERIODS = FIGURES[:2]
+ERRORS, PERIODS = ENGINES[:2]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
 
 
 def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
-    every = list(series_of("compass", "same-law", results))
+    every = list(engines_of("compass", "same-law", results))
     assert len({to_hex(one.line.get_color()) for one in every}) == len({one.engine for one in every})
     assert {one.engine for one in every} <= set(COLOURS)
 
@@ -68,7 +68,7 @@ def test_a_run_without_the_stage_has_neither_figure_nor_section():
 
 
 def test_a_scene_that_was_not_walked_has_no_figure(results):
-    assert [figure.why_left_out(results, {}) for figure in FIGURES] == [
+    assert [figure.why_left_out(results, {}) for figure in ENGINES] == [
         None,
         None,
         *["engines: it did not walk the scene kneed"] * 2,

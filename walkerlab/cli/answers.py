@@ -9,10 +9,10 @@ from typing import Any
 
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
-from walkerlab.report.gait_diagram import parameter
 from walkerlab.report.numbers import count, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, WALKED, ends, walks
-from walkerlab.report.sections import adjustment, basin, families, gaits, stability
+from walkerlab.report.sections import adjustment, families, gaits, stability
+from walkerlab.report.sections.families import parameter
 from walkerlab.report.sections.models import CHANNELS
 from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.symbols import in_signs
@@ -215,7 +215,7 @@ def continuation(summary: Summary) -> list[str | Table]:
 
 def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
-    return [in_signs(basin.shares(summary).text), basin.attractors(summary)]
+    return [in_signs(families.shares(summary).text), families.attractors(summary)]
 
 
 def engines(summary: Summary) -> list[str | Table]:

@@ -13,6 +13,15 @@ RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
 FIGURES = "figure-07 and so on, or its number; table-1 to table-3, table, trajectory"
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="Where to; its ending says the format, too. Default: named after the run.",
+    ),
+]
 FIRST_WALK = "default: contact-sim, or simulate where that has not run"
 
 
@@ -70,28 +79,46 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def export(
         run: RunArgument,
         what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
-        to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")],
-        output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Where to.")] = None,
-        columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 2,
+        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")] = None,
+        output: Output = None,
+        columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 1,
+        width: Annotated[
+            float | None, typer.Option(min=72.0, metavar="PT", help="Width of a figure in points; a column has 252.")
+        ] = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
         runs: Runs = RUNS,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
         with exit_on_failure("export", as_json=False):
-            from walkerlab.cli.exports import export_from
+            from walkerlab.cli.console import Console
+            from walkerlab.cli.exports import COLUMNS, Target, export_from
             from walkerlab.cli.named import walk_in
             from walkerlab.stages.runs import run_named
 
-            folder = run_named(run, runs)
-            print(export_from(folder, what, to, output, columns, walk_in(folder, model)))
+            folder, points = run_named(run, runs), width or COLUMNS[columns]
+            print(export_from(folder, what, Target(to, output), points, walk_in(folder, model), Console()))
+
+    @app.command("draw")
+    def draw(
+        file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
+        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
+        output: Output = None,
+    ) -> None:
+        """Draw a config's walker to scale, with its measures named as the config names them."""
+        with exit_on_failure("draw", as_json=False):
+            from walkerlab.cli.console import Console
+            from walkerlab.cli.exports import Target, draw_walker
+
+            print(draw_walker(file, Target(to, output), Console()))
 
     @app.command("animate")
     def animate(
         run: RunArgument,
         to: Annotated[
-            Path | None,
-            typer.Option("--to", metavar="FILE", help="A .gif, or an .mp4 where ffmpeg is found; default: RUN.gif."),
+            str | None,
+            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 where ffmpeg is found; a file goes too."),
         ] = None,
+        output: Output = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
         steps: Annotated[int, typer.Option(min=1, help="Steps that are shown.")] = 4,
         rate: Annotated[int, typer.Option(min=1, max=60, help="Pictures a second.")] = 25,
@@ -102,11 +129,11 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Draw a run's walk as a moving picture."""
         with exit_on_failure("animate", as_json=False):
             from walkerlab.cli.console import Console
+            from walkerlab.cli.exports import Target
             from walkerlab.cli.films import Film, write_film
             from walkerlab.cli.named import walk_in
             from walkerlab.stages.runs import run_named
 
             folder = run_named(run, runs)
-            path = to or Path(f"{folder.name}.gif")
             film = Film(walk_in(folder, model), steps, rate, slower)
-            print(write_film(folder, path, film, Console(quiet)))
+            print(write_film(folder, Target(to, output), film, Console(quiet)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkerlab.cli.console import Console
 from walkerlab.config.problems import nearest
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
@@ -24,42 +25,89 @@ if TYPE_CHECKING:
     from walkerlab.figures.illustration import Illustration
 
 FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
+DRAWING_KINDS = ("svg", "pdf", "png")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 TRAJECTORY = "trajectory"
+COLUMNS = {1: 252.0, 2: 516.0}
+"""Width of one or two columns of a journal, pt."""
 STORED_WITH = "outputs: [states, energies, forces] has it."
 """What a walk without a trajectory lacks in its config."""
 NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
-def export_from(folder: RunFolder, what: str, kind: str, output: Path | None, columns: int, model: str) -> Path:
-    """Write one thing of a run as a file of a kind, and say where it is.
+@dataclass(frozen=True)
+class Target:
+    """Where something is written to.
+
+    to      a format or, as long as there is no other file, a file whose name ends in one; None for what the file says
+    output  the file; None for one in this folder that is named after the run and what it is
+    """
+
+    to: str | None
+    output: Path | None
+
+    def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
+        """File and format; the first of the formats if none is named.
+
+        Raises ConfigError for a format that there is not, and for two at once.
+        """
+        a_file = self.to is not None and self.output is None and "." in self.to
+        output = Path(str(self.to)) if a_file else self.output
+        named = "" if output is None else output.suffix.removeprefix(".")
+        kind = (None if a_file else self.to) or named or kinds[0]
+        if kind not in kinds:
+            raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
+        if named in kinds and named != kind:
+            raise ConfigError(f"--to {kind} and {output} are two formats.", "Leave --to away, or name the file alike.")
+        return output or Path(f"{stem}.{kind}"), kind
+
+
+def put(path: Path, data: bytes, console: Console) -> Path:
+    """Write a file, and say so if that replaces another one."""
+    replaced = path.is_file() and path.read_bytes() != data
+    write_atomically(path, data)
+    if replaced:
+        console.warn(f"{path} was there and is replaced.")
+    return path
+
+
+def export_from(folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console) -> Path:
+    """Write one thing of a run as a file, and say where it is.
+
+    width  of a figure, pt
+    model  the stage whose trajectory is meant
 
     Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
     """
     what = figure_named(what)
+    make: Callable[[str], bytes]
+    kinds: Sequence[str]
     if what == TRAJECTORY:
-        data = written(what, kind, TRAJECTORY_KINDS, lambda: trajectory(result_in(folder, model), kind))
+        stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(result_in(folder, model), kind)
     elif what in TABLES:
-        data = written(what, kind, TABLE_KINDS, lambda: table(rows_of(folder, what), kind))
+        stem, kinds, make = what, TABLE_KINDS, lambda kind: table(rows_of(folder, what), kind)
     else:
         illustration = figure_in(folder, what)
-        data = written(what, kind, FIGURE_KINDS, lambda: figure(folder, illustration, kind, columns))
-    path = output or Path(f"{folder.name}-{what}.{kind}")
-    write_atomically(path, data)
-    return path
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width)
+    path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
+    return put(path, make(kind), console)
+
+
+def draw_walker(config: Path, target: Target, console: Console) -> Path:
+    """Draw the walker of a config with its measures; ConfigError for a bad config or format."""
+    # Imported here: other exports draw no walker.
+    from walkerlab.config.loader import load
+    from walkerlab.figures.measures import drawn
+
+    loaded = load(config, ())
+    path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
+    return put(path, drawn(loaded.config.walker, path.stem, kind), console)
 
 
 def figure_named(what: str) -> str:
     """The name of a figure that is named by its number, as figure-7 or 7; another name as it is."""
     found = NUMBERED.fullmatch(what)
     return f"figure-{int(found[1]):02d}" if found else what
-
-
-def written(what: str, kind: str, kinds: Sequence[str], make: Callable[[], bytes]) -> bytes:
-    """What `make` makes; ConfigError if there is no such kind of it."""
-    if kind not in kinds:
-        raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
-    return make()
 
 
 def figure_in(folder: RunFolder, name: str) -> Illustration:
@@ -73,19 +121,19 @@ def figure_in(folder: RunFolder, name: str) -> Illustration:
         near = nearest(name, (*named, *TABLES, TRAJECTORY))
         meant = f" Did you mean {near}?" if near else ""
         drawable = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
-        raise ConfigError(f"there is no {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
+        raise ConfigError(f"nothing is called {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
     return named[name]
 
 
-def figure(folder: RunFolder, illustration: Illustration, kind: str, columns: int) -> bytes:
-    """A figure, drawn anew for one or two columns of a journal; StaleError if the run lacks what it needs."""
+def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float) -> bytes:
+    """A figure, drawn again with a width in pt; StaleError if the run lacks what it needs."""
     stored = results_in(folder, illustration.stages)
     why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    return illustration.as_file(stored, kind, columns)
+    return illustration.as_file(stored, kind, width)
 
 
 def exportable(stored: Mapping[str, Stored]) -> list[str]:

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.cli.console import Console
-from walkerlab.cli.exports import STORED_WITH
+from walkerlab.cli.exports import STORED_WITH, Target, put
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.stages.runs import result_in
-from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder
 
-KINDS = (".gif", ".mp4")
+KINDS = ("gif", "mp4")
 
 
 @dataclass(frozen=True)
@@ -36,32 +35,30 @@ class Film:
     slower: float
 
 
-def write_film(folder: RunFolder, path: Path, film: Film, console: Console) -> Path:
+def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
     """Draw a run's walk, picture by picture, and write the film.
 
-    Raises ConfigError for a kind of file that there is not, StaleError if there is no walk to draw, StorageError.
+    Raises ConfigError for a format that there is not, StaleError if there is no walk to draw, StorageError.
     """
-    if path.suffix not in KINDS:
-        raise ConfigError(f"{path.name} is no film.", f"--to a name that ends in {' or '.join(KINDS)}")
+    path, kind = target.of("a film", f"{folder.name}-{film.model}", KINDS)
     ffmpeg = shutil.which("ffmpeg")
-    if path.suffix == ".mp4" and ffmpeg is None:
+    if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     # Imported here: what cannot be written is told before anything is loaded that draws.
-    from walkerlab.figures.film import pictures, sticks_of, times, why_not
+    from walkerlab.figures.stick_diagram import OF_STAGE, film_times, pictures, sticks_of
 
     results = {film.model: result_in(folder, film.model)}
-    why = why_not(results, film.model)
+    why = OF_STAGE[film.model].why_left_out(results, {})
     if why is not None:
         raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
-    sticks = sticks_of(results, film.model)
-    at = times(sticks, film.steps, film.rate, film.slower)
+    sticks = sticks_of(results[film.model])
+    at = film_times(sticks, film.steps, film.rate, film.slower)
     line = console.begin("animate", f"{at.size} pictures")
     line.start("drawing", int(at.size))
     drawn = told(pictures(sticks, at), line)
-    data = gif(drawn, film.rate) if path.suffix == ".gif" else mp4(drawn, film.rate, str(ffmpeg))
-    write_atomically(path, data)
+    data = gif(drawn, film.rate) if kind == "gif" else mp4(drawn, film.rate, str(ffmpeg))
     line.end("")
-    return path
+    return put(path, data, console)
 
 
 def told(drawn: Iterable[Any], line: Any) -> Iterable[Any]:

@@ -13,8 +13,10 @@ from walkerlab.cli.browser import open_file
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.report.tables import aligned
-from walkerlab.stages.graph import Graph, Stage
+from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.runner import StageReport, execute, preview
+
+DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(
@@ -69,8 +71,18 @@ def printed(request: Request, report: StageReport) -> str:
         lines = [*verdict(report.results), *answer(report.stage, own), *pages(request, report)]
     else:
         found = answer(report.stage, own)
-        lines = [*found, *([""] if found else []), f"stored in {report.artifact}"]
+        lines = [*found, *([""] if found else []), f"stored in {report.artifact}", *figures_of(report)]
     return "\n".join([*lines, *left_out_lines(request, report)])
+
+
+def figures_of(report: StageReport) -> list[str]:
+    """Where the figures are of what only this stage's command computes; they are drawn at once."""
+    if report.artifact is None or report.stage not in DRAWN_AT_ONCE:
+        return []
+    # Imported here: most stages draw nothing.
+    from walkerlab.stages.plot import draw_at_once
+
+    return [f"figure: {path}" for path in draw_at_once(report.stage, report.run_dir, anew=not report.reused)]
 
 
 def pages(request: Request, report: StageReport) -> list[str]:
@@ -88,12 +100,8 @@ def planned(report: StageReport) -> str:
 
 
 def left_out_lines(request: Request, report: StageReport) -> list[str]:
-    """What was left out: how much, and if asked for, what, why and what that saves."""
-    if report.left_out and not request.verbose:
-        names = list(dict.fromkeys(entry.what for entry in report.left_out))
-        few = f"{', '.join(names[:3])}{' …' if len(names) > 3 else ''}"
-        return [f"left out: {len(names)} ({few}); -v and --json say why"]
-    return each_left_out(report)
+    """What was left out, if that is asked for or nothing else is there to be told."""
+    return each_left_out(report) if request.verbose or report.artifact is None else []
 
 
 def each_left_out(report: StageReport) -> list[str]:

@@ -13,78 +13,47 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
-from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
-from matplotlib.transforms import Transform
 
-from walkerlab.figures.style import ONE_COLUMN, PNG_DPI, RC, WIDTH
+from walkerlab.figures.style import LEGEND_LETTERS, NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 LETTER, BESIDE_LABEL = 0.07, 0.65
-"""Width of a legend's letter, and of all that is beside a label, in."""
+"""Width of a legend's letter, and of all that is beside a label, in, at the ordinary size of its letters."""
+SHRINKS = 0.7
+"""Power of its width that a figure's height follows: letters keep their size."""
 
 
 @contextlib.contextmanager
-def styled(columns: int = 2) -> Iterator[None]:
+def styled(width: float = WIDTH) -> Iterator[None]:
     """Matplotlib's defaults and this project's style on top, whatever the user's own settings are.
 
-    columns  of a journal that a figure is to fill: in one, letters are smaller and lines thinner
+    width  of the figures, in; in narrow ones, letters are smaller and lines thinner
     """
-    with matplotlib.style.context(["default", RC, *([ONE_COLUMN] if columns == 1 else [])]):
+    size = {"figure.figsize": (width, width)}
+    with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
 
 
-def resize(figure: Figure, columns: int) -> None:
-    """Make a figure as wide as one column, and not as much lower; as it is for two."""
-    if columns == 1:
-        _, height = figure.get_size_inches()
-        figure.set_size_inches(WIDTH / 2, max(0.62 * height, 2.0))
-
-
 def blank(height: float) -> Figure:
-    """A figure of the common width and of `height` in."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
+    width = matplotlib.rcParams["figure.figsize"][0]
+    figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-class UprightLine(Line2D):
-    """A line that stands upright in legends, as it does in the figure."""
-
-
-class UprightHandler(HandlerBase):
-    """Draws upright lines in legends."""
-
-    def create_artists(
-        self,
-        legend: Legend,
-        orig_handle: Artist,
-        xdescent: float,
-        ydescent: float,
-        width: float,
-        height: float,
-        fontsize: float,  # noqa: ARG002 - matplotlib calls it so
-        trans: Transform,
-    ) -> Sequence[Artist]:
-        """One line in the middle, a little taller than the text."""
-        middle = 0.5 * width - xdescent
-        line = Line2D([middle, middle], [-0.3 * height - ydescent, 1.2 * height - ydescent])
-        self.update_prop(line, orig_handle, legend)
-        line.set_transform(trans)
-        return [line]
+def entry(label: str, **look: Any) -> Line2D:
+    """A line, or a mark, in a legend."""
+    return Line2D([], [], label=label, **look)
 
 
 def legend_above(figure: Figure, handles: Sequence[Artist]) -> None:
     """A legend in a band of its own above all axes, in as few rows as fit into the figure's width."""
     labels = [str(handle.get_label()) for handle in handles]
-    fitting = (columns for columns in range(len(labels), 1, -1) if legend_width(labels, columns) < WIDTH)
+    room = figure.get_figwidth() * LEGEND_LETTERS / matplotlib.rcParams["legend.fontsize"]
+    fitting = (columns for columns in range(len(labels), 1, -1) if legend_width(labels, columns) < room)
     rows = -(-len(labels) // next(fitting, 1))
-    figure.legend(
-        handles=list(handles),
-        loc="outside upper center",
-        ncols=-(-len(labels) // rows),
-        handler_map={UprightLine: UprightHandler()},
-    )
+    figure.legend(handles=list(handles), loc="outside upper center", ncols=-(-len(labels) // rows))
 
 
 def legend_width(labels: Sequence[str], columns: int) -> float:
@@ -104,28 +73,14 @@ def settle(figure: Figure) -> None:
     figure.set_layout_engine(None)
 
 
-def svg_of(figure: Figure, name: str, title: str) -> bytes:
-    """The figure as SVG with text kept as text; `name` makes its ids differ from those of other figures."""
-    with matplotlib.rc_context({"svg.hashsalt": name}):
-        return saved(figure, "svg", {"Date": None, "Creator": None, "Title": title})
-
-
-def png_of(figure: Figure, title: str) -> bytes:
-    """The figure as PNG."""
-    return saved(figure, "png", {"Software": None, "Title": title}, dpi=PNG_DPI)
-
-
-def bytes_of(figure: Figure, kind: str, name: str, title: str) -> bytes:
-    """The figure as SVG, PNG or PDF."""
-    if kind == "svg":
-        return svg_of(figure, name, title)
-    if kind == "png":
-        return png_of(figure, title)
-    return saved(figure, kind, {"CreationDate": None, "Title": title})
-
-
-def saved(figure: Figure, kind: str, metadata: dict[str, str | None], **options: Any) -> bytes:
-    """The figure's bytes in one of matplotlib's formats."""
+def as_file(figure: Figure, kind: str, name: str, title: str) -> bytes:
+    """The figure as SVG with text kept as text, PNG or PDF; `name` makes an SVG's ids differ from other figures'."""
+    undated: dict[str, dict[str, Any]] = {
+        "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
+        "png": {"metadata": {"Software": None, "Title": title}, "dpi": PNG_DPI},
+        "pdf": {"metadata": {"CreationDate": None, "Title": title}},
+    }
     file = io.BytesIO()
-    figure.savefig(file, format=kind, metadata=metadata, **options)
+    with matplotlib.rc_context({"svg.hashsalt": name}):
+        figure.savefig(file, format=kind, **undated[kind])
     return file.getvalue()

@@ -1,4 +1,4 @@
-"""What an illustration is: its name, its words, what it needs, and how it is drawn."""
+"""What an illustration is: its name, its words, what it needs of the stored results, and how it is drawn."""
 
 from __future__ import annotations
 
@@ -7,8 +7,34 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import bytes_of, png_of, resize, settle, styled, svg_of
-from walkerlab.figures.needs import Need, Results, why_not
+from walkerlab.figures.canvas import as_file, settle, styled
+from walkerlab.figures.style import POINT
+from walkerlab.store.artifact import Stored
+
+Results = Mapping[str, Stored]
+"""Results by the name of their stage."""
+
+
+@dataclass(frozen=True)
+class Need:
+    """Variables of a group of a stage's result; `or_else` is why a result may be without them, in words."""
+
+    stage: str
+    group: str
+    variables: tuple[str, ...]
+    or_else: str
+
+    def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
+        """Why the need is not met, in words; None if it is.
+
+        absent  why results are not there, by stage
+        """
+        if self.stage not in results:
+            why = absent.get(self.stage)
+            return f"it needs {self.stage}" + (f": {why}" if why else "")
+        group = results[self.stage].groups.get(self.group)
+        there = group is not None and all(name in group.variables for name in self.variables)
+        return None if there else f"{self.stage}: {self.or_else}"
 
 
 @dataclass(frozen=True)
@@ -56,24 +82,28 @@ class Illustration:
 
         absent  why results are not there, by stage
         """
-        return why_not(self.needs, results, absent)
+        reasons = (need.missing_in(results, absent) for need in self.needs)
+        return next((reason for reason in reasons if reason is not None), None)
+
+    @property
+    def heading(self) -> str:
+        """Its title, with the paper's number."""
+        return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def drawn(self, results: Results) -> Drawing:
         """Its files and words; the same results give the same bytes."""
-        title = self.title if self.number is None else f"Figure {self.number}. {self.title}"
         with styled():
             figure = self.plot(results)
             settle(figure)
-            return Drawing(svg_of(figure, self.name, title), png_of(figure, title), self.caption(results))
+            svg, png = (as_file(figure, kind, self.name, self.heading) for kind in ("svg", "png"))
+            return Drawing(svg, png, self.caption(results))
 
-    def as_file(self, results: Results, kind: str, columns: int) -> bytes:
-        """The figure as PDF, SVG or PNG, as wide as one or two columns of a journal."""
-        title = self.title if self.number is None else f"Figure {self.number}. {self.title}"
-        with styled(columns):
+    def as_file(self, results: Results, kind: str, width: float) -> bytes:
+        """The figure as PDF, SVG or PNG, of a width in pt."""
+        with styled(POINT * width):
             figure = self.plot(results)
-            resize(figure, columns)
             settle(figure)
-            return bytes_of(figure, kind, self.name, title)
+            return as_file(figure, kind, self.name, self.heading)
 
 
 def paper_figure(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
-from walkerlab.figures.canvas import blank, settle, styled, svg_of
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.figures.canvas import as_file, blank, settle, styled
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -31,7 +32,7 @@ FIRST_LANE, LANE, LEFT = 0.24, 0.72, -0.62
 
 
 @dataclass(frozen=True)
-class Measure:
+class Length:
     """A length of the config, between two points at one height or above one another (m)."""
 
     key: str
@@ -54,14 +55,15 @@ class UprightLeg:
 
     joints  the leg's line from the hip down, without the sole
     centre  of the sole's arc
+    top     height of the torso's end, or of the hip
     """
 
     joints: tuple[Point, ...]
     centre: Point
     radius: float
-    measures: tuple[Measure, ...]
+    lengths: tuple[Length, ...]
     masses: tuple[Mass, ...]
-    torso: Torso | None
+    top: float
 
     @property
     def length(self) -> float:
@@ -80,120 +82,85 @@ def said(key: str, value: float, unit: str = "") -> str:
     return f"{key}: {value:g} {unit}".rstrip()
 
 
-def weighing(prefix: str, mass_kg: float, inertia_kg_m2: float) -> tuple[str, ...]:
-    """The words of a mass, with its inertia if it has one."""
-    turning = (said(f"{prefix}inertia_kg_m2", inertia_kg_m2),) if inertia_kg_m2 else ()
-    return (said(f"{prefix}mass_kg", mass_kg), *turning)
+def weighing(prefix: str, body: Any) -> tuple[str, ...]:
+    """The words of a body's mass, with its inertia if it has one."""
+    keys = (f"{prefix}mass_kg", f"{prefix}inertia_kg_m2")
+    mass, inertia = (getattr(body, key.rpartition(".")[2], 0.0) for key in keys)
+    return (said(keys[0], mass), *((said(keys[1], inertia),) if inertia else ()))
 
 
 def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     """What is drawn of a walker of a type."""
+    radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
+    hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
+    lengths: list[Length] = []
+    masses = [Mass(weighing("hip_", walker), hip)]
+    if (torso := walker.torso) is not None:
+        head = (0.0, top + torso.above_hip_m)
+        lengths.append(Length("torso.above_hip_m", torso.above_hip_m, head, hip))
+        masses.append(Mass(weighing("torso.", torso), head))
+        top = head[1]
     if isinstance(walker, Kneed):
-        return upright_kneed(walker)
-    length, radius = walker.leg_length_m, walker.foot_radius_m
-    hip, sole = (0.0, length), (0.0, 0.0)
-    if isinstance(walker, CompassWalker):
-        mass, centre = (0.0, walker.foot_to_mass_m), (0.0, radius)
-        places: tuple[Measure, ...] = (Measure("foot_to_mass_m", walker.foot_to_mass_m, mass, sole),)
+        knee = (0.0, walker.shank.length_m)
+        joints.append(knee)
+        for name, limb, joint, below, end in (
+            ("thigh", walker.thigh, "hip", hip, knee),
+            ("shank", walker.shank, "knee", knee, sole),
+        ):
+            down = getattr(limb, f"mass_below_{joint}_m")
+            mass = (limb.mass_ahead_m, below[1] - down)
+            lengths += [
+                Length(f"{name}.mass_below_{joint}_m", down, below, mass),
+                Length(f"{name}.length_m", limb.length_m, below, end),
+                Length(f"{name}.mass_ahead_m", limb.mass_ahead_m, (0.0, mass[1]), mass),
+            ]
+            masses.append(Mass(weighing(f"{name}.", limb), mass))
     else:
-        mass = (walker.leg_mass_ahead_m, length - walker.leg_mass_below_hip_m)
-        centre = (walker.foot_centre_ahead_m, radius)
-        places = (
-            Measure("leg_mass_below_hip_m", walker.leg_mass_below_hip_m, hip, mass),
-            Measure("leg_mass_ahead_m", walker.leg_mass_ahead_m, (0.0, mass[1]), mass),
-            Measure("foot_centre_ahead_m", walker.foot_centre_ahead_m, (0.0, radius), centre),
-        )
-    return UprightLeg(
-        (hip,),
-        centre,
-        radius,
-        (*places, Measure("leg_length_m", length, hip, sole), sole_radius(radius, centre)),
-        (
-            Mass(weighing("leg_", walker.leg_mass_kg, walker.leg_inertia_kg_m2), mass),
-            Mass(weighing("hip_", walker.hip_mass_kg, 0.0), hip),
-        ),
-        walker.torso,
-    )
+        if isinstance(walker, CompassWalker):
+            mass = (0.0, walker.foot_to_mass_m)
+            lengths.append(Length("foot_to_mass_m", walker.foot_to_mass_m, mass, sole))
+        else:
+            mass, centre = (
+                (walker.leg_mass_ahead_m, hip[1] - walker.leg_mass_below_hip_m),
+                (walker.foot_centre_ahead_m, radius),
+            )
+            lengths += [
+                Length("leg_mass_below_hip_m", walker.leg_mass_below_hip_m, hip, mass),
+                Length("leg_mass_ahead_m", walker.leg_mass_ahead_m, (0.0, mass[1]), mass),
+                Length("foot_centre_ahead_m", walker.foot_centre_ahead_m, (0.0, radius), centre),
+            ]
+        lengths.append(Length("leg_length_m", walker.leg_length_m, hip, sole))
+        masses.append(Mass(weighing("leg_", walker), mass))
+    lengths.append(Length("foot_radius_m", radius, centre, (centre[0], 0.0)))
+    return UprightLeg(tuple(joints), centre, radius, tuple(lengths), tuple(masses), top)
 
 
-def upright_kneed(walker: Kneed) -> UprightLeg:
-    """A leg of thigh and shank, in line."""
-    thigh, shank, radius = walker.thigh, walker.shank, walker.foot_radius_m
-    hip, knee, sole, centre = (0.0, walker.leg_length_m), (0.0, shank.length_m), (0.0, 0.0), (0.0, radius)
-    upper = (thigh.mass_ahead_m, hip[1] - thigh.mass_below_hip_m)
-    lower = (shank.mass_ahead_m, knee[1] - shank.mass_below_knee_m)
-    return UprightLeg(
-        (hip, knee),
-        centre,
-        radius,
-        (
-            Measure("thigh.mass_below_hip_m", thigh.mass_below_hip_m, hip, upper),
-            Measure("shank.mass_below_knee_m", shank.mass_below_knee_m, knee, lower),
-            Measure("thigh.length_m", thigh.length_m, hip, knee),
-            Measure("shank.length_m", shank.length_m, knee, sole),
-            Measure("thigh.mass_ahead_m", thigh.mass_ahead_m, (0.0, upper[1]), upper),
-            Measure("shank.mass_ahead_m", shank.mass_ahead_m, (0.0, lower[1]), lower),
-            sole_radius(radius, centre),
-        ),
-        (
-            Mass(weighing("thigh.", thigh.mass_kg, thigh.inertia_kg_m2), upper),
-            Mass(weighing("shank.", shank.mass_kg, shank.inertia_kg_m2), lower),
-            Mass(weighing("hip_", walker.hip_mass_kg, 0.0), hip),
-        ),
-        walker.torso,
-    )
-
-
-def sole_radius(radius: float, centre: Point) -> Measure:
-    """The radius of the sole's arc."""
-    return Measure("foot_radius_m", radius, centre, (centre[0], 0.0))
-
-
-def with_torso(leg: UprightLeg, torso: Torso) -> UprightLeg:
-    """The leg's measures and masses with those of the torso above it."""
-    hip = leg.joints[0]
-    head = (hip[0], hip[1] + torso.above_hip_m)
-    measure = Measure("torso.above_hip_m", torso.above_hip_m, head, hip)
-    mass = Mass(weighing("torso.", torso.mass_kg, torso.inertia_kg_m2), head)
-    return UprightLeg(leg.joints, leg.centre, leg.radius, (measure, *leg.measures), (mass, *leg.masses), torso)
-
-
-def drawn(walker: AnyWalker, name: str) -> bytes:
-    """The walker's measures as SVG; the same walker and name give the same bytes."""
+def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
+    """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
     title = f"The measures of a walker of type {walker.type}"
     with styled():
         figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
         settle(figure)
-        return svg_of(figure, name, title)
+        return as_file(figure, kind, name, title)
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """One leg upright with its measures, the other one pale behind it."""
     leg = upright(walker)
-    if walker.torso is not None:
-        leg = with_torso(leg, walker.torso)
     figure = blank(HEIGHT)
-    axes = bare(figure, leg)
-    ground(axes, leg.length)
-    other_leg(axes, leg)
-    draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
-    if leg.torso is not None:
-        axes.plot([0.0, 0.0], [leg.length, leg.length + leg.torso.above_hip_m], color=BLACK, linewidth=2.0)
-    draw_heights(axes, leg)
-    draw_sideways(axes, leg)
-    draw_masses(axes, leg)
-    return figure
-
-
-def bare(figure: Figure, leg: UprightLeg) -> Axes:
-    """Axes of equal scales without ticks that fit the walker."""
-    top = leg.length + (0.0 if leg.torso is None else leg.torso.above_hip_m)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_xlim(-1.15 * leg.length, 1.35 * leg.length)
-    axes.set_ylim(-0.16 * leg.length, top + 0.1 * leg.length)
-    return axes
+    axes.set_ylim(-0.16 * leg.length, leg.top + 0.1 * leg.length)
+    ground(axes, leg.length)
+    other_leg(axes, leg)
+    draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
+    axes.plot([0.0, 0.0], [leg.length, leg.top], color=BLACK, linewidth=2.0)
+    draw_heights(axes, leg)
+    draw_sideways(axes, leg)
+    draw_masses(axes, leg)
+    return figure
 
 
 def ground(axes: Axes, length: float) -> None:
@@ -232,7 +199,7 @@ def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
 def draw_heights(axes: Axes, leg: UprightLeg) -> None:
     """Measures from a point to one below it, each in the first lane that has room."""
     lanes: list[list[tuple[float, float]]] = []
-    heights = [one for one in leg.measures if one.start[1] != one.end[1] and one.value > SMALL_ARC * leg.length]
+    heights = [one for one in leg.lengths if one.start[1] != one.end[1] and one.value > SMALL_ARC * leg.length]
     for measure in heights:
         high, low = measure.start[1], measure.end[1]
         free = (number for number, taken in enumerate(lanes) if all(high <= b or low >= a for a, b in taken))
@@ -249,7 +216,7 @@ def draw_heights(axes: Axes, leg: UprightLeg) -> None:
 
 def draw_sideways(axes: Axes, leg: UprightLeg) -> None:
     """Measures from the leg's line to a point ahead of it; those that are zero are left out."""
-    for measure in leg.measures:
+    for measure in leg.lengths:
         if measure.start[1] != measure.end[1] or not measure.value:
             continue
         axes.annotate("", xy=measure.end, xytext=measure.start, arrowprops={"arrowstyle": "-", "color": VERMILLION})
@@ -278,7 +245,7 @@ def of_parts(walker: PartsWalker) -> Figure:
     for place, body in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), place + 1)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_title(f"name: {body.name}\n" + "\n".join(weighing("", body.mass_kg, body.inertia_kg_m2)))
+        axes.set_title(f"name: {body.name}\n" + "\n".join(weighing("", body)))
         axes.set_xlabel("ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)

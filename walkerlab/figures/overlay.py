@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import blank, legend_above, png_of, settle, styled, svg_of
+from walkerlab.figures.canvas import as_file, blank, entry, legend_above, settle, styled
 from walkerlab.figures.style import BLUE, ORANGE
 from walkerlab.figures.walks import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.store.content import Content, Group
@@ -31,7 +31,7 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
     with styled():
         figure = drawn(shown, (first, second), names)
         settle(figure)
-        return svg_of(figure, "diff", title), png_of(figure, title)
+        return as_file(figure, "svg", "diff", title), as_file(figure, "png", "diff", title)
 
 
 def trajectory(results: Mapping[str, Content], stage: str) -> Group | None:
@@ -55,9 +55,5 @@ def drawn(
                 group = trajectory(run, stage)
                 if group is not None and variable in group.variables:
                     axes[row][column].plot(group["time"], group[variable], **look)
-    handles = []
-    for name, look in zip(names, LOOKS, strict=True):
-        (line,) = axes[0][0].plot([], [], label=name, **look)
-        handles.append(line)
-    legend_above(figure, handles)
+    legend_above(figure, [entry(name, **look) for name, look in zip(names, LOOKS, strict=True)])
     return figure

@@ -1,24 +1,38 @@
-"""Stick diagrams: a walker's postures over one gait cycle, to scale, on its slope."""
+"""A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and moving pictures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank
+from walkerlab.figures.canvas import blank, entry, legend_above, styled
+from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
-from walkerlab.figures.walks import Array
+from walkerlab.figures.walks import (
+    CONTACT_STAGE,
+    JOINTS,
+    NO_STATES,
+    RIGID_STAGE,
+    STATES,
+    STEPS_TAKEN_CONTACT,
+    STEPS_TAKEN_RIGID,
+    TRAJECTORY,
+    Array,
+)
 from walkerlab.store.artifact import Stored
+from walkerlab.store.content import Group
 
 CYCLE = 2
 """Steps of a gait cycle."""
@@ -112,7 +126,7 @@ class Sticks:
         return np.asarray(right - left_is_nearer, dtype=np.int64)
 
 
-def stored_sticks(result: Stored) -> Sticks:
+def sticks_of(result: Stored) -> Sticks:
     """The joints' places as a walk has stored them."""
     trajectory, steps, walker = result["trajectory"], result["steps"], result.identity.config_slice["walker"]
 
@@ -123,6 +137,8 @@ def stored_sticks(result: Stored) -> Sticks:
     if "torso_angle" in trajectory.variables:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
+    # a compass has point feet in the rigid model, whatever its ball feet
+    point_feet = result.identity.stage == RIGID_STAGE and walker["type"] == "compass"
     return Sticks(
         trajectory["time"],
         hip,
@@ -131,7 +147,7 @@ def stored_sticks(result: Stored) -> Sticks:
         np.append(0.0, steps["touch_along_m"]),
         slope,
         joints("knee") if "knee_along_m" in trajectory.variables else None,
-        sole_radius(walker),
+        0.0 if point_feet else sole_radius(walker),
         head,
     )
 
@@ -181,15 +197,9 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     for leg, look in enumerate(LEGS):
         for line in sticks.in_plane(sticks.leg(leg)[rows]):
             axes.plot(
-                *line.T,
-                color=look.colour,
-                linestyle=look.style,
-                linewidth=width,
-                marker=look.marker,
-                markevery=[*range(1, len(line))],
-                markersize=2.0 + width,
-                zorder=look.order + width,
-            )
+                *line.T, color=look.colour, linestyle=look.style, linewidth=width, marker=look.marker,
+                markevery=[*range(1, len(line))], markersize=2.0 + width, zorder=look.order + width,
+            )  # fmt: skip
         if sticks.radius > SMALL_FOOT * sticks.leg_length:
             for sole in sticks.in_plane(sticks.sole(leg)[rows]):
                 axes.plot(*sole.T, color=look.colour, linewidth=width, zorder=look.order + width)
@@ -204,16 +214,11 @@ def mark_landings(axes: Axes, sticks: Sticks) -> None:
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for along, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
         x, y = sticks.in_plane(np.array([along, -0.03 * sticks.leg_length]))
+        arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
-            f"{time:.3g} s" if time else "start",
-            (x, y),
-            xytext=(0.0, -9.0),
-            textcoords="offset points",
-            arrowprops={"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0},
-            ha="center",
-            va="top",
-            fontsize=8.0,
-        )
+            f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
+            arrowprops=arrow, ha="center", va="top", fontsize=matplotlib.rcParams["xtick.labelsize"],
+        )  # fmt: skip
 
 
 def show_direction(axes: Axes, sticks: Sticks, path: Array) -> None:
@@ -239,14 +244,11 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 
 def entries(sticks: Sticks) -> list[Artist]:
     """Legend entries of the legs and of what else the walker is made of."""
-    legs = [
-        Line2D([], [], color=look.colour, linestyle=look.style, linewidth=1.6, marker=look.marker, label=look.label)
-        for look in LEGS
-    ]
-    strike = Line2D([], [], color=GREY, linewidth=FULL, label="at heel strike")
-    between = Line2D([], [], color=GREY, linewidth=FAINT, label="between")
-    hip = Line2D([], [], color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0, label="hip")
-    torso = [] if sticks.head is None else [Line2D([], [], color=BLACK, linewidth=1.6, label="torso")]
+    legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
+    strike = entry("at heel strike", color=GREY, linewidth=FULL)
+    between = entry("between", color=GREY, linewidth=FAINT)
+    hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
+    torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
     return [*legs, strike, between, hip, *torso]
 
 
@@ -258,3 +260,134 @@ def cycle_caption(sticks: Sticks) -> str:
     unfinished = "" if strikes.size == CYCLE else "; the cycle was not completed"
     torso = "" if sticks.head is None else ", the torso up to its centre of mass"
     return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down{torso}."
+
+
+SEEN = "Legs as lines from the hip to the feet, fanned out from one foothold to the next, "
+TERRAIN = "terrain"
+PAD_HEIGHT = 0.028
+"""Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
+HATCHES = ("////", "||||")
+PAD_NAMES = ("pad of leg 1", "pad of leg 2")
+PLANES = {
+    "plane": "on a plane",
+    "after-mid-swing": "on a plane that a swing foot can touch only once it has passed the stance foot",
+}
+
+
+def plot_rigid(results: Results) -> Figure:
+    """The walker on the bare slope: the rigid model's ground is a plane."""
+    sticks = sticks_of(results[RIGID_STAGE])
+    figure, axes = stick_diagram(sticks)
+    draw_slope(axes, sticks)
+    legend_above(figure, entries(sticks))
+    return figure
+
+
+def say_rigid(results: Results) -> str:
+    """The cycle's measures."""
+    return f"One gait cycle of the rigid model, to scale. {cycle_caption(sticks_of(results[RIGID_STAGE]))}"
+
+
+def plot_contact(results: Results) -> Figure:
+    """The walker on its pads, or on its plane."""
+    sticks = sticks_of(results[CONTACT_STAGE])
+    figure, axes = stick_diagram(sticks)
+    pads = results[CONTACT_STAGE].groups.get(TERRAIN)
+    more: list[Artist] = []
+    if pads is None:
+        draw_slope(axes, sticks)
+    else:
+        draw_pads(axes, sticks, pads)
+        more = [Patch(label=name, **pad_look(leg)) for leg, name in enumerate(PAD_NAMES)]
+    legend_above(figure, [*entries(sticks), *more])
+    return figure
+
+
+def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> None:
+    """The pads of both lanes that are in sight."""
+    bottom = -PAD_HEIGHT * sticks.leg_length
+    left, right = axes.get_xlim()
+    for pad_left, pad_right, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
+        corners = np.array([[pad_left, 0.0], [pad_right, 0.0], [pad_right, bottom], [pad_left, bottom]])
+        outline = sticks.in_plane(corners)
+        if outline[:, 0].max() > left and outline[:, 0].min() < right:
+            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **pad_look(int(leg))))
+
+
+def pad_look(leg: int) -> dict[str, Any]:
+    """How the pads of a leg's lane are drawn."""
+    return {"facecolor": "white", "edgecolor": LEGS[leg].colour, "hatch": HATCHES[leg], "linewidth": 0.7}
+
+
+def say_contact(results: Results) -> str:
+    """The cycle's measures, and what the ground is."""
+    result = results[CONTACT_STAGE]
+    asked, sticks = result.identity.config_slice, sticks_of(result)
+    feet = f"round feet of {1e3 * sticks.radius:.3g} mm radius" if sticks.radius else "point feet"
+    on_pads = f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
+    ground = on_pads if TERRAIN in result.groups else PLANES[asked["contact"]["terrain"]]
+    return (
+        "One gait cycle of the contact model, to scale but for the feet's marks and the ground's depth: "
+        f"{feet}, {ground}. {cycle_caption(sticks)}"
+    )
+
+
+FIGURE_2 = paper_figure(
+    2,
+    "Stick diagram of the rigid model",
+    (Need(RIGID_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), STEPS_TAKEN_RIGID),
+    say_rigid,
+    plot_rigid,
+    f"{SEEN}down the slope to the right.",
+)
+FIGURE_6 = paper_figure(
+    6,
+    "Stick diagram of the contact model",
+    (Need(CONTACT_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), STEPS_TAKEN_CONTACT),
+    say_contact,
+    plot_contact,
+    f"{SEEN}and the ground under them.",
+)
+FIGURES = (FIGURE_2, FIGURE_6)
+
+FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
+"""Of a picture, in and pixels per in: both sides are even, as video formats want them."""
+OF_STAGE: dict[str, Illustration] = {RIGID_STAGE: FIGURE_2, CONTACT_STAGE: FIGURE_6}
+"""The stick diagrams of the walks, which need what a film of them needs."""
+
+
+def film_times(sticks: Sticks, steps: int, rate: int, slower: float) -> Array:
+    """Times of the pictures (s): the first steps, `rate` pictures a second, so many times slower than life."""
+    end = float(sticks.strikes[min(steps, sticks.strikes.size) - 1]) if sticks.strikes.size else float(sticks.time[-1])
+    return np.arange(0.0, end, 1.0 / (rate * slower))
+
+
+def pictures(sticks: Sticks, at: Array) -> Iterator[NDArray[np.uint8]]:
+    """A picture (height, width, 3) for each time."""
+    joints = np.concatenate([sticks.leg(leg) for leg in range(len(LEGS))], axis=1)
+    flat = joints.reshape(joints.shape[0], -1)
+    # between two samples, straight; both sides of a heel strike are samples, so none is cut across
+    places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
+    shown = sticks.in_plane(places.reshape(at.size, *joints.shape[1:]))
+    with styled():
+        figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        axes.set_aspect("equal")
+        length = sticks.leg_length
+        points = shown.reshape(-1, 2)
+        axes.set_xlim(points[:, 0].min() - SIDEROOM * length, points[:, 0].max() + SIDEROOM * length)
+        axes.set_ylim(points[:, 1].min() - FOOTROOM * length, points[:, 1].max() + HEADROOM * length)
+        axes.set_xlabel("horizontal position (m)")
+        axes.set_ylabel("height (m)")
+        draw_slope(axes, sticks)
+        legs = [axes.plot([], [], color=look.colour, linestyle=look.style, linewidth=2.2)[0] for look in LEGS]
+        (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
+        clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
+        for time, places in zip(at, shown, strict=True):
+            for line, joint in zip(legs, np.split(places, len(LEGS)), strict=True):
+                line.set_data(*joint.T)
+            hip.set_data(*places[:1].T)
+            clock.set_text(f"{time:.2f} s")
+            canvas.draw()  # type: ignore[no-untyped-call]
+            yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

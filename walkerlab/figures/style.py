@@ -7,7 +7,7 @@ brightness too, and in the line's style, so that figures survive a grey printer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
@@ -22,8 +22,12 @@ GREY: Final = "#7F7F7F"
 PALE: Final = "#EDEDED"
 
 WIDTH: Final = 7.2
-"""Of every figure, in."""
+"""Of every figure on a page, in: two columns of a journal."""
+POINT: Final = 1.0 / 72.0
+"""In in."""
 PNG_DPI: Final = 160
+LEGEND_LETTERS: Final = 8.5
+"""Their size, pt."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),
@@ -37,23 +41,27 @@ RC: Final = {
     "axes.titlepad": 4.0,
     "figure.constrained_layout.h_pad": 0.05,
     "figure.constrained_layout.w_pad": 0.05,
+    "figure.figsize": (WIDTH, WIDTH),
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.0,
     "legend.borderaxespad": 0.2,
-    "legend.fontsize": 8.5,
+    "legend.fontsize": LEGEND_LETTERS,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
     "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "xtick.labelsize": 8.0,
     "xtick.major.width": 0.7,
     "ytick.labelsize": 8.0,
     "ytick.major.width": 0.7,
 }
-"""On top of matplotlib's own defaults, whatever the user's matplotlibrc says."""
-ONE_COLUMN: Final = {
+"""On top of matplotlib's own defaults, whatever the user's matplotlibrc says; TrueType, as journals want it."""
+NARROW_BELOW: Final = 5.0
+"""Width of a figure, in, below which its letters are smaller and its lines thinner."""
+NARROW: Final = {
     "axes.labelsize": 7.0,
     "axes.titlesize": 7.0,
     "font.size": 7.0,
@@ -63,7 +71,7 @@ ONE_COLUMN: Final = {
     "xtick.labelsize": 6.0,
     "ytick.labelsize": 6.0,
 }
-"""On top of it, for a figure of half the width."""
+"""On top of it, for a figure of one column."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,11 @@ class Look:
     width: float
     marker: str
     order: int = 3
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """What matplotlib is told of its line."""
+        return {"color": self.colour, "linestyle": self.style, "linewidth": self.width}
 
 
 RIGID: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)

@@ -7,18 +7,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank, png_of, settle, styled, svg_of
+from walkerlab.figures.canvas import as_file, blank, entry, legend_above, settle, styled
+from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
 from walkerlab.store.content import Group, Variable
 
 PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MOST_PANELS: Final = 4
+MOST_LINES: Final = 5
+"""Values of a second parameter, each of which is a line; of more, there is a map."""
+DASHES: Final = ("-", "--", "-.")
+ONE: Final = "largest multiplier 1"
 MOST_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
 PREFERRED: Final[tuple[str, ...]] = (
@@ -27,9 +34,6 @@ PREFERRED: Final[tuple[str, ...]] = (
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
 LABELS: Final = {RADIUS: "largest multiplier (1)"}
-WHITE: Final = "#FFFFFF"
-LOG_SPAN: Final = 50.0
-"""Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +76,12 @@ def draw(
     """
     title = f"{stage} over {', '.join(parameters)}"
     with styled():
-        figure = maps(group, parameters, names) if len(dims) == 2 else panels(group, parameters, dims, names)
+        if len(dims) != 2:
+            figure = panels(group, parameters, dims, names)
+        else:
+            figure = (lines if in_lines(group, dims) else maps)(group, parameters, names)
         settle(figure)
-        svg, png = svg_of(figure, f"sweep-{stage}", title), png_of(figure, title)
+        svg, png = (as_file(figure, kind, f"sweep-{stage}", title) for kind in ("svg", "png"))
     return SweepFigure(svg, png, title, caption(group, dims, parameters, names))
 
 
@@ -84,9 +91,12 @@ def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], name
     said = ", ".join(f"{count} {name}" for name, count in zip(outcomes, counts, strict=True))
     what = ", ".join(words(group.variables[name]) for name in names)
     gaps = bool(np.any(group["status"] != "answered"))
-    end = " Where there is no answer the map is grey." if gaps and len(dims) == 2 else ""
-    if gaps and len(dims) == 1:
+    a_map = len(dims) == 2 and not in_lines(group, dims)
+    end = " Where there is no answer the map is grey." if gaps and a_map else ""
+    if gaps and not a_map and len(dims) < 3:
         end = " Marks at the bottom: no answer there."
+    if a_map:
+        end += " The map ends where the outermost values were sampled; small ticks are at the others."
     one = " The line is a largest multiplier of one: beyond it the gait is unstable." if RADIUS in names else ""
     return f"{what[:1].upper()}{what[1:]} over {', '.join(parameters)}: {said}.{end}{one}"
 
@@ -140,17 +150,53 @@ def draw_panel(axes: Axes, group: Group, x: NDArray[Any], parameter: str, name: 
         axes.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
     else:
         axes.plot(x[few], y[few], linestyle="none", color=BLUE, marker="o", markersize=2.2, rasterized=few.size > 2000)
+    finish_panel(axes, group, parameter, name, x[np.isnan(y)])
+
+
+def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
+    """What a number's panel over a parameter has besides its points; missing: where there is no answer."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
-    missing = x[np.isnan(y)]
     if missing.size:
         axes.plot(
             missing, np.full(missing.size, 0.02), color=VERMILLION, marker="|", linestyle="none", markersize=5.0,
             transform=axes.get_xaxis_transform(),
         )  # fmt: skip
-    if is_logarithmic(np.unique(x)):
+    if is_logarithmic(np.unique(numbers(group, parameter))):
         axes.set_xscale("log")
     name_ticks(axes, group, parameter, "x")
+
+
+def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
+    """Whether one of two parameters has so few values that each is a line over the other one."""
+    return min(group["outcome"].shape) <= MOST_LINES and len(dims) == 2
+
+
+def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+    """A row for each number, over one parameter, and in it a line for each value of the one that has fewer."""
+    across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
+    x, values = numbers(group, across), group[few].tolist()
+    looks = [(matplotlib.colormaps["viridis"](0.85 * shade), DASHES[place % len(DASHES)])
+             for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
+    figure = blank(0.8 + PANEL_HEIGHT * len(names))
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for one, name in zip(axes, names, strict=True):
+        found = group[name].astype(float)
+        rows = found if parameters[0] == few else found.T
+        for row, (colour, style) in zip(rows, looks, strict=True):
+            one.plot(x, row, color=colour, linestyle=style, linewidth=1.3, marker="o", markersize=2.4)
+        finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
+        one.set_ylabel(label(group, name))
+    axes[-1].set_xlabel(label(group, across))
+    said = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+    spoken, _, unit = label(group, few).rstrip(")").rpartition(" (")
+    unit = "" if unit == "1" else f" {unit}"
+    key = [
+        entry(f"{spoken} {value}{unit}", color=colour, linestyle=style)
+        for value, (colour, style) in zip(said, looks, strict=True)
+    ]
+    legend_above(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
+    return figure
 
 
 def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
@@ -158,14 +204,6 @@ def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
     values = group[parameter]
     if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
         getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
-
-
-def is_logarithmic(values: NDArray[Any]) -> bool:
-    """Whether values are evenly spaced powers over a wide range."""
-    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < LOG_SPAN:
-        return False
-    gaps = np.diff(np.log(np.sort(values)))
-    return bool(gaps.max() < 1.01 * gaps.min())
 
 
 def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
@@ -190,10 +228,15 @@ def draw_map(figure: Figure, axes: Axes, group: Group, parameters: Sequence[str]
     figure.colorbar(mesh, ax=axes, label=label(group, name))
     if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
         axes.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
+        outlined = [withStroke(linewidth=2.6, foreground=GREY)]
+        legend_above(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
     for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
         getattr(axes, f"set_{axis}label")(label(group, parameter))
         if is_logarithmic(scale):
             getattr(axes, f"set_{axis}scale")("log")
+        if scale.size > 1 and group[parameter].dtype.kind != "O":
+            getattr(axes, f"set_{axis}ticks")(scale, minor=True)
+            getattr(axes, f"set_{axis}lim")(scale.min(), scale.max())
         name_ticks(axes, group, parameter, axis)
     assert figure.get_figwidth() == WIDTH
 
@@ -202,14 +245,3 @@ def numbers(group: Group, parameter: str) -> NDArray[Any]:
     """A parameter's values as numbers; places of words."""
     values = group[parameter]
     return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)
-
-
-def edges(centres: NDArray[Any]) -> NDArray[Any]:
-    """Bounds of cells about values, halfway between neighbours, on their own scale."""
-    scale = np.log(centres) if is_logarithmic(centres) else centres
-    if scale.size == 1:
-        found = np.array([scale[0] - 0.5, scale[0] + 0.5])
-    else:
-        middle = 0.5 * (scale[1:] + scale[:-1])
-        found = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
-    return np.exp(found) if is_logarithmic(centres) else found

@@ -10,7 +10,7 @@ from enum import StrEnum
 from walkerlab.paper.printed import Printed, number
 
 
-class Verdict(StrEnum):
+class NumberVerdict(StrEnum):
     """How a printed number fares."""
 
     REPRODUCED = "reproduced"  # it comes out to the printed digits
@@ -26,12 +26,25 @@ class JudgedNumber:
     as_printed: float | None
     corrected: float | None
     contact: float | None
-    verdict: Verdict
+    verdict: NumberVerdict
     evidence: str
+
+    @property
+    def summary(self) -> dict[str, str | float | None]:
+        """As commands print it."""
+        printed = {name: getattr(self.printed, name) for name in ("where", "quantity", "unit")}
+        models = {name: getattr(self, name) for name in ("as_printed", "corrected", "contact")}
+        return {
+            **printed,
+            "printed": self.printed.text,
+            **models,
+            "verdict": self.verdict.value,
+            "evidence": self.evidence,
+        }
 
 
 def judged(
-    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[Verdict, str]
+    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[NumberVerdict, str]
 ) -> JudgedNumber:
     """A printed number beside those of the rigid model, by set of equations, and of the contact model."""
     return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, *found)
@@ -49,7 +62,9 @@ def agreement(printed: Printed, value: float | None) -> str:
     return "cut off" if found.quantize(last, ROUND_DOWN) == expected else ""
 
 
-def weigh(agrees: bool, otherwise: Verdict, departures: tuple[str, ...], evidence: str) -> tuple[Verdict, str]:
+def weigh(
+    agrees: bool, otherwise: NumberVerdict, departures: tuple[str, ...], evidence: str
+) -> tuple[NumberVerdict, str]:
     """The verdict and its evidence.
 
     agrees      the number came out
@@ -57,9 +72,9 @@ def weigh(agrees: bool, otherwise: Verdict, departures: tuple[str, ...], evidenc
     departures  in what the scene is not the paper's: a mismatch refutes nothing then
     """
     if agrees:
-        return Verdict.REPRODUCED, evidence
+        return NumberVerdict.REPRODUCED, evidence
     if departures:
-        return Verdict.EXPLAINED, f"Not the paper's scene ({'; '.join(departures)}). {evidence}"
+        return NumberVerdict.EXPLAINED, f"Not the paper's scene ({'; '.join(departures)}). {evidence}"
     return otherwise, evidence
 
 

@@ -168,19 +168,14 @@ class LegErrors:
     velocity: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Largest differences between the contact model and the rigid one; None where there is nothing to compare.
+Errors = Mapping[str, LegErrors]
+"""Largest differences between the contact model and the rigid one, in each way in which there is something to compare:
 
-    Each is a pair, one for each leg. `between_impacts` leaves out the first instants of every step, in which a
-    compliant impact is still under way; `settled` besides takes the last completed stride only.
-    """
-
-    raw: LegErrors | None = None
-    aligned: LegErrors | None = None
-    between_impacts: LegErrors | None = None
-    settled: LegErrors | None = None
-    orbit: tuple[float, ...] | None = None
+raw              at the same time
+aligned          at the same phase of each step
+between_impacts  of that without the first instants of every step, in which a compliant impact is still under way
+settled          of that the last completed stride only
+"""
 
 
 @dataclass(frozen=True)

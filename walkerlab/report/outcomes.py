@@ -17,11 +17,11 @@ ENDS = {
     "off-pad": "trips on a pad",
     "lifted-off": "leaves the ground",
     "slid": "slides away",
-    "no-heel-strike": "comes to no heel strike",
-    "bent-knee": "comes down on a bent knee",
-    "budget-exhausted": "runs out of right-hand sides",
-    "solver-failed": "defeats the solver",
-    "rejected": "is refused its start",
+    "no-heel-strike": "never reaches a heel strike",
+    "bent-knee": "lands on a bent knee",
+    "budget-exhausted": "exhausts its evaluation budget",
+    "solver-failed": "makes the solver fail",
+    "rejected": "starts in a state that is not allowed",
 }
 """What a walker does in the end, by the outcome of its walk."""
 

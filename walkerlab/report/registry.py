@@ -15,23 +15,17 @@ from walkerlab.report.results import Results
 from walkerlab.report.sections import (
     accuracy,
     adjustment,
-    assumptions,
-    basin,
-    contact_walk,
+    closing,
     engines,
     families,
-    figures,
-    further,
     gaits,
-    glossary,
-    left_out,
     models,
     motion,
     paper,
     provenance,
     stability,
-    steps,
     verdict,
+    walks,
 )
 
 SectionMaker = Callable[[Results], Section | None]
@@ -39,14 +33,14 @@ SectionMaker = Callable[[Results], Section | None]
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,
     motion.section,
-    figures.section,
+    motion.figures,
     gaits.section,
     families.section,
-    assumptions.section,
-    contact_walk.section,
+    walks.assumptions,
+    walks.contact,
     adjustment.section,
-    steps.section,
-    basin.section,
+    walks.steps,
+    families.basin,
     models.section,
     paper.numbers,
     paper.tables,
@@ -55,8 +49,8 @@ SECTIONS: tuple[SectionMaker, ...] = (
     accuracy.section,
     engines.section,
     adjustment.limit,
-    glossary.section,
-    left_out.section,
+    closing.glossary,
+    closing.left_out,
     provenance.section,
 )
 
@@ -67,8 +61,8 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     run  name of the run's folder
     """
     sections = sections_of(results)
-    main = list(further.on(MAIN, sections))
-    links = further.section(results, further.elsewhere(sections))
+    main = list(closing.on(MAIN, sections))
+    links = closing.further(results, closing.elsewhere(sections))
     if links is not None:
         place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
         main.insert(place, links)
@@ -76,8 +70,8 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     report = Page(title(run), tuple(main), lead(results, run), MAIN, results.config.source, redone, results.pending)
     beside = (
         Page(f"{name} · {run}", found, file=file)
-        for file, name in further.TITLES.items()
-        if (found := further.on(file, sections))
+        for file, name in closing.TITLES.items()
+        if (found := closing.on(file, sections))
     )
     return (report, *beside)
 

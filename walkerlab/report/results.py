@@ -8,18 +8,9 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.report.blocks import Picture
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
-
-
-@dataclass(frozen=True)
-class Absent:
-    """Something that was not computed, why, and what that saves; `failed` if it was tried and has no answer."""
-
-    what: str
-    why: str
-    failed: bool = False
-    saves: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +21,16 @@ class Results:
     stored    results by stage: those that are there and current
     pictures  the figures that `plot` drew, embedded
     absent    what has no result
+    failed    those of them that were tried and have no answer
     pending   the stages whose results are still being computed
     """
 
     config: Config
     stored: Mapping[str, Stored] = field(default_factory=dict)
     pictures: tuple[Picture, ...] = ()
-    absent: tuple[Absent, ...] = ()
+    absent: tuple[LeftOut, ...] = ()
     pending: tuple[str, ...] = ()
+    failed: frozenset[str] = frozenset()
 
     @property
     def departures(self) -> Sequence[str] | None:

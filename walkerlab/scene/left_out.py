@@ -7,6 +7,7 @@ bytes is measured by scripts/benchmark.py (docs/performance.md).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,14 +20,25 @@ if TYPE_CHECKING:
     )
     from walkerlab.config.schema import Output
 
-LeftOut = dict[str, str]
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that was not computed, why, and what that saves, if anything but the work itself."""
+
+    what: str
+    why: str
+    saves: str = ""
+
+
+Entry = dict[str, str]
+"""The same as summaries hold it."""
 PAPERS = "it is the paper's procedure with its compass"
 RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 """How many numbers a sample each output takes, model by model."""
 
 
-def of_rigid_walk(config: SimulateConfig) -> tuple[LeftOut, ...]:
+def of_rigid_walk(config: SimulateConfig) -> tuple[Entry, ...]:
     """What the rigid model's walk does without."""
     return (
         of_stance(config),
@@ -35,7 +47,7 @@ def of_rigid_walk(config: SimulateConfig) -> tuple[LeftOut, ...]:
     )
 
 
-def of_stance(config: RigidConfig) -> LeftOut:
+def of_stance(config: RigidConfig) -> Entry:
     """What the rigid model's stance foot does without: a compass stands on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return left_out(
@@ -50,7 +62,7 @@ def of_stance(config: RigidConfig) -> LeftOut:
     )
 
 
-def of_contact_walk(config: ContactSimConfig) -> tuple[LeftOut, ...]:
+def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
     """What the contact model's walk does without."""
     contact = config.contact
     found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
@@ -66,7 +78,7 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[LeftOut, ...]:
     return (*found, *of_legs(config), *of_outputs(config.outputs, "contact", CONTACT_NUMBERS))
 
 
-def of_adjustment(config: RigidConfig) -> tuple[LeftOut, ...]:
+def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     """What the adjustment of another walker than the paper's compass does without."""
     found = []
     if not of_the_compass(config.walker):
@@ -77,7 +89,7 @@ def of_adjustment(config: RigidConfig) -> tuple[LeftOut, ...]:
     return tuple(found)
 
 
-def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[LeftOut, ...]:
+def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
     """What the verification of another walker than the paper's compass does without."""
     if of_the_paper(config.walker):
         return ()
@@ -105,14 +117,14 @@ def of_the_paper(walker: object) -> bool:
     return is_the_papers(walker)
 
 
-def of_legs(config: RigidConfig) -> Iterator[LeftOut]:
+def of_legs(config: RigidConfig) -> Iterator[Entry]:
     """What legs without inertia do without."""
     if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
         saved = "nothing: it is summed into constants before anything runs"
         yield left_out("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
-def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[LeftOut]:
+def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
     """What is not computed along the walk since nobody asks for it."""
     for output, count in numbers.items():
         if output not in wanted:
@@ -122,6 +134,6 @@ def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, 
         yield left_out(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
 
 
-def left_out(what: str, why: str, saves: str) -> LeftOut:
+def left_out(what: str, why: str, saves: str) -> Entry:
     """An entry as `--json` prints it."""
     return {"what": what, "why": why, "saves": saves}

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import ContactConfig, RigidConfig
+from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Equations
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_the_papers
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Array, Motion, sampled_at_strikes
 from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
@@ -18,7 +17,7 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
-from walkerlab.paper.judged import JudgedNumber, Verdict
+from walkerlab.paper.judged import NumberVerdict
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -30,8 +29,7 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.result_rows import result_rows
-from walkerlab.paper.start_rows import start_rows
+from walkerlab.paper.rows import paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.scene.contact import GAIT_ATOL, GAIT_METHOD, GAIT_RTOL, contact_scene, start_state
@@ -54,7 +52,7 @@ EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
 def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
-    if not is_plain_compass(config.walker):
+    if not is_the_papers(config.walker):
         return models_compared(config, inputs, progress)
     progress.start("compare", 3)
     study = study_the_paper()
@@ -62,17 +60,17 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     progress.advance()
     measured = measure(config, inputs, motion)
-    rows = (*start_rows(measured, study), *result_rows(measured, study))
+    rows = tuple(paper_rows(measured, study))
     progress.advance()
     found = errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: table_group(table) for name, table in tables.items()}
-    numbers, stored = [row_summary(row) for row in rows], rows_group(found, labels_of(Erratum))
+    numbers, stored = [row.summary for row in rows], rows_group(found, labels_of(Erratum))
     return Content(
         {"paper_numbers": numbers_group(numbers), "errata": stored, **groups, **motion.groups},
         {
             "paper_numbers": numbers,
-            "verdicts": verdicts(rows),
+            "verdicts": {verdict.value: [row.verdict for row in rows].count(verdict) for verdict in NumberVerdict},
             **tables,
             **motion.summary,
             "errata": [vars(erratum) for erratum in found],
@@ -109,7 +107,7 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
     return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": left_out})
 
 
-NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's compass"}
+NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
@@ -120,27 +118,6 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
         return step
     begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
     return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
-
-
-def row_summary(row: JudgedNumber) -> dict[str, Any]:
-    """A row of `paper_numbers` as the command prints it."""
-    return {
-        "where": row.printed.where,
-        "quantity": row.printed.quantity,
-        "unit": row.printed.unit,
-        "printed": row.printed.text,
-        "as_printed": row.as_printed,
-        "corrected": row.corrected,
-        "contact": row.contact,
-        "verdict": row.verdict.value,
-        "evidence": row.evidence,
-    }
-
-
-def verdicts(rows: tuple[JudgedNumber, ...]) -> dict[str, int]:
-    """How many numbers fared how."""
-    count = Counter(row.verdict for row in rows)
-    return {verdict.value: count[verdict] for verdict in Verdict}
 
 
 def motion_of(walk: Content) -> Motion | None:
@@ -169,22 +146,19 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
     """Everything that the paper's numbers are held against."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
-    models: dict[str, RigidModel] = {name: walk_gait(config, name, gait) for name, gait in found.items()}
+    models: dict[str, RigidModel] = {
+        name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()
+    }
     contact = contact_model(config, inputs["contact-sim"])
     return Measured(
         walker=compass(config, config.equations),
         equations=config.equations,
-        models=dict(models),
+        models=models,
         spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
         contact=contact,
         errors=motion.errors,
         departures=departures(config, start_moved(models.get(config.equations), contact.start)),
     )
-
-
-def walk_gait(config: RigidConfig, equations: Equations, gait: Mapping[str, Any]) -> RigidModel:
-    """The rigid model walked from a stored fixed point."""
-    return rigid_model(compass(config, equations), as_state(gait["state"]))
 
 
 def start_moved(model: RigidModel | None, start: State | None) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.identity import Identities
 from walkerlab.store import artifact
@@ -17,15 +18,6 @@ from walkerlab.store.key import Identity, changed_parts
 from walkerlab.store.runfolder import RunFolder
 
 Action = Literal["reuse", "run", "leave out"]
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Something that was not computed, why, and what that saves, if anything but the work itself."""
-
-    what: str
-    why: str
-    saves: str = ""
 
 
 NO_CONTACT = "the config has no contact block"

@@ -8,10 +8,10 @@ from pathlib import Path
 from walkerlab.config.reads import NamedConfig
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Progress
-from walkerlab.store import index
+from walkerlab.store import artifact, index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
 from walkerlab.store.files import make_folder, storing, write_atomically
@@ -67,6 +67,22 @@ def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> d
     number = {} if figure.number is None else {"number": figure.number}
     words = {"title": figure.title, "caption": drawing.caption, "alt": figure.seen}
     return {**number, **words, **paths, "results": list(figure.stages)}
+
+
+def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
+    """Draw the figures that need a stage's result alone, and say where they are.
+
+    anew  also those that are there
+
+    Raises StorageError if a figure cannot be stored.
+    """
+    results = {stage: artifact.read(folder / f"{stage}.h5")}
+    figures = [one for one in FIGURES if one.stages == (stage,) and one.why_left_out(results, {}) is None]
+    make_folder(folder / FOLDER)
+    for figure in figures:
+        if anew or not all((folder / path).is_file() for path in paths_of(figure).values()):
+            draw(figure, results, folder)
+    return [folder / paths_of(figure)["svg"] for figure in figures]
 
 
 def remove(figure: Illustration, folder: Path) -> None:

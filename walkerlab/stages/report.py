@@ -11,11 +11,12 @@ from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
 from walkerlab.report.registry import pages_of
-from walkerlab.report.results import Absent, Results
-from walkerlab.report.sections.further import TITLES
+from walkerlab.report.results import Results
+from walkerlab.report.sections.closing import TITLES
 from walkerlab.report.tables import Table
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import STILL_COMPUTED, LeftOut, why_unsuited
+from walkerlab.stages.plan import STILL_COMPUTED, why_unsuited
 from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
@@ -69,7 +70,9 @@ def write_pages(
     Pages of an earlier run that there is nothing for any more are removed. Raises StorageError if one cannot be stored.
     """
     waited = [entry for entry in left_out if entry.what not in pending]
-    plain = Results(config, inputs, (), absent(config, waited), tuple(pending))
+    names = {entry.what for entry in waited}
+    failed = frozenset(name for name in names if has_failed(config, name, names))
+    plain = Results(config, inputs, (), tuple(waited), tuple(pending), failed)
     results = replace(plain, pictures=pictures(inputs, folder, numbered=plain.of_the_paper))
     pages = pages_of(results, folder.name)
     for page in pages:
@@ -80,14 +83,8 @@ def write_pages(
     return pages, results
 
 
-def absent(config: Config, left_out: Sequence[LeftOut]) -> tuple[Absent, ...]:
-    """Stages without a result; what was tried itself, and not given up for want of another, has failed."""
-    names = {entry.what for entry in left_out}
-    return tuple(Absent(one.what, one.why, has_failed(config, one.what, names), one.saves) for one in left_out)
-
-
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
-    """Whether a stage without a result was run and found no answer."""
+    """Whether a stage without a result was tried itself, and not given up for want of another: it has no answer."""
     stage = next((stage for stage in PIPELINE.stages if stage.name == name), None)
     if stage is None or name not in PIPELINE["report"].inputs(config):
         return False

@@ -16,10 +16,10 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import NoAnswer
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
     STILL_COMPUTED,
-    LeftOut,
     Planner,
     Step,
     input_digest,
@@ -394,7 +394,7 @@ class Execution:
         for done in self.done:
             if done.action != "leave out":
                 entries += graph[done.stage].does_without(self.planner.config)
-        found += [LeftOut(str(entry["what"]), str(entry["why"]), str(entry.get("saves", ""))) for entry in entries]
+        found += [LeftOut(**entry) for entry in entries]
         return tuple(dict.fromkeys(found))
 
     def _no_answer(self, said: dict[str, str] | None) -> NoAnswer | None:

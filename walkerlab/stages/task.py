@@ -11,8 +11,8 @@ from typing import Any
 
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import Stage
-from walkerlab.stages.plan import LeftOut
 from walkerlab.stages.progress import Progress
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

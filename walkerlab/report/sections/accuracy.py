@@ -25,7 +25,7 @@ def section(results: Results) -> Section | None:
     scenes = list(summary["reference"])
     concluded = tuple(Statement(scene, spoken(summary["conclusions"][scene], scene)) for scene in scenes)
     blocks: tuple[PageBlock, ...] = (
-        Paragraph(introduction(summary)),
+        Paragraph(words("accuracy.introduction", summary)),
         Statements(concluded),
         costs(summary),
         references(summary),
@@ -44,11 +44,6 @@ def fastest(summary: Row) -> str:
     return f"Fastest: {said}." if said else ""
 
 
-def introduction(summary: Row) -> str:
-    """What was measured."""
-    return words("accuracy.introduction", summary)
-
-
 def spoken(conclusion: str, scene: str) -> str:
     """A conclusion without the scene's name, which stands before it."""
     text = conclusion.removeprefix(f"{scene}: ")
@@ -58,7 +53,10 @@ def spoken(conclusion: str, scene: str) -> str:
 def costs(summary: Row) -> Table:
     """What each method costs for each error, by scene."""
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
-    least = (Column(f"ms for {power_of_ten(level, 1)}", partial(least_time, level), in_ms, True) for level in levels)
+    least = (
+        Column(f"ms for {power_of_ten(level, 1)}", partial(least_ms, level), partial(number, digits=3), True)
+        for level in levels
+    )
     columns = (
         Column("method", method_of),
         *least,
@@ -88,14 +86,9 @@ def reached(method: Row) -> list[Row]:
     return [run for run in method["runs"] if run["error"] is not None]
 
 
-def least_time(level: float, method: Row) -> float | None:
-    """Least time (s) of the runs that are exact enough; None if none is."""
-    return min((run["wall_s"] for run in reached(method) if run["error"] <= level), default=None)
-
-
-def in_ms(time_s: float | None) -> str:
-    """A time in ms."""
-    return number(None if time_s is None else 1e3 * time_s, 3)
+def least_ms(level: float, method: Row) -> float | None:
+    """Least time (ms) of the runs that are exact enough; None if none is."""
+    return min((1e3 * run["wall_s"] for run in reached(method) if run["error"] <= level), default=None)
 
 
 def most_exact(method: Row) -> Row:
@@ -112,13 +105,8 @@ def smallest_error(method: Row) -> str:
 def failures(method: Row) -> str:
     """How the runs ended that have no end state."""
     return listed(
-        f"{run['outcome']} at {tolerance(run['tolerance'])}" for run in method["runs"] if run["error"] is None
+        f"{run['outcome']} at {power_of_ten(run['tolerance'], 1)}" for run in method["runs"] if run["error"] is None
     )
-
-
-def tolerance(value: float) -> str:
-    """A tolerance as a power of ten."""
-    return power_of_ten(value, 1)
 
 
 REFERENCE_COLUMNS = (
@@ -138,7 +126,7 @@ def references(summary: Row) -> Table:
 NOT_RUN_COLUMNS = (
     Column("scene", "scene"),
     Column("method", "method"),
-    Column("tolerances", "tolerances", lambda values: listed(map(tolerance, values))),
+    Column("tolerances", "tolerances", lambda values: listed(power_of_ten(value, 1) for value in values)),
     Column("why", "why", wide=True),
 )
 

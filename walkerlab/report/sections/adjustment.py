@@ -70,7 +70,9 @@ def limit(results: Results) -> Section | None:
 
 def verdict(results: Results, summary: Summary) -> str:
     """What explains the gait that it settles on, in one paragraph."""
-    parts = [explained(summary), caused(summary), *([papers_start(summary)] if results.of_the_paper else [])]
+    parts = [explained(summary), caused(summary)]
+    if results.of_the_paper:
+        parts.append(f"The start that the paper arrived at is not a gait's: {summary['paper_start']['reason']}.")
     return " ".join(part for part in parts if part)
 
 
@@ -130,12 +132,6 @@ def milliseconds(value_s: float) -> str:
     return quantity(1e3 * value_s, "ms", 3)
 
 
-def papers_start(summary: Summary) -> str:
-    """What becomes of the paper's own start."""
-    start = summary["paper_start"]
-    return f"The start that the paper arrived at is not a gait's: {start['reason']}."
-
-
 BESIDE_TABLE_2 = {
     "paper_matlab": "paper, MATLAB",
     "paper_adams": "paper, ADAMS",
@@ -166,11 +162,6 @@ def starts_table(results: Results, summary: Summary) -> Table:
     return table("Table 2 again: the start before and after the adjustment", (row, *beside), rows, note=note)
 
 
-def joules(value: float) -> str:
-    """An energy."""
-    return quantity(value, "J")
-
-
 def lost(channel: str, gait: Summary) -> float | Cell | None:
     """What a gait dissipates in a channel (J); None of knees that take nothing."""
     into = gait["lost_J"].get(channel)
@@ -194,15 +185,15 @@ GAIT_LINES = (
     Column("stable", "stable"),
     Column("slip a step", "slip_m", length),
     *(
-        Column(f"energy lost {said}", partial(lost, channel), joules)
+        Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
         for channel, said in {
             "damping": "to damping",
             "friction": "to friction",
-            "knee_strikes": f"in {CHANNELS['knee_strikes'][0]}",
-            "knee_stop": f"in {CHANNELS['knee_stop'][0]}",
+            "knee_strikes": "in the knee's strike",
+            "knee_stop": "in the knees' stops",
         }.items()
     ),
-    Column("height lost", "height_lost_J", joules),
+    Column("height lost", "height_lost_J", partial(quantity, unit="J")),
 )
 OF_RIGID = {
     "damping": "in the impact, all",

@@ -29,7 +29,12 @@ def section(results: Results) -> Section | None:
     names = summary.get("state_names", STATE)
     shown = SETS if results.of_the_paper else (summary["equations"],)
     sets = {name: found for name in shown if (found := set_of(summary, name)) is not None}
-    blocks: list[PageBlock] = [Paragraph(in_words(summary))]
+    way = "die out" if summary["stable"] else "grow"
+    said = (
+        f"Small disturbances {way} by the largest multiplier a step. "
+        "A state is given just after the heel strike, angles absolute, from the vertical."
+    )
+    blocks: list[PageBlock] = [Paragraph(said)]
     if sets:
         blocks.append(gait_table(sets, names))
     every = found_gaits(results, shown, names)
@@ -52,20 +57,6 @@ def finding(summary: Mapping[str, Any]) -> str:
     return f"A step takes {size}; it is {way}, the largest multiplier being {number(summary['spectral_radius'], 4)}."
 
 
-def in_words(summary: Mapping[str, Any]) -> str:
-    """What the multipliers say, and how a state is given."""
-    way = "die out" if summary["stable"] else "grow"
-    return (
-        f"Small disturbances {way} by the largest multiplier a step. "
-        "A state is given just after the heel strike, angles absolute, from the vertical."
-    )
-
-
-MEASURES = (
-    measured("step period T", "period_s", partial(fixed, decimals=6)),
-    measured("step length S", "step_length_m", partial(fixed, decimals=6)),
-)
-"""The size of a gait's steps."""
 CHECKS = (
     Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
     Column("stable", "stable"),
@@ -90,8 +81,12 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
             Column(coordinate(name), partial(state_at, place), partial(fixed, decimals=6))
             for place, name in enumerate(names)
         ),
-        *MEASURES,
-        *(Column(factor_name(place), partial(multiplier, place=place)) for place in multipliers),
+        measured("step period T", "period_s", partial(fixed, decimals=6)),
+        measured("step length S", "step_length_m", partial(fixed, decimals=6)),
+        *(
+            Column(in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}"), partial(multiplier, place=place))
+            for place in multipliers
+        ),
         *CHECKS,
     ]
     note = "As printed: Appendix A with its misprint in eq. A.5, as the paper's own code; corrected: without it."
@@ -107,11 +102,6 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
 def state_at(place: int, gait: Mapping[str, Any]) -> float:
     """A coordinate of a gait's fixed point."""
     return float(gait["state"][place])
-
-
-def factor_name(place: int) -> str:
-    """What a multiplier is called."""
-    return in_signs(f"{'multipliers ' if place == 0 else ''}lambda_{place + 1}")
 
 
 def heads_of(sets: Sequence[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Section
@@ -31,26 +32,21 @@ def section(results: Results) -> Section | None:
     rows = [(said, angle[key], velocity.get(key)) for key, said in MEASURES.items() if key in angle]
     columns = (
         Column("contact model less rigid model"),
-        Column("angle (rad)", written=printed, numeric=True),
-        Column("velocity (rad/s)", written=printed, numeric=True),
+        Column("angle (rad)", written=partial(number, digits=3), numeric=True),
+        Column("velocity (rad/s)", written=partial(number, digits=3), numeric=True),
     )
     note = "The larger of both legs. A clock that runs slow makes the difference at the same time grow without bound."
     orbit = summary.get(ORBIT)
     if orbit is not None:
         note += f" Their limit cycles lie at most {quantity(100 * orbit, '%', 2)} of the rigid one’s size apart."
     differences = table("Largest differences of the legs’ motions", columns, rows, note=note)
-    found = f"Their legs’ angles differ by at most {printed(angle.get('raw'))} rad at the same time"
+    found = f"Their legs’ angles differ by at most {number(angle.get('raw'), 3)} rad at the same time"
     if "aligned" in angle:
-        found += f", and by {printed(angle['aligned'])} rad at the same phase of each step"
+        found += f", and by {number(angle['aligned'], 3)} rad at the same phase of each step"
     blocks: tuple[PageBlock, ...] = (differences,)
     if summary.get("releases"):
         blocks += (releases_table(summary),)
     return Section("models", "The models compared", blocks, f"{found}.")
-
-
-def printed(difference: float | None) -> str:
-    """A largest difference."""
-    return number(difference, 3)
 
 
 RELEASED = {
@@ -70,18 +66,18 @@ CHANNELS = {
 """Where a contact walk dissipates energy, by the names under which it is stored."""
 
 
-def lost_in_strikes(walk: Mapping[str, Any]) -> float | None:
-    """What knee strikes dissipate in a step (J); None if that is unknown."""
-    return (walk.get("dissipated_J_per_step") or {}).get("knee_strikes")
-
-
 RELEASE_COLUMNS = (
     Column("trailing knee released", "released"),
     Column("steps", lambda walk: f"{walk['steps']} of {walk['of']}, {walk['outcome']}" if "steps" in walk else None),
     measured("period", "period_s"),
-    measured("length", "length_m", lambda length: number(length, 4)),
-    measured("knee locks after", "knee_strike_s", lambda time: number(time, 4)),
-    Column("knee strikes (J a step)", lost_in_strikes, lambda lost: number(lost, 3), numeric=True),
+    measured("length", "length_m", partial(number, digits=4)),
+    measured("knee locks after", "knee_strike_s", partial(number, digits=4)),
+    Column(
+        "knee strikes (J a step)",
+        lambda walk: (walk.get("dissipated_J_per_step") or {}).get("knee_strikes"),
+        partial(number, digits=3),
+        numeric=True,
+    ),
     Column("rigid period (s)", lambda walk: (walk.get("rigid") or {}).get("period_s"), number, numeric=True),
 )
 
@@ -104,7 +100,9 @@ def departure(results: Results) -> str:
         return ""
     told = [words("models.last_step", steps["contact"], steps["gait"]), losses_in_words(summary["dissipated_J"])]
     if summary.get("releases"):
-        told += [locking_in_words(steps), *releases_in_words(summary["releases"], float(steps["gait"]["period_s"]))]
+        walk, gait = steps["contact"].get("knee_strike_s"), steps["gait"].get("knee_strike_s")
+        told += [] if walk is None or gait is None else [words("models.locking", walk, gait)]
+        told += releases_in_words(summary["releases"], float(steps["gait"]["period_s"]))
     return " ".join(sentence for sentence in told if sentence)
 
 
@@ -116,12 +114,6 @@ def losses_in_words(dissipated: Mapping[str, float]) -> str:
     ranked = sorted(dissipated.items(), key=lambda one: -one[1])
     parts = [f"{quantity(100 * lost / total, '%', 3)} {CHANNELS.get(name, name)}" for name, lost in ranked if lost]
     return words("models.losses", total, parts)
-
-
-def locking_in_words(steps: Mapping[str, Mapping[str, Any]]) -> str:
-    """When the knee locks in either model."""
-    walk, gait = steps["contact"].get("knee_strike_s"), steps["gait"].get("knee_strike_s")
-    return "" if walk is None or gait is None else words("models.locking", walk, gait)
 
 
 def releases_in_words(releases: Mapping[str, Mapping[str, Any]], gait_period: float) -> list[str]:

@@ -1,4 +1,4 @@
-"""The walk, moving: all models that walked on their ground, with a foot in close-up and three views on one clock."""
+"""What is seen: the walk, moving, with a foot in close-up and three views on one clock; and the figures."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.report.blocks import Pad, PageBlock, Player, Section, Walker
+from walkerlab.report.blocks import MAIN, Gallery, Pad, PageBlock, Paragraph, Player, Section, Walker
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
+from walkerlab.report.words import words
 
 MAX_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
@@ -22,17 +23,10 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
-    tracks: dict[str, Track] = {}
-    for stage in MODELS:
-        result = results.stored.get(stage)
-        track = None if result is None else track_of(result)
-        if track is not None:
-            tracks[stage] = track
-    if not tracks:
-        return None
+    found = {stage: track_of(results.stored[stage]) for stage in MODELS if stage in results.stored}
     end = first_steps(results)
-    tracks = {stage: track.until(end) for stage, track in tracks.items()}
-    return Section("motion", "The walk", (player(results, tracks),))
+    tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
+    return Section("motion", "The walk", (player(results, tracks),)) if tracks else None
 
 
 def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
@@ -58,12 +52,8 @@ def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
 
 def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
-    times = []
-    for stage in MODELS:
-        touches = (results.summary(stage) or {}).get("touch_times_s", [])
-        if len(touches) >= MAX_STEPS:
-            times.append(touches[MAX_STEPS - 1])
-    return max(times) if times else math.inf
+    touches = [(results.summary(stage) or {}).get("touch_times_s", []) for stage in MODELS]
+    return max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
 
 
 def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
@@ -89,13 +79,7 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
     times: Any = np.array([0.0, *strikes])
     wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
-    names = [
-        "f0",
-        *(["k0"] if "kx0" in track.channels else []),
-        "h",
-        *(["k1"] if "kx1" in track.channels else []),
-        "f1",
-    ]
+    names = ["f0", "k0", "h", "k1", "f1"] if "kx0" in track.channels else ["f0", "h", "f1"]
     return tuple(tuple(point(track, name, int(row)) for name in names) for row in rows)
 
 
@@ -162,3 +146,14 @@ def alt(results: Results, stages: tuple[str, ...]) -> str:
         f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: "
         + "; ".join(walked)
     )
+
+
+def figures(results: Results) -> Section | None:
+    """The figures of the walks and gaits."""
+    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    if not shown:
+        return None
+    blocks: list[PageBlock] = [Gallery(shown)]
+    if results.of_the_paper:
+        blocks.insert(0, Paragraph(words("figures.numbered")))
+    return Section("figures", "Figures", tuple(blocks))

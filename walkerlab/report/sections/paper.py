@@ -87,6 +87,12 @@ CAPTIONS = {
 }
 """The tables in the summary of `compare`."""
 
+NOTES = {
+    "table3": "Ours are of the last completed stride, whose first step is the left one; the energy is the time mean "
+    "over the rigid gaits' ten steps and over the contact model's last five.",
+}
+"""What to know when reading them: whose periods these are, and over which time a mean is."""
+
 HEADS = {
     "paper": "paper",
     "paper_matlab": "paper, MATLAB",
@@ -115,17 +121,17 @@ def tables(results: Results) -> Section | None:
     """The tables that there are."""
     summary = results.summary("compare") or {}
     shown: list[PageBlock] = [
-        paper_table(caption, summary[key]) for key, caption in CAPTIONS.items() if summary.get(key)
+        paper_table(caption, summary[key], NOTES.get(key, "")) for key, caption in CAPTIONS.items() if summary.get(key)
     ]
     return Section("tables", "The paper’s tables", tuple(shown), page=PAPER) if shown else None
 
 
-def paper_table(caption: str, rows: Mapping[str, Row]) -> Table:
+def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     """One table; its rows are named by their symbol and unit, and columns without any value are left away."""
     found = dict.fromkeys(name for row in rows.values() for name, value in row.items() if value is not None)
     columns = [column_of(name, rows) for name in found if name != UNIT]
     named = [{"row": row_name(symbol, row), **row} for symbol, row in rows.items()]
-    return table(caption, [Column("row", "row"), *columns], named)
+    return table(caption, [Column("row", "row"), *columns], named, note=note)
 
 
 def column_of(name: str, rows: Mapping[str, Row]) -> Column:
@@ -166,7 +172,7 @@ def errors(results: Results) -> Section | None:
     if not rows:
         return None
     found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
-    finding = f"{count(len(rows), 'place')} where the paper does not say what is right."
+    finding = f"{count(len(rows), 'error')} and gaps of the paper, each with its evidence."
     return Section("errata", "Errata of the paper", (found,), finding, PAPER)
 
 

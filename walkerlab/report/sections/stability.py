@@ -26,7 +26,12 @@ def section(results: Results) -> Section | None:
     if summary is None:
         return None
     cases, known = summary["cases"], summary["known"]
-    blocks: list[PageBlock] = [*failures(cases, known), judgement(), case_table(cases), known_table(known)]
+    blocks: list[PageBlock] = [
+        *failures(cases, known),
+        Paragraph(words("stability.judgement")),
+        case_table(cases),
+        known_table(known),
+    ]
     if summary["ordinary"]:
         blocks.append(ordinary_table(summary))
     blocks.append(maps(results))
@@ -41,11 +46,6 @@ def failures(cases: Rows, known: Rows) -> list[PageBlock]:
     failed = [("stability.failed_case", one) for one in cases if not one["ok"]]
     failed += [("stability.failed_problem", one) for one in known if not one["ok"]]
     return [Paragraph(words(name, one), "bad") for name, one in failed]
-
-
-def judgement() -> Paragraph:
-    """How cases are judged."""
-    return Paragraph(words("stability.judgement"))
 
 
 def maps(results: Results) -> Paragraph:
@@ -115,16 +115,16 @@ def known_table(known: Rows) -> Table:
 def ordinary_table(summary: Row) -> Table:
     """What ordinary methods do with the cases: one row a case, one column a method."""
     methods = grouped(summary["ordinary"], "method")
-    columns = [Column("case", "case"), *(Column(shortened(method), method, ordinary_cell) for method in methods)]
+    columns = [
+        Column("case", "case"),
+        *(
+            Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
+            for method in methods
+        ),
+    ]
     tried = grouped(summary["ordinary"], "case").items()
     records = [{"case": case, **{row["method"]: row for row in rows}} for case, rows in tried]
-    note = words("stability.ordinary", summary)
-    return table("What an ordinary choice of method does", columns, records, note=note)
-
-
-def shortened(method: str) -> str:
-    """A method's name as a column's head."""
-    return method.removeprefix("SciPy ").removeprefix("semi-implicit ")
+    return table("What an ordinary choice of method does", columns, records, note=words("stability.ordinary", summary))
 
 
 def ordinary_cell(row: Row | None) -> Cell:

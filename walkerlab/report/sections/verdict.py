@@ -9,12 +9,13 @@ from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, listed
-from walkerlab.report.outcomes import MODELS, tone
-from walkerlab.report.results import Absent, Results
+from walkerlab.report.outcomes import CONTACT, MODELS, WALKED, tone
+from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper import TONES, errata, paper_numbers
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.words import words
+from walkerlab.scene.left_out import LeftOut
 
 HEADLINES = {
     "A.5 row 2": "The equations of motion have a sign error",
@@ -33,6 +34,7 @@ Rows = Sequence[Mapping[str, Any]]
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
     blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
+    blocks += opening(results)
     told = (*(walk(results, stage) for stage in MODELS), gait(results), adjustment(results))
     fared = [found for found in told if found is not None]
     if fared:
@@ -48,16 +50,31 @@ def section(results: Results) -> Section:
     return Section("verdict", "Verdict", tuple(blocks))
 
 
+def opening(results: Results) -> list[PageBlock]:
+    """What holds, what fails and what follows; nothing without a walk."""
+    found = {model.lower(): results.summary(stage) for stage, model in MODELS.items()}
+    walked = {model: summary for model, summary in found.items() if summary is not None}
+    if not walked:
+        return []
+    verdicts = Counter(str(row["verdict"]) for row in paper_numbers(results)) if results.of_the_paper else Counter()
+    misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
+    gait, contact = results.summary("fixedpoint"), results.summary(CONTACT)
+    slower = None
+    if gait and contact and contact["outcome"] == WALKED and gait.get("period_s"):
+        slower = 100.0 * (contact["step_periods_s"][-1] / gait["period_s"] - 1.0)
+    return [Paragraph(words("verdict.opening", walked, gait, verdicts, misprint, slower))]
+
+
 def failures(results: Results) -> list[str]:
     """What has no answer, and what is missing for that reason; then results that are there and say that they fail."""
     told = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
-    missing = [failure(results, absent) for absent in results.absent if absent.failed]
+    missing = [failure(results, absent) for absent in results.absent if absent.what in results.failed]
     return [*missing, *(f"{name}: {said['message'].rstrip('.')}." for name, said in told.items() if said is not None)]
 
 
-def failure(results: Results, absent: Absent) -> str:
+def failure(results: Results, absent: LeftOut) -> str:
     """Why a stage has no answer, and which others have none for that reason."""
-    lost = [other.what for other in results.absent if not other.failed and absent.why in other.why]
+    lost = [other.what for other in results.absent if other.what not in results.failed and absent.why in other.why]
     without = f" What needs it is left out: {listed(lost)}." if lost else ""
     return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
 
@@ -98,7 +115,9 @@ def adjustment(results: Results) -> Statement | None:
     found = (results.summary("tune") or {}).get("adjustment")
     if found is None or found["found"]:
         return None
-    return Statement("Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "none helps", "bad")
+    return Statement(
+        "Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "no start helps", "bad"
+    )
 
 
 def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:

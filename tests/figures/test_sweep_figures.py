@@ -1,0 +1,66 @@
+"""Figures of sweeps over two parameters: lines where one has few values, a map where both have many."""
+
+import numpy as np
+import pytest
+
+from walkerlab.figures.canvas import styled
+from walkerlab.figures.sweep import draw, lines, maps
+from walkerlab.store.content import Group, Variable
+
+PARAMETERS = ("slope_deg", "hip_mass_kg")
+
+
+def swept(slopes, masses, answered=True):
+    """A multiplier that grows with the slope past one, on a grid; without an answer at its first point if told so."""
+    slope, mass = np.linspace(1.0, 5.0, slopes), np.linspace(5.0, 15.0, masses)
+    radius = 0.3 * slope[:, None] + 0.01 * mass
+    radius[0, 0] = radius[0, 0] if answered else np.nan
+    status = np.where(np.isnan(radius), "no answer", "answered").astype(object)
+    outcome = np.where(np.isnan(radius), "none", "walked").astype(object)
+    return Group(
+        {
+            "slope_deg": Variable(slope, ("slope_deg",), "deg", "slope"),
+            "hip_mass_kg": Variable(mass, ("hip_mass_kg",), "kg", "mass of the hip"),
+            "spectral_radius": Variable(radius, PARAMETERS, "1", "largest magnitude of a multiplier", missing=True),
+            "status": Variable(status, PARAMETERS, "", "status"),
+            "outcome": Variable(outcome, PARAMETERS, "", "outcome"),
+        }
+    )
+
+
+def drawn(made, group):
+    with styled():
+        return made(group, PARAMETERS, ["spectral_radius"])
+
+
+@pytest.mark.parametrize(("slopes", "masses"), [(9, 3), (3, 9)])
+def test_each_value_of_the_parameter_that_has_few_is_a_line(slopes, masses):
+    group = swept(slopes, masses)
+    figure = drawn(lines, group)
+    curves = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    values = group["spectral_radius"]
+    expected = values.T if masses == 3 else values
+    np.testing.assert_array_equal([line.get_ydata() for line in curves], expected)
+    (legend,) = figure.legends
+    said = [text.get_text() for text in legend.get_texts()]
+    assert said[-1] == "largest multiplier 1"
+    assert said[0] == ("hip mass 5 kg" if masses == 3 else "slope 1 deg")
+
+
+def test_a_map_ends_where_values_were_sampled_and_its_white_line_has_a_legend():
+    figure = drawn(maps, swept(9, 8))
+    axes = figure.axes[0]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((1.0, 5.0), (5.0, 15.0))
+    assert set(np.linspace(1.0, 5.0, 9)) <= {*axes.get_xticks(), *axes.get_xticks(minor=True)}
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["largest multiplier 1"]
+
+
+def test_the_caption_tells_how_gaps_look():
+    for masses, said in (
+        (3, "Marks at the bottom: no answer there."),
+        (8, "Where there is no answer the map is grey."),
+    ):
+        made = draw(swept(9, masses, answered=False), "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"])
+        assert said in made.caption
+        assert made.svg.startswith(b"<?xml")

@@ -1,0 +1,406 @@
+"""Figures of families of gaits: 13 the bifurcation diagram, 14 multipliers, 16 the plane of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from walkerlab.figures.canvas import blank, entry, legend_above
+from walkerlab.figures.illustration import Need, Results, paper_figure
+from walkerlab.figures.maps import Kind, draw_kinds
+from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
+from walkerlab.labels import with_unit
+from walkerlab.store.content import Group
+
+if TYPE_CHECKING:
+    from matplotlib.typing import LineStyleType
+
+STAGE: Final = "continuation"
+NEED: Final = Need(STAGE, "branches", ("model", "period", "from", "to"), "no branch was found")
+MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
+MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
+STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
+OTHER: Final = GREEN
+"""Of gaits that are not born of the gait of one step."""
+
+
+@dataclass(frozen=True)
+class DrawnBranch:
+    """A branch with its model."""
+
+    model: str
+    number: int
+    group: Group
+
+    @property
+    def period(self) -> int:
+        """Steps of its gaits."""
+        return int(self.group.attrs["period"])
+
+    @property
+    def colour(self) -> str:
+        """Of the model; of other gaits than those of one step and its cascade, their own."""
+        period = self.period
+        return MODELS[self.model] if period & (period - 1) == 0 else OTHER
+
+
+def branches_of(results: Results) -> Iterator[DrawnBranch]:
+    """Every branch of a result."""
+    return (DrawnBranch(*found) for found in numbered(results, "branch"))
+
+
+def label_of(results: Results) -> str:
+    """The parameter with its unit, as an axis says it."""
+    summary = results[STAGE].summary
+    name = str(summary["over"])
+    return with_unit({"slope_deg": "slope", "slope_rad": "slope"}.get(name, name), str(summary["unit"]))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity of every step along a branch, bifurcations among its points.
+
+    value     (points,) of the parameter
+    quantity  (points, steps)
+    stable    (points - 1,) whether the gaits between neighbours are
+    marks     where the bifurcations are, and of which kind
+    """
+
+    value: NDArray[np.float64]
+    quantity: NDArray[np.float64]
+    stable: NDArray[np.bool_]
+    marks: tuple[tuple[int, str], ...]
+
+
+def curve_of(group: Group, name: str) -> Curve:
+    """A quantity along a branch; its stability changes at bifurcations, and else in the middle between neighbours."""
+    value, quantity = group["value"], group[name]
+    stable = group["stable"].astype(bool)
+    if "mark_after" not in group.variables:
+        return Curve(value, quantity, stable[:-1] & stable[1:], ())
+    places = group["mark_after"].astype(int) + 1
+    order = np.argsort(places, kind="stable")
+    marked = places[order] + np.arange(places.size)
+    value = np.insert(value, places[order], group["mark_value"][order])
+    quantity = np.insert(quantity, places[order], group[f"mark_{name}"][order], axis=0)
+    on_mark = np.zeros(value.size, bool)
+    on_mark[marked] = True
+    known = np.insert(stable, places[order], True)  # a bifurcation bounds what is stable and what is not
+    between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
+    kinds = tuple(str(kind) for kind in group["mark_kind"][order])
+    return Curve(value, quantity, between, tuple(zip((int(place) for place in marked), kinds, strict=True)))
+
+
+def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
+    """A quantity of every step of a branch, solid where it is stable, with its bifurcations; their kinds."""
+    curve = curve_of(branch.group, name)
+    width = 1.5 if branch.period == 1 else 1.0
+    bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
+    for begin, end in pairwise(bounds):
+        if begin == end:
+            continue
+        stable = bool(curve.stable[begin])
+        axes.plot(
+            curve.value[begin : end + 1], curve.quantity[begin : end + 1], color=branch.colour,
+            linestyle=STYLES[stable], linewidth=width if stable else 0.6 * width, zorder=4 if stable else 3,
+        )  # fmt: skip
+    for place, kind in curve.marks:
+        marker, colour = MARKS[kind]
+        axes.plot(
+            np.full(curve.quantity.shape[1], curve.value[place]), curve.quantity[place], linestyle="none",
+            marker=marker, markersize=2.6, color=colour, markeredgewidth=0.0, zorder=6,
+        )  # fmt: skip
+    return {kind for _, kind in curve.marks}
+
+
+def numbered(results: Results, name: str) -> Iterator[tuple[str, int, Group]]:
+    """The groups of a name, with their models and numbers, in the order in which they were followed."""
+    groups = results[STAGE].groups
+    for model in MODELS:
+        number = 0
+        while (group := groups.get(f"{model}/{name}_{number}")) is not None:
+            yield model, number, group
+            number += 1
+
+
+def clouds(results: Results) -> Iterator[tuple[str, Group]]:
+    """What walks of the models settled on."""
+    found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
+    return ((model, group) for model, group in found if group is not None)
+
+
+def key_of(results: Results, kinds: set[str]) -> list[Artist]:
+    """What the legend has; kinds of the bifurcations that are drawn."""
+    drawn = list(branches_of(results))
+    models = {branch.model for branch in drawn}
+    found: list[Artist] = [
+        entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in MODELS.items() if model in models
+    ]
+    if any(branch.colour == OTHER for branch in drawn):
+        found.append(entry("other gaits", color=OTHER, linewidth=1.0))
+    found.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
+    if any(clouds(results)):
+        found.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
+    for kind, (marker, colour) in MARKS.items():
+        if kind in kinds:
+            found.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
+    return found
+
+
+QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
+ROOM: Final = 0.06
+"""Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
+
+
+def plot_branches(results: Results) -> Figure:
+    """Both quantities over the whole span on the left, over the part with bifurcations on the right."""
+    figure = blank(5.6)
+    panels = figure.subplots(2, 2)
+    close = cascade_of(results)
+    kinds: set[str] = set()
+    for row, (name, words) in enumerate(QUANTITIES.items()):
+        for column, axes in enumerate(panels[row]):
+            kinds |= draw_family(axes, results, name)
+            axes.set_xlabel(label_of(results))
+            if column == 1 and close is not None:
+                axes.set_xlim(*close)
+            axes.set_ylim(*bounds(results, name, close if column == 1 else None))
+        units = next(branches_of(results)).group.variables[name].units
+        panels[row][0].set_ylabel(with_unit(words, units))
+    for axes, title in zip(panels[0], ("(a) all of it", "(b) where gaits change"), strict=True):
+        axes.set_title(title)
+    legend_above(figure, key_of(results, kinds))
+    return figure
+
+
+def draw_family(axes: Axes, results: Results, name: str) -> set[str]:
+    """One quantity of every branch, with its bifurcations and the attractor behind."""
+    for model, cloud in clouds(results):
+        values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
+        colour = BLACK if model == "rigid" else GREY
+        axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
+    return {kind for branch in branches_of(results) for kind in draw_branch(axes, branch, name)}
+
+
+def cascade_of(results: Results) -> tuple[float, float] | None:
+    """The part of the axis with bifurcations, from before the first to where the attractor ends."""
+    summary = results[STAGE].summary
+    found = [one["value"] for one in summary["bifurcations"]]
+    if not found:
+        return None
+    ends = [one["to"] for one in summary["attractors"]] or [summary["to"]]
+    least, most = min(found), max(*ends, max(found))
+    room = ROOM * (most - least)
+    return (least - room, most + room) if room > 0.0 else None
+
+
+def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
+    """Room for what is stable and for the gaits of one step, in the part that is shown."""
+    shown: list[NDArray[Any]] = []
+    for branch in branches_of(results):
+        group = branch.group
+        inside = np.ones(group["value"].size, bool)
+        if close is not None:
+            inside = (group["value"] >= close[0]) & (group["value"] <= close[1])
+        wanted = inside & group["stable"].astype(bool)
+        if close is None and branch.period == 1:
+            wanted = inside
+        shown.append(group[name][wanted].ravel())
+    values = np.concatenate([*shown, *(cloud[name].ravel() for _, cloud in clouds(results))])
+    if values.size == 0:
+        values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
+    room = ROOM * max(float(np.ptp(values)), 1e-9)
+    return float(values.min()) - room, float(values.max()) + room
+
+
+def say_branches(results: Results) -> str:
+    """How far gaits are stable, and where they change."""
+    summary = results[STAGE].summary
+    unit = f" {summary['unit']}" if summary["unit"] not in ("", "1") else ""
+    said = ["Gaits over the parameter: solid where small disturbances die out, dashed where they grow."]
+    said += [
+        f"The {model} model's gait of one step first doubles its period at {first:.6g}{unit}."
+        for model, first in summary["first_doubling"].items()
+    ]
+    said += [
+        f"A cascade of the {cascade['model']} model from {cascade['flips'][0]:.6g}{unit} on accumulates at "
+        f"{cascade['accumulates_at']:.6g}{unit}, the last ratio of its flips' distances being "
+        f"{cascade['ratios'][-1]:.4g}."
+        for cascade in summary["cascades"]
+        if cascade["period"] == 1 and "accumulates_at" in cascade
+    ]
+    return " ".join(said)
+
+
+FARTHEST: Final = 1.6
+"""Of the complex plane that is shown; an unstable gait's multipliers may be far outside."""
+
+
+def plot_multipliers(results: Results) -> Figure:
+    """The complex plane on the left, magnitudes over the parameter on the right."""
+    figure = blank(3.6)
+    left, right = figure.subplots(1, 2)
+    drawn = [branch for branch in branches_of(results) if branch.period == 1]
+    for branch in drawn:
+        in_the_plane(left, branch)
+        over_the_parameter(right, branch)
+    left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
+    left.set_xlim(-FARTHEST, FARTHEST)
+    left.set_ylim(-FARTHEST, FARTHEST)
+    left.set_aspect("equal")
+    left.set_xlabel("real part")
+    left.set_ylabel("imaginary part")
+    left.set_title("(a) in the complex plane")
+    right.axhline(1.0, color=GREY, linewidth=0.8)
+    right.set_ylim(0.0, 2.0 * FARTHEST)
+    right.set_xlabel(label_of(results))
+    right.set_ylabel("magnitude")
+    right.set_title("(b) over the parameter")
+    models = {branch.model for branch in drawn}
+    shown = {model: colour for model, colour in MODELS.items() if model in models}
+    handles = [entry(f"{model} model", color=colour, marker="o", markersize=3) for model, colour in shown.items()]
+    end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
+    legend_above(figure, [*handles, end])
+    return figure
+
+
+def in_the_plane(axes: Axes, branch: DrawnBranch) -> None:
+    """Every multiplier along the branch, its last place marked."""
+    real, imag = branch.group["multiplier_real"], branch.group["multiplier_imag"]
+    axes.plot(real.ravel(), imag.ravel(), linestyle="none", marker="o", markersize=1.6, color=branch.colour)
+    last = int(np.argmax(branch.group["value"]))
+    axes.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
+
+
+def over_the_parameter(axes: Axes, branch: DrawnBranch) -> None:
+    """Magnitudes, largest first, so that each is a line."""
+    size = np.hypot(branch.group["multiplier_real"], branch.group["multiplier_imag"])
+    axes.plot(branch.group["value"], size, color=branch.colour, linewidth=1.0, marker="o", markersize=1.6)
+
+
+def say_multipliers(results: Results) -> str:
+    """What the largest multipliers are where the span begins and ends."""
+    said = ["Multipliers of the step map along the gaits of one step; inside the circle a disturbance dies out."]
+    summary = results[STAGE].summary
+    alone = [one for one in summary["bifurcations"] if one["period"] == 1]
+    for model, kind in dict.fromkeys((one["model"], one["kind"]) for one in alone):
+        values = [one["value"] for one in alone if (one["model"], one["kind"]) == (model, kind)]
+        *others, last = [f"{value:.6g}" for value in sorted(values)]
+        at = f"{', '.join(others)} and {last}" if others else last
+        said.append(f"The {model} model has {f'a {kind}' if len(values) == 1 else f'{kind}s'} at {at}.")
+    return " ".join(said)
+
+
+CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
+CURVE_COLOURS: Final = {"rigid": BLACK, "contact": ORANGE}
+CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0, 1.5))}
+WIDTHS: Final = {1: 1.4, 2: 1.0}
+FINEST: Final = 0.6
+DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#1F5488"}
+OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
+
+
+def curves(results: Results) -> list[tuple[str, Group]]:
+    """The curves with their models."""
+    return [(model, group) for model, _, group in numbered(results, "curve")]
+
+
+def plot_plane(results: Results) -> Figure:
+    """Regions by what walks settle on, and every curve over them."""
+    figure = blank(4.4)
+    axes = figure.subplots()
+    regions = results[STAGE].groups.get("rigid/regions")
+    key: list[Artist] = []
+    if regions is not None:
+        value, second = regions["value"], regions["second"]
+        mesh = partial(axes.pcolormesh, value, second, shading="nearest", rasterized=True)
+        key = draw_kinds(lambda numbers, **look: mesh(numbers.T, **look), region_kinds(regions))
+    legend_above(figure, [*key, *draw_curves(axes, curves(results))])
+    axes.set_xlabel(label_of(results))
+    axes.set_ylabel(curves(results)[0][1].variables["second"].long_name)
+    return figure
+
+
+def region_kinds(regions: Group) -> list[Kind]:
+    """Colour, name and cells of what walks settle on, of what there is."""
+    period = regions["period"]
+    other = (period > 0) & ~np.isin(period, list(DOUBLED))
+    kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]
+    kinds += [
+        (OTHER_PERIOD, "another number of steps", other),
+        (APERIODIC, "never repeats itself", period == 0),
+        (NOTHING, "no walk goes on", period < 0),
+    ]
+    return [kind for kind in kinds if kind[2].any()]
+
+
+def draw_curves(axes: Axes, drawn: list[tuple[str, Group]]) -> list[Artist]:
+    """Every curve, by model, kind and period; returns the key."""
+    seen: dict[tuple[str, str], None] = {}
+    for model, group in drawn:
+        kind = str(group.attrs["kind"])
+        axes.plot(
+            group["value"], group["second"], color=CURVE_COLOURS[model], linestyle=CURVE_STYLES[kind],
+            linewidth=WIDTHS.get(int(group.attrs["period"]), FINEST),
+        )  # fmt: skip
+        seen[model, kind] = None
+    return [
+        entry(f"{kind}s, {model} model", color=CURVE_COLOURS[model], linestyle=CURVE_STYLES[kind])
+        for model, kind in sorted(seen, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
+    ]
+
+
+def say_plane(results: Results) -> str:
+    """What the curves divide, and how much of the plane walks."""
+    drawn = curves(results)
+    kinds = sorted({str(group.attrs["kind"]) for _, group in drawn}, key=list(MARKS).index)
+    models = " and ".join(model for model in CURVE_COLOURS if any(model == one for one, _ in drawn))
+    said = [
+        f"Curves of {' and '.join(f'{kind}s' for kind in kinds)} of the {models} model's gaits over two parameters."
+    ]
+    regions = results[STAGE].groups.get("rigid/regions")
+    if regions is not None:
+        shares = ", ".join(f"{name} in {100.0 * where.mean():.3g} %" for _, name, where in region_kinds(regions))
+        said.append(
+            "Shaded: what walks of the rigid model settle on, led from cell to cell from the gait of one step: "
+            f"{shares} of the plane."
+        )
+    return " ".join(said)
+
+
+FIGURE_13 = paper_figure(
+    13,
+    "Families of gaits over a parameter",
+    (NEED,),
+    say_branches,
+    plot_branches,
+    "Step period and stance angle of gaits over the parameter: stable branches solid, unstable ones "
+    "dashed, bifurcations marked; both models where both were followed.",
+)
+FIGURE_14 = paper_figure(
+    14,
+    "Multipliers over a parameter",
+    (NEED,),
+    say_multipliers,
+    plot_multipliers,
+    "Multipliers of the gaits, in the complex plane with the unit circle and as magnitudes over the parameter.",
+)
+FIGURE_16 = paper_figure(
+    16,
+    "Where gaits change, over two parameters",
+    (CURVES_NEED,),
+    say_plane,
+    plot_plane,
+    "A plane of two parameters, shaded by what walks settle on, with the curves of flips and folds between.",
+)
+FIGURES = (FIGURE_13, FIGURE_14, FIGURE_16)
