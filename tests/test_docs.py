@@ -9,6 +9,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
+import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
 from walkerlab.stages.graph import PIPELINE
@@ -35,8 +36,10 @@ def code_in(path):
 
 
 def commands():
+    """Those of stages that are not run as examples."""
     names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean", "sweep"}
-    found = {command.strip() for path in DOCUMENTS for code in code_in(path) for command in COMMAND.findall(code)}
+    code = [code for path in DOCUMENTS for code in code_in(path) if not code.startswith("$ ")]
+    found = {command.strip() for each in code for command in COMMAND.findall(each)}
     return sorted(command for command in found if shlex.split(command)[1] in names)
 
 
@@ -105,6 +108,23 @@ def test_a_documented_config_is_accepted(text, tmp_path):
     assert load(path, ()).config
 
 
+@pytest.mark.parametrize("path", MAKER["with_examples"](), ids=lambda path: path.name)
+def test_examples_print_what_documents_show(path, tmp_path):
+    assert "\n".join(MAKER["differences"](path, tmp_path)) == ""
+
+
+def test_an_example_that_prints_otherwise_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```yaml\n# a.yaml\nname: a\n```\n```console\n$ cat a.yaml\n...\nname: b\n$ ls -- no-such; exit 3\n...\n"
+        "$ echo $?\n3\n```\n```pycon\n>>> 1 + 1\n3\n```\n",
+        encoding="utf-8",
+    )
+    config, python = MAKER["differences"](page, tmp_path)
+    assert "name: a" in config
+    assert "Got:\n    2" in python
+
+
 @pytest.fixture(scope="session")
 def results(tmp_path_factory):
     return MAKER["Results"](tmp_path_factory.mktemp("runs"))
@@ -124,6 +144,19 @@ def test_every_part_has_a_maker_and_a_place():
 @pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.name)
 def test_the_readme_leads_to_every_page(page):
     assert f"(docs/{page.name})" in text_of(ROOT / "README.md")
+
+
+def test_the_api_reference_has_every_name_of_the_package():
+    listed = re.search(r"members: \[(.*)\]", text_of(ROOT / "docs" / "api.md"))[1].split(", ")
+    assert sorted(walkerlab.__all__) == sorted(set(listed) - {"Result", "Run"})
+
+
+def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
+    pytest.importorskip("griffe")
+    shown = runpy.run_path(str(ROOT / "scripts" / "api_docstrings.py"))["as_markdown"]
+    assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
+        "Walk.\n\n- `slope_deg`: downhill,\n           deg\n- `a, b`: both\n\n```pycon\n>>> 1 + 1\n2\n```\n\nEnd."
+    )
 
 
 def test_the_pipeline_page_draws_every_stage():
