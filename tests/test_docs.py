@@ -1,10 +1,14 @@
 """README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
 
+import math
 import re
 import runpy
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Protocol
 
+import numpy as np
 import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
@@ -12,7 +16,8 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
-from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.graph import PIPELINE, Stage, results_of
+from walkerlab.store.content import Content, Group, Variable
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -49,17 +54,59 @@ def test_links_lead_to_files_that_are_there(path):
     assert [link for link in relative if not (path.parent / link).exists()] == []
 
 
-def called_in(path):
-    """Names that a document calls in code: `name(...)`."""
-    return {name for code in code_in(path) for name in re.findall(r"\b([A-Za-z_]\w+)\(\w", code)}
+def code_to_add():
+    """The Python of the page that says how to add something: figure, stage (its type, its module, its entry), law."""
+    return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", [ROOT / "docs" / "pipeline.md"], ids=lambda path: path.name)
-def test_functions_that_a_document_calls_are_defined(path):
+def test_the_figure_of_the_docs_is_drawn():
+    names = {}
+    exec(next(code for code in code_to_add() if "FIGURE =" in code), names)
+    figure = names["FIGURE"]
+    assert "contact-sim" in figure.why_left_out({}, {})
+    steps = Group({"slip_m": Variable(np.array([5e-4, 6e-4]), ("step",), "m", "slip")})
+    walk = SimpleNamespace(groups={"steps": steps})
+    assert figure.why_left_out({"contact-sim": walk}, {}) is None
+    assert b"slip (mm)" in figure.drawn({"contact-sim": walk}).svg
+
+
+def test_the_stage_of_the_docs_runs():
+    type_it_takes, module, entry = (code for code in code_to_add() if "peed" in code)
+    names = {"Protocol": Protocol, "Mapping": dict, "Content": Content, "Group": Group, "Variable": Variable}
+    exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
+    stage = eval(entry, {"Stage": Stage, "results_of": results_of}, names)
+    assert stage.reads == ("gravity_m_s2",)
+    steps = {name: Variable(np.array([0.5]), ("step",), "", name) for name in ("length_m", "period_s")}
+    found = names["run"](SimpleNamespace(gravity_m_s2=10.0), {"simulate": Content({"steps": Group(steps)}, {})}, None)
+    assert found.summary == {"speed_m_s": 1.0, "froude": 0.1}
+
+
+def test_the_friction_of_the_docs_has_the_derivative_that_it_says():
+    code = next(code for code in code_to_add() if "friction_coefficient" in code)
+    names = {"math": math, "Smooth": object}
+    exec(code.partition("\n")[2], names)
+    law, h = SimpleNamespace(coefficient=0.8, velocity=0.1), 1e-6
+    low, high = (names["smooth_coefficient"](law, 0.05 + side * h)[0] for side in (-1, 1))
+    assert names["smooth_coefficient"](law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
+    assert low < 0.0
+
+
+def test_files_and_names_of_the_pipeline_page_are_there():
+    text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / "pipeline.md"), flags=re.DOTALL | re.MULTILINE)
     source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
-    defined = set(re.findall(r"^\s*(?:def|class) (\w+)", source, re.MULTILINE)) | {"sha256"}
-    assert called_in(path)
-    assert called_in(path) <= defined
+    said = set(re.findall(r"`([a-z_/]+\.py|[a-z_]+/[a-z_/]+)`", text)) - {
+        "walkerlab/figures/slip.py",
+        "walkerlab/stages/speed.py",
+    }
+    assert [name for name in said if not any((base / name).exists() for base in places())] == []
+    names = set(re.findall(r"`([A-Z]\w+|[A-Z_]{4,})`", text)) - {"SpeedConfig"}
+    assert [name for name in names if not re.search(rf"\b{name}\b", source)] == []
+
+
+def places():
+    """Where a file may be that a document names."""
+    package = ROOT / "walkerlab"
+    return (ROOT, package, *(path for path in package.iterdir() if path.is_dir()))
 
 
 @pytest.mark.parametrize("command", commands())
