@@ -206,6 +206,17 @@ def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     )
 
 
+def test_the_draft_of_the_paper_cites_what_its_references_hold_and_leaves_its_blanks_marked():
+    folder = ROOT / "docs" / "joss"
+    text, references = text_of(folder / "paper.md"), text_of(folder / "paper.bib")
+    assert set(re.findall(r"@(\w+)", text.partition("# Summary")[2])) == set(
+        re.findall(r"^@\w+\{(\w+)", references, re.MULTILINE)
+    )
+    for part in ("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"):
+        assert f"\n# {part}\n" in text
+    assert text.count("[BLANK") >= 5
+
+
 def test_the_pipeline_page_draws_every_stage():
     drawing = re.search(r"```mermaid\n(.*?)```", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL)[1]
     assert [stage.name for stage in PIPELINE.stages if not re.search(rf"\b{stage.name}\b", drawing)] == []
