@@ -1,5 +1,7 @@
 """README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
 
+import base64
+import json
 import math
 import re
 import runpy
@@ -204,6 +206,19 @@ def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
         "Walk.\n\n- `slope_deg`: downhill,\n           deg\n- `a, b`: both\n\n```pycon\n>>> 1 + 1\n2\n```\n\nEnd."
     )
+
+
+def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):
+    make = runpy.run_path(str(ROOT / "scripts" / "make_gallery.py"))["sweep_page"]
+    make.__globals__.update(SLOPES="3:20:2", HIPS=[10])
+    page = make(tmp_path)
+    gait, none = (row[0] for row in json.loads(re.search(r'id="gaits">(.*?)</script>', page)[1]))
+    assert gait["said"].startswith("Steps of 0.5354 m in 0.7343 s")
+    floats = np.frombuffer(base64.b64decode(gait["floats"]), "<f4").reshape(len(gait["meta"]["channels"]), -1)
+    time = floats[gait["meta"]["channels"].index("t")]
+    assert time[-1] == pytest.approx(2 * 0.7343, abs=1e-3)
+    assert "meta" not in none
+    assert "no gait" in none["said"]
 
 
 def test_the_draft_of_the_paper_cites_what_its_references_hold_and_leaves_its_blanks_marked():
