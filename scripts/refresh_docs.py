@@ -8,8 +8,9 @@ written, and the exit code is 1 if a part is out of date. With --picture the REA
 depend on the version of matplotlib, so it is not checked.
 
 An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
-`>>>`, and a `yaml` block that begins with `# NAME.yaml` is written to that file. `...` stands for anything. Examples of
-a document run in order in one empty folder; those below `<!-- takes minutes -->` run with --slow only.
+`>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
+anything. Examples of a document run in order in one empty folder; those below `<!-- takes minutes -->` run with --slow
+only.
 """
 
 from __future__ import annotations
@@ -246,8 +247,8 @@ def differences(path: Path, folder: Path, slow: bool = False) -> Iterator[str]:
     exit_code = 0
     with contextlib.chdir(folder):
         for takes_minutes, kind, text in EXAMPLE.findall(path.read_text(encoding="utf-8")):
-            if kind == "yaml" and (named := re.match(r"# (\S+\.yaml)\n", text)):
-                Path(named[1]).write_text(text, encoding="utf-8")
+            if kind == "yaml" and (named := re.match(r"(?:# (\S+)\.yaml|name: (\S+))\n", text)):
+                Path(f"{named[1] or named[2]}.yaml").write_text(text, encoding="utf-8")
             elif kind == "console" and (slow or not takes_minutes):
                 for command, shown in COMMAND.findall(text):
                     printed, exit_code = run_in_shell(command, exit_code)
