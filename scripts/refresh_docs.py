@@ -1,19 +1,30 @@
-"""Make the parts of README and docs that follow from the code anew: results, gaits, stages, config keys.
+"""Keep README and docs true: write the parts that follow from the code, and try the examples.
 
     python scripts/refresh_docs.py [--check | --picture]
+    python scripts/refresh_docs.py --examples [--slow] [DOCUMENT ...]
 
-Each such part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing
-is written, and the exit code is 1 if a part is not what it would be made to. With --picture the README's picture is
-drawn too; its bytes depend on the version of matplotlib, so that it is not checked.
+A part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing is
+written, and the exit code is 1 if a part is out of date. With --picture the README's picture is drawn too; its bytes
+depend on the version of matplotlib, so it is not checked.
+
+An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
+`>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
+anything. Examples of a document run in order in one empty folder; those below `<!-- takes minutes -->` run with --slow
+only.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import doctest
+import io
+import os
 import re
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,6 +38,9 @@ from walkerlab.store.runfolder import RunFolder
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
 PICTURE = "figure-06.png"
+EXAMPLE = re.compile(r"^(<!-- takes minutes -->\n)?```(console|pycon|yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
+LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -183,17 +197,22 @@ def refreshed(text: str, results: Results) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Refresh or check all documents; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is not current")
+    parser.add_argument("documents", nargs="*", type=Path, help="whose examples to try; default: all")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is out of date")
+    parser.add_argument("--examples", action="store_true", help="try the examples; exit with 1 if one prints otherwise")
+    parser.add_argument("--slow", action="store_true", help="those that take minutes too")
     parser.add_argument("--picture", action="store_true", help="draw the README's picture too")
     parser.add_argument("--runs", type=Path, help="folder of runs to reuse; default: a temporary one")
     options = parser.parse_args(arguments)
+    if options.examples:
+        return try_examples(options.documents or with_examples(), options.slow)
     with tempfile.TemporaryDirectory() as temporary:
         results = Results(options.runs or Path(temporary))
         if options.picture:
             (ROOT / "docs" / "images" / PICTURE).write_bytes(results.picture())
         stale = [path for name in DOCUMENTS if not refresh(path := ROOT / name, results, write=not options.check)]
     for path in stale:
-        print(f"{path.relative_to(ROOT)}: {'not current' if options.check else 'made anew'}")
+        print(f"{path.relative_to(ROOT)}: {'out of date' if options.check else 'written'}")
     return 1 if stale and options.check else 0
 
 
@@ -204,6 +223,57 @@ def refresh(path: Path, results: Results, write: bool) -> bool:
     if write and new != old:
         path.write_text(new, encoding="utf-8")
     return new == old
+
+
+def with_examples() -> list[Path]:
+    """The documents that have examples."""
+    documents = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [path for path in documents if EXAMPLE.search(path.read_text(encoding="utf-8"))]
+
+
+def try_examples(documents: Sequence[Path], slow: bool) -> int:
+    """Print what examples print otherwise than documents say; 1 if one does."""
+    found = []
+    for path in documents:
+        with tempfile.TemporaryDirectory() as folder:
+            found += [f"{path}: {difference}" for difference in differences(path.resolve(), Path(folder), slow)]
+    print("\n".join(found) or "all examples print what the documents say")
+    return 1 if found else 0
+
+
+def differences(path: Path, folder: Path, slow: bool = False) -> Iterator[str]:
+    """For each example of a document that prints something else than is shown: the command, and both texts."""
+    names: dict[str, Any] = {}
+    exit_code = 0
+    with contextlib.chdir(folder):
+        for takes_minutes, kind, text in EXAMPLE.findall(path.read_text(encoding="utf-8")):
+            if kind == "yaml" and (named := re.match(r"(?:# (\S+)\.yaml|name: (\S+))\n", text)):
+                Path(f"{named[1] or named[2]}.yaml").write_text(text, encoding="utf-8")
+            elif kind == "console" and (slow or not takes_minutes):
+                for command, shown in COMMAND.findall(text):
+                    printed, exit_code = run_in_shell(command, exit_code)
+                    if not doctest.OutputChecker().check_output(shown, printed, LOOSELY):
+                        yield f"$ {command}\nshown:\n{shown}printed:\n{printed}"
+            elif kind == "pycon" and (slow or not takes_minutes):
+                test = doctest.DocTestParser().get_doctest(text, names, path.name, None, None)
+                said = io.StringIO()
+                doctest.DocTestRunner(optionflags=LOOSELY).run(test, out=said.write, clear_globs=False)
+                names = test.globs
+                if said.getvalue():
+                    yield said.getvalue()
+
+
+def run_in_shell(command: str, exit_code_before: int) -> tuple[str, int]:
+    """What a command prints, after one that ended with an exit code: its answer, or its errors too if it fails."""
+    environment = os.environ | {
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+        "COLUMNS": "100",
+    }
+    done = subprocess.run(
+        ["bash", "-c", f"(exit {exit_code_before}); {command}"], env=environment, capture_output=True, text=True
+    )
+    printed = done.stdout + (done.stderr if done.returncode else "")
+    return printed.replace("\u00a0", " "), done.returncode
 
 
 if __name__ == "__main__":

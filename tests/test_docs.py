@@ -1,17 +1,25 @@
 """README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
 
+import base64
+import json
+import math
 import re
 import runpy
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Protocol
 
+import numpy as np
 import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
+import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
-from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.graph import PIPELINE, Stage, results_of
+from walkerlab.store.content import Content, Group, Variable
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -35,8 +43,10 @@ def code_in(path):
 
 
 def commands():
+    """Those of stages that are not run as examples."""
     names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean", "sweep"}
-    found = {command.strip() for path in DOCUMENTS for code in code_in(path) for command in COMMAND.findall(code)}
+    code = [code for path in DOCUMENTS for code in code_in(path) if not code.startswith("$ ")]
+    found = {command.strip() for each in code for command in COMMAND.findall(each)}
     return sorted(command for command in found if shlex.split(command)[1] in names)
 
 
@@ -46,17 +56,59 @@ def test_links_lead_to_files_that_are_there(path):
     assert [link for link in relative if not (path.parent / link).exists()] == []
 
 
-def called_in(path):
-    """Names that a document calls in code: `name(...)`."""
-    return {name for code in code_in(path) for name in re.findall(r"\b([A-Za-z_]\w+)\(\w", code)}
+def code_to_add():
+    """The Python of the page that says how to add something: figure, stage (its type, its module, its entry), law."""
+    return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", [ROOT / "docs" / "pipeline.md"], ids=lambda path: path.name)
-def test_functions_that_a_document_calls_are_defined(path):
+def test_the_figure_of_the_docs_is_drawn():
+    names = {}
+    exec(next(code for code in code_to_add() if "FIGURE =" in code), names)
+    figure = names["FIGURE"]
+    assert "contact-sim" in figure.why_left_out({}, {})
+    steps = Group({"slip_m": Variable(np.array([5e-4, 6e-4]), ("step",), "m", "slip")})
+    walk = SimpleNamespace(groups={"steps": steps})
+    assert figure.why_left_out({"contact-sim": walk}, {}) is None
+    assert b"slip (mm)" in figure.drawn({"contact-sim": walk}).svg
+
+
+def test_the_stage_of_the_docs_runs():
+    type_it_takes, module, entry = (code for code in code_to_add() if "peed" in code)
+    names = {"Protocol": Protocol, "Mapping": dict, "Content": Content, "Group": Group, "Variable": Variable}
+    exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
+    stage = eval(entry, {"Stage": Stage, "results_of": results_of}, names)
+    assert stage.reads == ("gravity_m_s2",)
+    steps = {name: Variable(np.array([0.5]), ("step",), "", name) for name in ("length_m", "period_s")}
+    found = names["run"](SimpleNamespace(gravity_m_s2=10.0), {"simulate": Content({"steps": Group(steps)}, {})}, None)
+    assert found.summary == {"speed_m_s": 1.0, "froude": 0.1}
+
+
+def test_the_friction_of_the_docs_has_the_derivative_that_it_says():
+    code = next(code for code in code_to_add() if "friction_coefficient" in code)
+    names = {"math": math, "Smooth": object}
+    exec(code.partition("\n")[2], names)
+    law, h = SimpleNamespace(coefficient=0.8, velocity=0.1), 1e-6
+    low, high = (names["smooth_coefficient"](law, 0.05 + side * h)[0] for side in (-1, 1))
+    assert names["smooth_coefficient"](law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
+    assert low < 0.0
+
+
+def test_files_and_names_of_the_pipeline_page_are_there():
+    text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / "pipeline.md"), flags=re.DOTALL | re.MULTILINE)
     source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
-    defined = set(re.findall(r"^\s*(?:def|class) (\w+)", source, re.MULTILINE)) | {"sha256"}
-    assert called_in(path)
-    assert called_in(path) <= defined
+    said = set(re.findall(r"`([a-z_/]+\.py|[a-z_]+/[a-z_/]+)`", text)) - {
+        "walkerlab/figures/slip.py",
+        "walkerlab/stages/speed.py",
+    }
+    assert [name for name in said if not any((base / name).exists() for base in places())] == []
+    names = set(re.findall(r"`([A-Z]\w+|[A-Z_]{4,})`", text)) - {"SpeedConfig"}
+    assert [name for name in names if not re.search(rf"\b{name}\b", source)] == []
+
+
+def places():
+    """Where a file may be that a document names."""
+    package = ROOT / "walkerlab"
+    return (ROOT, package, *(path for path in package.iterdir() if path.is_dir()))
 
 
 @pytest.mark.parametrize("command", commands())
@@ -105,6 +157,23 @@ def test_a_documented_config_is_accepted(text, tmp_path):
     assert load(path, ()).config
 
 
+@pytest.mark.parametrize("path", MAKER["with_examples"](), ids=lambda path: path.name)
+def test_examples_print_what_documents_show(path, tmp_path):
+    assert "\n".join(MAKER["differences"](path, tmp_path)) == ""
+
+
+def test_an_example_that_prints_otherwise_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```yaml\n# a.yaml\nname: a\n```\n```console\n$ cat a.yaml\n...\nname: b\n$ ls -- no-such; exit 3\n...\n"
+        "$ echo $?\n3\n```\n```pycon\n>>> 1 + 1\n3\n```\n",
+        encoding="utf-8",
+    )
+    config, python = MAKER["differences"](page, tmp_path)
+    assert "name: a" in config
+    assert "Got:\n    2" in python
+
+
 @pytest.fixture(scope="session")
 def results(tmp_path_factory):
     return MAKER["Results"](tmp_path_factory.mktemp("runs"))
@@ -124,6 +193,43 @@ def test_every_part_has_a_maker_and_a_place():
 @pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.name)
 def test_the_readme_leads_to_every_page(page):
     assert f"(docs/{page.name})" in text_of(ROOT / "README.md")
+
+
+def test_the_api_reference_has_every_name_of_the_package():
+    listed = re.search(r"members: \[(.*)\]", text_of(ROOT / "docs" / "api.md"))[1].split(", ")
+    assert sorted(walkerlab.__all__) == sorted(set(listed) - {"Result", "Run"})
+
+
+def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
+    pytest.importorskip("griffe")
+    shown = runpy.run_path(str(ROOT / "scripts" / "api_docstrings.py"))["as_markdown"]
+    assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
+        "Walk.\n\n- `slope_deg`: downhill,\n           deg\n- `a, b`: both\n\n```pycon\n>>> 1 + 1\n2\n```\n\nEnd."
+    )
+
+
+def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):
+    make = runpy.run_path(str(ROOT / "scripts" / "make_gallery.py"))["sweep_page"]
+    make.__globals__.update(SLOPES="3:20:2", HIPS=[10])
+    page = make(tmp_path)
+    gait, none = (row[0] for row in json.loads(re.search(r'id="gaits">(.*?)</script>', page)[1]))
+    assert gait["said"].startswith("Steps of 0.5354 m in 0.7343 s")
+    floats = np.frombuffer(base64.b64decode(gait["floats"]), "<f4").reshape(len(gait["meta"]["channels"]), -1)
+    time = floats[gait["meta"]["channels"].index("t")]
+    assert time[-1] == pytest.approx(2 * 0.7343, abs=1e-3)
+    assert "meta" not in none
+    assert "no gait" in none["said"]
+
+
+def test_the_draft_of_the_paper_cites_what_its_references_hold_and_leaves_its_blanks_marked():
+    folder = ROOT / "docs" / "joss"
+    text, references = text_of(folder / "paper.md"), text_of(folder / "paper.bib")
+    assert set(re.findall(r"@(\w+)", text.partition("# Summary")[2])) == set(
+        re.findall(r"^@\w+\{(\w+)", references, re.MULTILINE)
+    )
+    for part in ("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"):
+        assert f"\n# {part}\n" in text
+    assert text.count("[BLANK") >= 5
 
 
 def test_the_pipeline_page_draws_every_stage():

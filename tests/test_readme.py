@@ -4,6 +4,9 @@ import re
 import tomllib
 from pathlib import Path
 
+import jinja2
+from ruamel.yaml import YAML
+
 import walkerlab
 
 ROOT = Path(__file__).parent.parent
@@ -43,6 +46,20 @@ def test_versions_agree():
     assert pyproject["tool"]["hatch"]["version"]["path"] == "walkerlab/__init__.py"
     assert f"\nversion: {walkerlab.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"## {walkerlab.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_conda_recipe_asks_for_what_the_package_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    text = (ROOT / "docs" / "conda" / "meta.yaml").read_text(encoding="utf-8")
+    recipe = YAML(typ="safe").load(jinja2.Template(text).render(PYTHON="python"))
+    asked = [re.sub(r"(?=[<>=])", " ", one, count=1) for one in project["dependencies"]]
+    assert recipe["requirements"]["run"] == [
+        f"python {project['requires-python']}",
+        *(one.replace("matplotlib ", "matplotlib-base ") for one in asked),
+    ]
+    assert recipe["build"]["entry_points"] == [f"{name} = {what}" for name, what in project["scripts"].items()]
+    assert recipe["source"]["path"].endswith(f"dist/walkerlab-{walkerlab.__version__}.tar.gz")
+    assert (recipe["package"]["version"], "://" in text) == (walkerlab.__version__, False)
 
 
 def test_the_least_python_is_the_one_that_is_promised():

@@ -5,7 +5,7 @@ What is listed in `__all__` is loaded when it is first asked for: importing the 
 
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "basin",
