@@ -116,8 +116,8 @@ def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
 def test_any_bytes_are_a_config_or_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "any.yaml"
     path.write_bytes(data)
-    with pytest.raises(ConfigError):
-        load(path)
+    with suppress(ConfigError):
+        assert isinstance(load(path).config, Config)
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
