@@ -143,18 +143,6 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 
 @inlined
-def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Which way an event function goes that is zero at the step's start: a number of that sign; 0 while it stays there.
-
-    clearly  what a coefficient of its slope (per step) is to exceed to count
-    """
-    for i in range(set_root_piece(finder, event, True)):
-        if abs(finder.stack[0, i]) > clearly:
-            return float(finder.stack[0, i])
-    return 0.0
-
-
-@inlined
 def sign_changes(stack: Any, piece: int, size: int) -> int:
     """How often the coefficients of a piece change sign; zero counts as positive."""
     changes = 0
