@@ -13,7 +13,7 @@ from walkerlab.api import open_run
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, export_from
 from walkerlab.cli.films import Film, write_film
-from walkerlab.cli.named import walk_in
+from walkerlab.cli.resolve import walk_in
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.figures.style import PNG_DPI

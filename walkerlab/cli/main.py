@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from walkerlab import __version__
-from walkerlab.cli import around, housekeeping, sweep
+from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.options import (
@@ -69,7 +69,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     for stage in graph.stages:
         app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
     housekeeping.add_to(app, graph)
-    around.add_to(app, graph)
+    lifecycle.add_to(app, graph)
     sweep.add_to(app, graph)
     whole_runs.add_to(app, graph)
     return app

@@ -43,7 +43,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Write a commented config to begin with, and a schema by which editors check it."""
         with exit_on_failure("init", as_json=False):
-            from walkerlab.cli.begin import write_config
+            from walkerlab.cli.init import write_config
 
             said = write_config(file or Path(f"my-{walker}.yaml"), walker)
             if not quiet:
@@ -55,7 +55,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("open", as_json=False):
             from walkerlab.cli.browser import open_file
             from walkerlab.cli.console import Console
-            from walkerlab.cli.named import page_of
+            from walkerlab.cli.resolve import page_of
 
             page = page_of(run, runs)
             open_file(page, Console(quiet, verbose))
@@ -70,8 +70,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Compute a stored result again, from nothing, and say whether it comes out the same."""
         with exit_on_failure("rerun", as_json):
-            from walkerlab.cli.again import rerun_artifact
             from walkerlab.cli.console import Console
+            from walkerlab.cli.rerun import rerun_artifact
 
             rerun_artifact(artifact, graph, Console(quiet, verbose), as_json)
 
@@ -92,7 +92,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("export", as_json=False):
             from walkerlab.cli.console import Console
             from walkerlab.cli.exports import COLUMNS, Target, export_from
-            from walkerlab.cli.named import walk_in
+            from walkerlab.cli.resolve import walk_in
             from walkerlab.stages.runs import run_named
 
             folder, points = run_named(run, runs), width or COLUMNS[columns]
@@ -131,7 +131,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.cli.console import Console
             from walkerlab.cli.exports import Target
             from walkerlab.cli.films import Film, write_film
-            from walkerlab.cli.named import walk_in
+            from walkerlab.cli.resolve import walk_in
             from walkerlab.stages.runs import run_named
 
             folder = run_named(run, runs)
