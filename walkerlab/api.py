@@ -24,7 +24,7 @@ from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.resolve import resolve
-from walkerlab.stages.runner import execute
+from walkerlab.stages.runner import Options, execute
 from walkerlab.stages.runs import config_of, result_in, run_named
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, Stored
@@ -143,7 +143,7 @@ def run(
 
     refuse_unknown_stage(stage)
     asked = resolve(str(config), settings(set), strides, Path(runs))
-    report = execute(asked.template.base.config, stage, asked.folder, force=force, jobs=jobs)
+    report = execute(asked.template.base.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
     return Result(stage, as_json(report), content, said, report.artifact)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from walkerlab.cli.failures import to_type_back
-from walkerlab.cli.options import typed_options
+from walkerlab.cli.request import Request
 from walkerlab.config.loader import load, safe_name
 
 
@@ -158,7 +158,7 @@ def test_a_film_needs_no_name(walker):
 def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` makes it." in done.stderr
-    typed = typed_options(None, ["start=[0, 1, 2, 3]"], None, Path("runs"))
+    typed = Request(sets=["start=[0, 1, 2, 3]"]).typed
     assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )

@@ -10,7 +10,7 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.stages.runner import execute, plan, preview
+from walkerlab.stages.runner import Options, execute, plan, preview
 from walkerlab.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent
@@ -32,17 +32,17 @@ class Toy:
         loaded = load(Path(config) if config else None, sets)
         return loaded.config, RunFolder(self.runs, loaded.run_name)
 
-    def execute(self, target, *sets, config=None, **options):
+    def execute(self, target, *sets, config=None, reporter=None, **options):
         loaded, folder = self.loaded(*sets, config=config)
-        return execute(loaded, target, folder, graph=self.graph, **options)
+        return execute(loaded, target, folder, Options(**options), reporter, self.graph)
 
     def plan(self, target, *sets, config=None, force=False):
         loaded, folder = self.loaded(*sets, config=config)
         return plan(loaded, target, folder, force, self.graph)
 
-    def preview(self, target, *sets, config=None, force=False):
+    def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)
-        return preview(loaded, target, folder, force=force, graph=self.graph)
+        return preview(loaded, target, folder, Options(**options), self.graph)
 
     def edit(self, module, old, new):
         """Change the source of a toy stage; this process goes on with what it has imported."""

@@ -89,7 +89,4 @@ def test_force_begins_anew(toy, monkeypatch):
 
 
 def test_a_preview_tells_of_it(toy):
-    config, folder = toy.loaded()
-    from walkerlab.stages.runner import preview
-
-    assert actions(preview(config, "survey", folder, full=True, graph=toy.graph)) == {"survey": "run", "census": "run"}
+    assert actions(toy.preview("survey", full=True)) == {"survey": "run", "census": "run"}

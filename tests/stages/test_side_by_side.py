@@ -8,7 +8,7 @@ import pytest
 from process_table import workers_below
 
 from walkerlab.stages.graph import Graph
-from walkerlab.stages.runner import STILL_COMPUTED, any_side_by_side, execute
+from walkerlab.stages.runner import STILL_COMPUTED, Options, any_side_by_side, execute
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerDiedError
 
@@ -96,5 +96,5 @@ def test_a_chain_is_walked_in_one_process(toy):
 
 def test_no_process_is_left(toy):
     config, folder = toy.loaded()
-    execute(config, "page", folder, jobs=2, graph=toy.graph)
+    execute(config, "page", folder, Options(jobs=2), graph=toy.graph)
     assert workers_below(os.getpid()) == []

@@ -14,41 +14,33 @@ from walkerlab.store.clean import files_of, remove, remove_if_empty
 from walkerlab.store.runfolder import RunFolder
 
 
-def clean_run(request: Request, stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool) -> None:
-    """Remove the files of these stages from the run's folder, once the user agrees.
-
-    Raises typer.BadParameter if nobody can be asked, LockedError (only without `wait`) and StorageError.
-    """
-    clean_folders(request, [request.folder], stages, yes=yes, dry_run=dry_run, wait=wait)
-
-
-def clean_all(request: Request, stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool) -> None:
-    """The same of every run in the folder of all runs."""
+def every_run(request: Request) -> list[RunFolder]:
+    """The runs in the folder of all runs."""
     there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
-    folders = [RunFolder(request.runs, name) for name in there]
-    clean_folders(request, folders, stages, yes=yes, dry_run=dry_run, wait=wait)
+    return [RunFolder(request.runs, name) for name in there]
 
 
-def clean_folders(
-    request: Request, folders: Sequence[RunFolder], stages: Sequence[str], *, yes: bool, dry_run: bool, wait: bool
-) -> None:
-    """Remove the files of these stages from run folders, and folders that have nothing else in them."""
+def clean_folders(request: Request, folders: Sequence[RunFolder], stages: Sequence[str], yes: bool) -> None:
+    """Remove the files of these stages from run folders, once the user agrees, and folders with nothing else in them.
+
+    Raises typer.BadParameter if nobody can be asked, LockedError (only with `--no-wait`) and StorageError.
+    """
     found = {folder: files_of(folder, stages) for folder in folders}
     files = [path for paths in found.values() for path in paths]
     where = folders[0].path if len(folders) == 1 else request.runs
-    if files and not (yes or dry_run) and not agreed(where, files):
+    if files and not (yes or request.dry_run) and not agreed(where, files):
         found, files = {}, []
-    if not dry_run:
+    if not request.dry_run:
         for folder, paths in found.items():
             if paths:
-                with folder.locked(wait, request.console.note):
+                with folder.locked(not request.no_wait, request.console.note):
                     remove(folder, paths)
                 remove_if_empty(folder)
     names = [str(path) for path in files]
     if request.as_json:
-        print_json({"run_dir": str(where), "removed": names, "dry_run": dry_run})
+        print_json({"run_dir": str(where), "removed": names, "dry_run": request.dry_run})
     else:
-        said = "would be removed" if dry_run else "removed"
+        said = "would be removed" if request.dry_run else "removed"
         print("\n".join([f"{said}: {name}" for name in names] or [f"{where}: nothing {said}"]))
 
 

@@ -1,5 +1,7 @@
 """Failures at the edge: one message, one advice, one exit code; a bug keeps its traceback."""
 
+from __future__ import annotations
+
 import contextlib
 import errno
 import json
@@ -8,47 +10,40 @@ import re
 import signal
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from walkerlab.errors import StoppedError, StorageError, WalkerlabError
+
+if TYPE_CHECKING:
+    from walkerlab.cli.request import Request
 
 ADVISED = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
 """A command in a text, unless it is about no run."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-@dataclass
-class Command:
-    """A command that runs: its name, and its run's folder once that is known."""
-
-    name: str
-    run_dir: Path | None = None
-
-
 @contextlib.contextmanager
-def exit_on_failure(name: str, as_json: bool, typed: str = "") -> Iterator[Command]:
+def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
     """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too.
 
-    typed  the options of the command that say which run it is about: advice has them too
+    name     of the command
+    request  what it is asked; advice has the options that say which run that is about
     """
-    command = Command(name)
     signal.signal(signal.SIGTERM, interrupt)
     try:
-        yield command
+        yield request
         sys.stdout.flush()
     except WalkerlabError as error:
-        if as_json:
-            print_json(failed(command, error))
-        say(error, typed)
+        if request.as_json:
+            print_json(failed(name, request, error))
+        say(error, request.typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "Stages that were finished are kept; the same command does the rest.")
-        if as_json:
-            print_json(failed(command, stopped))
+        if request.as_json:
+            print_json(failed(name, request, stopped))
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
     except BrokenPipeError:
@@ -86,11 +81,11 @@ def to_type_back(text: str, typed: str) -> str:
     return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
-def failed(command: Command, error: WalkerlabError) -> dict[str, Any]:
+def failed(name: str, request: Request, error: WalkerlabError) -> dict[str, Any]:
     """The JSON object of a command that came to nothing: the keys there always are, and the error."""
     return {
-        "stage": command.name,
-        "run_dir": None if command.run_dir is None else str(command.run_dir),
+        "stage": name,
+        "run_dir": None if request.run_dir is None else str(request.run_dir),
         "artifact": None,
         "reused": False,
         "wall_s": 0.0,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from walkerlab.cli.failures import exit_on_failure
-from walkerlab.cli.options import RUNS, AsJson, Quiet, Runs, Verbose
+from walkerlab.cli.request import OF_TALK, Request, command
 from walkerlab.stages.graph import Graph
 
 RunArgument = Annotated[
@@ -28,8 +28,9 @@ FIRST_WALK = "default: contact-sim, or simulate where that has not run"
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the commands to a program for a pipeline."""
 
-    @app.command("init")
+    @command(app, "quiet")
     def init(
+        request: Request,
         file: Annotated[
             Path | None,
             typer.Argument(
@@ -39,44 +40,40 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         walker: Annotated[
             str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
         ] = "compass",
-        quiet: Quiet = False,
     ) -> None:
         """Write a commented config to begin with, and a schema by which editors check it."""
-        with exit_on_failure("init", as_json=False):
+        with exit_on_failure("init", request):
             from walkerlab.cli.init import write_config
 
             said = write_config(file or Path(f"my-{walker}.yaml"), walker)
-            if not quiet:
+            if not request.quiet:
                 print(said)
 
-    @app.command("open")
-    def open_run(run: RunArgument = "paper", runs: Runs = RUNS, quiet: Quiet = False, verbose: Verbose = False) -> None:
+    @command(app, "runs", "quiet", "verbose", name="open")
+    def open_run(request: Request, run: RunArgument = "paper") -> None:
         """Show a run's page in the browser."""
-        with exit_on_failure("open", as_json=False):
+        with exit_on_failure("open", request):
             from walkerlab.cli.browser import open_file
-            from walkerlab.cli.console import Console
             from walkerlab.cli.resolve import page_of
 
-            page = page_of(run, runs)
-            open_file(page, Console(quiet, verbose))
+            page = page_of(run, request.runs)
+            open_file(page, request.console)
             print(page)
 
-    @app.command("rerun")
+    @command(app, *OF_TALK)
     def rerun(
+        request: Request,
         artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
-        as_json: AsJson = False,
-        quiet: Quiet = False,
-        verbose: Verbose = False,
     ) -> None:
         """Compute a stored result again, from nothing, and say whether it comes out the same."""
-        with exit_on_failure("rerun", as_json):
-            from walkerlab.cli.console import Console
+        with exit_on_failure("rerun", request):
             from walkerlab.cli.rerun import rerun_artifact
 
-            rerun_artifact(artifact, graph, Console(quiet, verbose), as_json)
+            rerun_artifact(artifact, graph, request)
 
-    @app.command("export")
+    @command(app, "runs")
     def export(
+        request: Request,
         run: RunArgument,
         what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
         to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")] = None,
@@ -86,33 +83,32 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             float | None, typer.Option(min=72.0, metavar="PT", help="Width of a figure in points; a column has 252.")
         ] = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
-        runs: Runs = RUNS,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
-        with exit_on_failure("export", as_json=False):
-            from walkerlab.cli.console import Console
+        with exit_on_failure("export", request):
             from walkerlab.cli.exports import COLUMNS, Target, export_from
             from walkerlab.cli.resolve import walk_in
             from walkerlab.stages.runs import run_named
 
-            folder, points = run_named(run, runs), width or COLUMNS[columns]
-            print(export_from(folder, what, Target(to, output), points, walk_in(folder, model), Console()))
+            folder, points = run_named(run, request.runs), width or COLUMNS[columns]
+            print(export_from(folder, what, Target(to, output), points, walk_in(folder, model), request.console))
 
-    @app.command("draw")
+    @command(app)
     def draw(
+        request: Request,
         file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
         to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
         output: Output = None,
     ) -> None:
         """Draw a config's walker to scale, with its measures named as the config names them."""
-        with exit_on_failure("draw", as_json=False):
-            from walkerlab.cli.console import Console
+        with exit_on_failure("draw", request):
             from walkerlab.cli.exports import Target, draw_walker
 
-            print(draw_walker(file, Target(to, output), Console()))
+            print(draw_walker(file, Target(to, output), request.console))
 
-    @app.command("animate")
+    @command(app, "runs", "quiet")
     def animate(
+        request: Request,
         run: RunArgument,
         to: Annotated[
             str | None,
@@ -123,17 +119,14 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         steps: Annotated[int, typer.Option(min=1, help="Steps that are shown.")] = 4,
         rate: Annotated[int, typer.Option(min=1, max=60, help="Pictures a second.")] = 25,
         slower: Annotated[float, typer.Option(min=0.01, help="So many times slower than life.")] = 1.0,
-        runs: Runs = RUNS,
-        quiet: Quiet = False,
     ) -> None:
         """Draw a run's walk as a moving picture."""
-        with exit_on_failure("animate", as_json=False):
-            from walkerlab.cli.console import Console
+        with exit_on_failure("animate", request):
             from walkerlab.cli.exports import Target
             from walkerlab.cli.films import Film, write_film
             from walkerlab.cli.resolve import walk_in
             from walkerlab.stages.runs import run_named
 
-            folder = run_named(run, runs)
+            folder = run_named(run, request.runs)
             film = Film(walk_in(folder, model), steps, rate, slower)
-            print(write_film(folder, Target(to, output), film, Console(quiet)))
+            print(write_film(folder, Target(to, output), film, request.console))

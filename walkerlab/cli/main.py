@@ -1,8 +1,6 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
-import inspect
-import os
-from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
@@ -12,28 +10,7 @@ from walkerlab import __version__
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
-from walkerlab.cli.options import (
-    RUNS,
-    AsJson,
-    ConfigFile,
-    DryRun,
-    Force,
-    From,
-    Full,
-    Jobs,
-    Model,
-    NoWait,
-    Open,
-    Over,
-    Periods,
-    Quiet,
-    Runs,
-    Sets,
-    Strides,
-    To,
-    Verbose,
-    typed_options,
-)
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
 
@@ -67,7 +44,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     )
     app.callback()(options_of_the_program)
     for stage in graph.stages:
-        app.command(stage.name, help=stage.purpose)(stage_command(stage, graph))
+        add_stage(app, stage, graph)
     housekeeping.add_to(app, graph)
     lifecycle.add_to(app, graph)
     sweep.add_to(app, graph)
@@ -90,57 +67,44 @@ def options_of_the_program(
     """Nothing but `--version`, which is answered on sight."""
 
 
-def stage_command(stage: Stage, graph: Graph) -> Callable[..., None]:
-    """The command of one stage, with the options that mean something to it."""
+Over = Annotated[
+    str | None,
+    typer.Option(
+        "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
+    ),
+]
+From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
+To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
+Model = Annotated[str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits to follow.")]
+Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
+Full = Annotated[bool, typer.Option("--full", help="Run the long campaign too; interrupted, it goes on the next time.")]
 
-    def command(
-        config: ConfigFile = None,
-        sets: Sets = None,
-        strides: Strides = None,
+
+def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
+    """Add the command of one stage to a program, with the options that mean something to it."""
+    last = stage is graph.stages[-1]
+    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *(["open_page"] if last else []), *OF_TALK]
+    if not (stage.walks or last):
+        shared.remove("strides")
+    unasked: list[str] = [] if stage.follows else ["over", "begin", "end", "model", "periods"]
+    meaningless = [*unasked, *([] if graph.campaigns_of(stage.name) else ["full"])]
+
+    @command(app, *shared, name=stage.name, purpose=stage.purpose, without=meaningless)
+    def run(
+        request: Request,
         over: Over = None,
         begin: From = None,
         end: To = None,
         model: Model = None,
         periods: Periods = None,
-        runs: Runs = RUNS,
-        jobs: Jobs = None,
         full: Full = False,
-        force: Force = False,
-        dry_run: DryRun = False,
-        no_wait: NoWait = False,
-        open_page: Open = False,
-        as_json: AsJson = False,
-        quiet: Quiet = False,
-        verbose: Verbose = False,
     ) -> None:
-        with exit_on_failure(stage.name, as_json, typed_options(config, sets, strides, runs)) as asked:
+        settings = [*(request.sets or ()), *following(over, begin, end, model, periods)]
+        with exit_on_failure(stage.name, replace(request, sets=settings)) as asked:
             # Imported here: help loads neither a config nor an array.
-            from walkerlab.cli.request import Request
             from walkerlab.cli.stage import run_stage
 
-            settings = (*(sets or ()), *following(over, begin, end, model, periods))
-            request = Request(config, settings, strides, runs, as_json, quiet, verbose, open_page)
-            asked.run_dir = request.folder.path
-            cores = jobs or all_cores()
-            run_stage(request, stage, graph, force=force, dry_run=dry_run, wait=not no_wait, jobs=cores, full=full)
-
-    last = stage is graph.stages[-1]
-    meant = {
-        "strides": stage.walks or last,
-        "full": bool(graph.campaigns_of(stage.name)),
-        "open_page": last,
-    }
-    meant |= dict.fromkeys(("over", "begin", "end", "model", "periods"), stage.follows)
-    meaningless = {name for name, has in meant.items() if not has}
-    signature = inspect.signature(command)
-    options = [option for name, option in signature.parameters.items() if name not in meaningless]
-    command.__signature__ = signature.replace(parameters=options)  # type: ignore[attr-defined]
-    return command
-
-
-def all_cores() -> int:
-    """The processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+            run_stage(asked, stage, graph, full)
 
 
 def following(

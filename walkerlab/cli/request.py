@@ -1,37 +1,100 @@
-"""What every command is asked: which config, which run folder, how much to say."""
+"""What commands are asked: the options that they share, each declared once, and the run that these mean."""
 
-from __future__ import annotations
-
+import glob
+import inspect
+import os
+import re
+import shlex
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
 
 from walkerlab.cli.console import Console
-from walkerlab.cli.options import typed_options
-from walkerlab.config.loader import LoadedConfig, Template
-from walkerlab.config.schema import Config
-from walkerlab.stages.resolve import Asked, resolve
-from walkerlab.store.runfolder import RunFolder
+
+# Help loads neither a config nor an array.
+if TYPE_CHECKING:
+    from walkerlab.config.loader import Template
+    from walkerlab.config.schema import Config
+    from walkerlab.stages.resolve import Asked
+    from walkerlab.store.runfolder import RunFolder
+
+F = TypeVar("F", bound=Callable[..., None])
+RUNS = Path("runs")
+OF_KIND = re.compile(r"\([^)]*\)")
+"""The kind of a block that has several: `walker(kneed)`."""
+
+
+def keys_to_set(incomplete: str) -> list[str]:
+    """The keys of a config that begin with what was typed, each with the `=` that `--set` wants."""
+    # Imported here and below: only a shell that completes asks.
+    from walkerlab.config.reference import keys
+
+    of_kinds = (OF_KIND.sub("", row.key) for row in keys() if row.key != "extends")
+    return [f"{key}=" for key in dict.fromkeys(of_kinds) if key.startswith(incomplete)]
+
+
+def keys_to_vary(incomplete: str) -> list[str]:
+    """The same without the `=`."""
+    return [key.removesuffix("=") for key in keys_to_set(incomplete)]
+
+
+def configs_and_files(incomplete: str) -> list[str]:
+    """The built-in configs and the YAML files whose names begin with what was typed."""
+    from walkerlab.config.files import builtin_names
+
+    folder, slash, stem = incomplete.rpartition("/")
+    files = sorted(folder + slash + path.name for path in Path(folder + slash).glob(f"{glob.escape(stem)}*.yaml"))
+    return [*(name for name in builtin_names() if name.startswith(incomplete)), *files]
 
 
 @dataclass(frozen=True)
 class Request:
-    """The options that every command has.
+    """The options that commands share; what a command has no option for is as if it had not been given."""
 
-    config   what `resolve` takes: file, built-in name or run; None is the built-in paper config
-    sets     `--set` options
-    strides  `--strides`, or None
-    runs     the folder of all runs
-    """
-
-    config: str | None
-    sets: tuple[str, ...] = ()
-    strides: int | None = None
-    runs: Path = Path("runs")
-    as_json: bool = False
-    quiet: bool = False
-    verbose: bool = False
-    open_page: bool = False
+    config: Annotated[
+        str | None,
+        typer.Option(
+            "--config",
+            "-c",
+            metavar="FILE",
+            help="Config file, built-in config, or run by its name or folder; default: paper.",
+            autocompletion=configs_and_files,
+        ),
+    ] = None
+    sets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change one key of the config; may be repeated.",
+            autocompletion=keys_to_set,
+        ),
+    ] = None
+    strides: Annotated[
+        int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
+    ] = None
+    runs: Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all runs.")] = RUNS
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
+        ),
+    ] = None
+    force: Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")] = False
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would happen and why; touch nothing.")] = False
+    no_wait: Annotated[
+        bool, typer.Option("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
+    ] = False
+    open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")] = (
+        False
+    )
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")] = False
 
     @cached_property
     def console(self) -> Console:
@@ -40,13 +103,27 @@ class Request:
 
     @property
     def typed(self) -> str:
-        """The options that say which run it is, as they can be typed again."""
-        return typed_options(self.config, self.sets, self.strides, self.runs)
+        """The options that say which run is meant, each with a blank before it; none for the paper config's own."""
+        words = [] if self.config is None else ["-c", self.config]
+        for setting in self.sets or ():
+            words += ["--set", setting]
+        words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
+        words += [] if self.runs == RUNS else ["--runs", str(self.runs)]
+        return "".join(f" {shlex.quote(word)}" for word in words)
+
+    @property
+    def processes(self) -> int:
+        """How many processes may work at once."""
+        if self.jobs is not None:
+            return self.jobs
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
-    def asked(self) -> Asked:
+    def asked(self) -> "Asked":
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
-        found = resolve(self.config, self.sets, self.strides, self.runs)
+        from walkerlab.stages.resolve import resolve
+
+        found = resolve(self.config, self.sets or (), self.strides, self.runs)
         loaded = found.template.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
@@ -58,21 +135,54 @@ class Request:
         return found
 
     @property
-    def template(self) -> Template:
+    def run_dir(self) -> Path | None:
+        """The run's folder; None as long as nothing has asked for it."""
+        return self.folder.path if "asked" in vars(self) else None
+
+    @property
+    def template(self) -> "Template":
         """The config, ready to be varied."""
         return self.asked.template
 
     @property
-    def loaded(self) -> LoadedConfig:
-        """The config as it is."""
-        return self.asked.template.base
-
-    @property
-    def resolved(self) -> Config:
+    def resolved(self) -> "Config":
         """The config itself."""
-        return self.loaded.config
+        return self.template.base.config
 
     @property
-    def folder(self) -> RunFolder:
+    def folder(self) -> "RunFolder":
         """The run's folder."""
         return self.asked.folder
+
+
+SHARED = inspect.signature(Request).parameters
+OF_A_RUN = ("config", "sets", "strides", "runs")
+"""The options that say which run is meant."""
+OF_TALK = ("as_json", "quiet", "verbose")
+"""The options that say how much is printed, and how."""
+
+
+def command(
+    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, without: Collection[str] = ()
+) -> Callable[[F], F]:
+    """Add the decorated function to a program: it takes a `Request`, then the options that are its own.
+
+    shared   fields of `Request` that are options of the command; the others keep their defaults
+    name     as it is typed; default: the function's
+    purpose  what help says; default: the function's docstring
+    without  parameters of the function that are no options of this command
+    """
+
+    def register(function: F) -> F:
+        def run(**given: Any) -> None:
+            request = Request(**{field: given.pop(field) for field in shared})
+            function(request, **given)
+
+        _, *own = inspect.signature(function, eval_str=True).parameters.values()
+        options = [one for one in own if one.name not in without] + [SHARED[field] for field in shared]
+        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in options]
+        run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
+        app.command(name or function.__name__, help=purpose or inspect.getdoc(function))(run)
+        return function
+
+    return register

@@ -5,8 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from walkerlab.cli.console import Console
 from walkerlab.cli.failures import print_json
+from walkerlab.cli.request import Request
 from walkerlab.config.loader import EarlierRun, load
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import Graph
@@ -17,7 +17,7 @@ from walkerlab.store.runfolder import RunFolder
 SHORT = 12
 
 
-def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) -> None:
+def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
     """Run an artifact's stage and all it needs in an empty folder, and say whether its content is the same.
 
     Raises ConfigError if there is no such artifact, StaleError if it cannot be read or is not the same.
@@ -27,11 +27,11 @@ def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) ->
     name = path.resolve().parent.name
     config = load(run=EarlierRun(stored.provenance.config, name, str(path))).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
-        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=console, graph=graph)
+        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=graph)
         again = None if report.artifact is None else read(report.artifact)
     before, after = stored.digest(), None if again is None else again.digest()
     same_code = again is not None and again.identity.key == stored.identity.key
-    if as_json:
+    if request.as_json:
         print_json(
             {
                 "stage": stage,
@@ -48,7 +48,7 @@ def rerun_artifact(path: Path, graph: Graph, console: Console, as_json: bool) ->
             f"{path} does not come out again: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
             "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
         )
-    if not as_json:
+    if not request.as_json:
         print(f"{path} comes out again to the last bit: content {before[:SHORT]}.")
 
 

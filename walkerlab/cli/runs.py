@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from walkerlab.cli.failures import exit_on_failure, print_json
-from walkerlab.cli.options import RUNS, AsJson, Runs, Verbose
+from walkerlab.cli.request import Request, command
 from walkerlab.stages.graph import Graph
 
 if TYPE_CHECKING:
@@ -21,20 +21,18 @@ SAME = 1e-12
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the commands to a program for a pipeline."""
 
-    @app.command()
+    @command(app, "runs", "as_json", "verbose")
     def diff(
+        request: Request,
         first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
         second: Annotated[str, typer.Argument(metavar="RUN_B", help="Another one.")],
-        runs: Runs = RUNS,
-        as_json: AsJson = False,
-        verbose: Verbose = False,
     ) -> None:
         """Say how two runs differ: configs, numbers with relative change, walks over one another."""
-        with exit_on_failure("diff", as_json):
+        with exit_on_failure("diff", request):
             from walkerlab.errors import StaleError
             from walkerlab.stages.runs import config_of, difference, results_in, run_named
 
-            folders = (run_named(first, runs), run_named(second, runs))
+            folders = (run_named(first, request.runs), run_named(second, request.runs))
             names = [stage.name for stage in graph.stages]
             results = [results_in(folder, names, graph) for folder in folders]
             for folder, found in zip(folders, results, strict=True):
@@ -42,10 +40,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                     raise StaleError(f"{folder.path} has no results.", "A stage's command makes them.")
             found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
             figures = draw(folders, results)
-            if as_json:
+            if request.as_json:
                 print_json(as_object(folders, found_difference, figures))
             else:
-                print("\n".join(lines(folders, found_difference, figures, verbose)))
+                print("\n".join(lines(folders, found_difference, figures, request.verbose)))
 
 
 def draw(folders: tuple[Any, Any], results: list[dict[str, Any]]) -> list[Path]:

@@ -14,23 +14,20 @@ from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.runner import StageReport, execute, preview
+from walkerlab.stages.runner import Options, StageReport, execute, preview
 
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
-def run_stage(
-    request: Request, stage: Stage, graph: Graph, *, force: bool, dry_run: bool, wait: bool, jobs: int, full: bool
-) -> None:
+def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
+    options = Options(request.force, not request.no_wait, request.processes, full)
     config, folder = request.resolved, request.folder
-    if dry_run:
-        report = preview(config, stage.name, folder, force=force, full=full, graph=graph)
+    if request.dry_run:
+        report = preview(config, stage.name, folder, options, graph)
         show(request, as_json(report) | {"dry_run": True}, planned(report))
         return
-    report = execute(
-        config, stage.name, folder, force=force, wait=wait, jobs=jobs, full=full, reporter=request.console, graph=graph
-    )
+    report = execute(config, stage.name, folder, options, request.console, graph)
     show(request, as_json(report), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:
         open_file(report.run_dir / str(report.summary["html"]), request.console)

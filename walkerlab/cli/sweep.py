@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from walkerlab.cli.failures import described, exit_on_failure, print_json, say
-from walkerlab.cli.options import RUNS, AsJson, ConfigFile, DryRun, Force, NoWait, Quiet, Runs, Sets, Strides, Verbose
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
 from walkerlab.stages.graph import PIPELINE, Graph
 
 if TYPE_CHECKING:
-    from walkerlab.cli.request import Request
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
 SHOWN = 20
@@ -54,38 +53,27 @@ AsCsv = Annotated[bool, typer.Option("--csv", help="Print the points as a table,
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the command to a program for a pipeline."""
 
-    @app.command()
+    @command(app, *OF_A_RUN, "force", "dry_run", "no_wait", *OF_TALK)
     def sweep(
+        request: Request,
         over: Over = None,
         stage: Of = None,
         zipped: Zip = False,
         sample: Sample = None,
         seed: Seed = None,
-        config: ConfigFile = None,
-        sets: Sets = None,
-        strides: Strides = None,
-        runs: Runs = RUNS,
         engine: EngineName = "local",
         engine_option: EngineOptions = None,
         jobs: Jobs = 0,
         chunk_seconds: ChunkSeconds = None,
         show: Show = None,
-        force: Force = False,
-        dry_run: DryRun = False,
-        no_wait: NoWait = False,
         as_csv: AsCsv = False,
-        as_json: AsJson = False,
-        quiet: Quiet = False,
-        verbose: Verbose = False,
     ) -> None:
         """Ask a stage over many values of parameters; what is computed already is taken over."""
-        with exit_on_failure("sweep", as_json):
-            from walkerlab.cli.request import Request
+        with exit_on_failure("sweep", request):
             from walkerlab.sweeps.engines import Order, engine_named
             from walkerlab.sweeps.question import axis_of_text
             from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-            request = Request(config, tuple(sets or ()), strides, runs, as_json, quiet, verbose)
             chosen, address = engine_named(engine)
             template = request.template
             texts = [axis_of_text(text) for text in over or ()]
@@ -97,14 +85,14 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 folder=request.folder.path,
                 options=options_of(engine_option or ()),
             )
-            if dry_run:
+            if request.dry_run:
                 asked = SweepRun(question, template, request.folder, graph)
                 show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
                 return
             with chosen.begun(order) as begun:
                 asked = SweepRun(question, template, request.folder, graph)
                 load_meanwhile("walkerlab.sweeps.drawing")
-                work = SweepWork(begun, order, chunk_seconds, not no_wait, force, where(graph))
+                work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph))
                 swept = asked.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
 

@@ -81,40 +81,49 @@ class StageReport:
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Options:
+    """How a stage is run.
+
+    force  run it and all it needs, up to date or not
+    wait   for another process that works in the folder, and reuse what it made
+    jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
+    full   run its campaigns too
+    """
+
+    force: bool = False
+    wait: bool = True
+    jobs: int = 1
+    full: bool = False
+
+
+USUAL = Options()
+
+
 def execute(
     config: Config,
     target: str,
     folder: RunFolder,
-    *,
-    force: bool = False,
-    wait: bool = True,
-    jobs: int = 1,
-    full: bool = False,
+    options: Options = USUAL,
     reporter: Reporter | None = None,
     graph: Graph = PIPELINE,
 ) -> StageReport:
     """Have the result of a stage in its folder, running what is not up to date.
 
-    force  run the target and all it needs
-    wait   for another process that works in the folder, and reuse what it made
-    jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
-    full   run the target's campaigns too
-
     Raises ConfigError if the config has not what the target needs or the folder holds results of another one,
-    LockedError (only without `wait`), StorageError.
+    LockedError (only without `options.wait`), StorageError.
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
-    refuse_unsuited(graph[target], config)
-    stages = asked_for(target, config, graph, full)
-    planner = Planner(config, folder, graph, force)
+    stages = asked_for(target, config, graph, options.full)
+    planner = Planner(config, folder, graph, options.force)
     steps = planner.plan(stages)
-    run = Execution(planner, reporter or Silent(), jobs)
+    run = Execution(planner, reporter or Silent(), options.jobs)
     if writes(steps):
-        with folder.locked(wait, run.reporter.note):
+        with folder.locked(options.wait, run.reporter.note):
             claim(folder, config)
             # Decided anew, stage by stage: another process may have worked here until now.
-            run = Execution(Planner(config, folder, graph, force), run.reporter, jobs)
+            run = Execution(Planner(config, folder, graph, options.force), run.reporter, options.jobs)
             run.carry_out(stages, [step.stage for step in steps if step.action == "run"])
     else:
         for step in steps:
@@ -123,23 +132,16 @@ def execute(
 
 
 def preview(
-    config: Config,
-    target: str,
-    folder: RunFolder,
-    *,
-    force: bool = False,
-    full: bool = False,
-    graph: Graph = PIPELINE,
+    config: Config, target: str, folder: RunFolder, options: Options = USUAL, graph: Graph = PIPELINE
 ) -> StageReport:
     """What `execute` would do, as the report it would give before anything has run; touches nothing.
 
     Raises ConfigError as `execute` would.
     """
     started = time.perf_counter()
-    refuse_unsuited(graph[target], config)
-    planner = Planner(config, folder, graph, force)
-    run = Execution(planner, Silent(), jobs=1)
-    steps = planner.plan(asked_for(target, config, graph, full))
+    stages = asked_for(target, config, graph, options.full)
+    run = Execution(Planner(config, folder, graph, options.force), Silent(), options.jobs)
+    steps = run.planner.plan(stages)
     if writes(steps):
         refuse_another_config(folder, config)
     for step in steps:
@@ -153,15 +155,14 @@ def writes(steps: Sequence[Step]) -> bool:
 
 
 def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[Stage, ...]:
-    """The stages that asking for a target means, in the order in which they run."""
+    """The stages that asking for a target means, in the order in which they run.
+
+    Raises ConfigError if the config leaves the target out.
+    """
+    if why_unsuited(graph[target], config) is not None:
+        raise without_contact(target, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
     stages = graph.needed_for(target, config)
     return (*stages, *graph.campaigns_of(target)) if full else stages
-
-
-def refuse_unsuited(stage: Stage, config: Config) -> None:
-    """Raise ConfigError if a stage is asked for that the config leaves out."""
-    if why_unsuited(stage, config) is not None:
-        raise without_contact(stage.name, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
 
 @dataclass(frozen=True)
