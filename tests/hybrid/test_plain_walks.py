@@ -8,7 +8,7 @@ import pytest
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "contact_campaign.py"
 # straight legs, free and hinged, on every terrain; knees, free and hinged
-SEEDS = (18, 3, 19, 1, 0, 40, 8, 2, 29)
+SEEDS = (18, 3, 19, 1, 0, 40, 8, 2, 29, 117, 69)
 
 
 @pytest.fixture(scope="module")

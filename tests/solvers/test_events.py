@@ -12,6 +12,7 @@ from walkerlab.solvers.events import (
     RISING,
     first_crossing,
     new_crossing_finder,
+    way_from_zero,
 )
 
 DEGREE = 7
@@ -127,3 +128,14 @@ def test_every_crossing_is_found_in_order(thousandths, sign, direction):
         found.append(fraction)
         after = fraction + 1e-6
     assert found == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize("left", [0.0, 1e-13, -1e-13])
+def test_the_way_from_zero_is_that_of_the_slope_whatever_an_event_left_there(left):
+    falls_then_rises = left + Polynomial([0.0, -1e-6, 1e-2])
+    assert way_from_zero(finder_on(falls_then_rises), 0, 1e-12) == pytest.approx(-1e-6, rel=1e-5)
+    assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
+
+
+def test_rounding_is_no_way_from_zero():
+    assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

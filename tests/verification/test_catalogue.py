@@ -28,6 +28,7 @@ QUICK = (
     "rigid-slope-minus-1-deg",
     "adams-start",
     "deep-1-cm",
+    "velocities-10",
     "velocities-1e3",
     "rigid-split",
     "loosest",

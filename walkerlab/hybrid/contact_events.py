@@ -26,7 +26,7 @@ from walkerlab.ground.terrain import Terrain, cell_edges
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
 from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing
+from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 from walkerlab.solvers.system import State
 
 # event functions of each foot
@@ -43,6 +43,7 @@ NO_SIDE = 0  # of an event function that may cross zero either way
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 ROUNDING = 1e-14  # m, rad or their rates: what event functions are zero to
+CLEARLY_MOVED = 1e-12  # the same, over a step: what they move away from zero by, if not by rounding alone
 
 
 class Frame(NamedTuple):
@@ -296,22 +297,25 @@ def earliest_crossing(
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
     """Fraction at which an event function crosses to the other side of zero than it is known to be on.
 
-    At once if it is there already: the step before, which ended for another event, went past its zero, or on it. Not
-    while rounding alone has moved it from zero: a foot whose hinge is released, say, may still sink in.
+    At once if it is there already: the step before, which ended for another event, went past its zero, or on it. Of one
+    that is zero at the start the way it goes tells, and rounding alone, which has not moved it from zero, does not: a
+    foot whose hinge is released, say, may still sink in. One that its own event left at zero has gone its way already,
+    and is back only where it is on the other side all along.
     """
-    zero_at_start = zero_at_start or abs(finder.values[event, 0]) < ROUNDING
+    value = finder.values[event, 0]
+    at_zero = zero_at_start or abs(value) < ROUNDING
     if side != NO_SIDE:
-        beyond, farthest = zero_at_start or side * finder.values[event, 0] < 0.0, ROUNDING
+        if at_zero:
+            value = way_from_zero(finder, event, CLEARLY_MOVED)
+            if value == 0.0:
+                return NO_CROSSING
+        beyond = side * value < 0.0
         if zero_at_start:
-            farthest = 0.0
             for j in range(1, finder.nodes.size):
                 beyond = beyond and side * finder.values[event, j] < 0.0
-                farthest = max(farthest, abs(finder.values[event, j]))
-        if farthest < ROUNDING:
-            return NO_CROSSING
         if beyond:
             return 0.0
-    return first_crossing(finder, event, -side, 0.0, zero_at_start)
+    return first_crossing(finder, event, -side, 0.0, at_zero)
 
 
 @inlined

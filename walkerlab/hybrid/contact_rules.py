@@ -37,6 +37,7 @@ from walkerlab.kernels import by_type_or_default, inlined
 from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
+AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
 TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
 BENT_KNEE = int(Outcome.BENT_KNEE)
@@ -94,7 +95,10 @@ def happen(
     if event == PASSING:
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         for foot in range(2):
-            pass_by(terrain, walk_state, foot)
+            # equal legs of a hinged step pass each other on the surface: rounding neither lifts a foot nor holds one
+            at_surface = abs(feet[foot].height) < AT_SURFACE
+            above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
+            find_ground(terrain, walk_state, foot, above)
         return GOES_ON
     foot = event // PER_FOOT
     kind = event % PER_FOOT
@@ -145,9 +149,9 @@ def is_ahead(walk_state: WalkState, foot: int) -> bool:
 
 
 @inlined
-def pass_by(terrain: Terrain, walk_state: WalkState, foot: int) -> None:
-    """The feet changed places: one that is in the air may find ground, or lose it."""
-    if is_above(walk_state, foot):
+def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
+    """A foot above the surface may find ground, or lose it, as the feet change places or roles."""
+    if above:
         stands = foot == walk_state.feet[STANCE]
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
         walk_state.has_ground[foot] = 1 if has_ground else 0
@@ -170,8 +174,7 @@ def lift(
             step = walk_state.feet[STEPS] - 1
             walk_state.slip[step], walk_state.rolling[step] = walk_state.stood[foot, 0], walk_state.stood[foot, 1]
         walk_state.leaving[foot] = 0
-    has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
-    walk_state.has_ground[foot] = 1 if has_ground else 0
+    find_ground(terrain, walk_state, foot, True)
 
 
 @inlined
@@ -200,9 +203,6 @@ def touch(
     down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     """
     stance = walk_state.feet[STANCE]
-    if foot != stance and walk_state.at_zero[PASSING] != 0:
-        # it passes the other one at this instant, as equal hinged legs do: it has not been above the ground ahead
-        walk_state.has_ground[foot] = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, False, False)
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
     material = material_along(walker, foot, feet[foot].along, y)
@@ -230,7 +230,7 @@ def touch(
     walk_state.times[LAST_TOUCH] = t
     walk_state.feet[STANCE] = foot
     walk_state.feet[STEPS] = step + 1
-    pass_by(terrain, walk_state, stance)
+    find_ground(terrain, walk_state, stance, is_above(walk_state, stance))
     follow_strike(walker.knees, walk_state, stance)
     return GOES_ON
 

@@ -143,6 +143,22 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 
 @inlined
+def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
+    """Which way an event function goes that is zero at the step's start: a number of that sign; 0 while it stays there.
+
+    What the error of an event's time left of the value there does not count.
+
+    clearly  what a coefficient of its slope (per step) must exceed to count
+    """
+    size = set_root_piece(finder, event, False)
+    for i in range(1, size):
+        slope = (finder.stack[0, i] - finder.stack[0, 0]) * (size - 1) / i
+        if abs(slope) > clearly:
+            return float(slope)
+    return 0.0
+
+
+@inlined
 def sign_changes(stack: Any, piece: int, size: int) -> int:
     """How often the coefficients of a piece change sign; zero counts as positive."""
     changes = 0

@@ -37,10 +37,11 @@ from walkerlab.hybrid.contact_rules import (
     STANCE,
     STEPS,
     WalkState,
+    find_ground,
+    is_above,
     is_to_lift,
     knee_stops,
     lift,
-    pass_by,
     release,
     touch,
 )
@@ -116,7 +117,7 @@ class RuleFollower:
         if (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
             walk_state.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
             for foot in range(2):
-                pass_by(terrain, walk_state, foot)
+                find_ground(terrain, walk_state, foot, is_above(walk_state, foot))
         h = time_s - self.time_s
         for foot in range(2):
             if (before[foot][1] < 0.0) == (now[foot][1] < 0.0):
