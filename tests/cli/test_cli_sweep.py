@@ -3,8 +3,15 @@
 import csv
 import io
 import json
+from pathlib import Path
 
 import pytest
+
+from walkerlab.cli.runs import lines, percent
+from walkerlab.report.headlines import MOST
+from walkerlab.stages.runs import Pair, difference
+from walkerlab.store.content import Content
+from walkerlab.store.runfolder import RunFolder
 
 SWEEP = ("sweep", "--stage", "drop", "--jobs", "1")
 
@@ -78,6 +85,37 @@ def test_diff_says_what_of_config_and_numbers_differs(toy):
     assert numbers["period_s"]["change"] == pytest.approx(2**0.5 - 1, rel=1e-12)
     text = toy("diff", "paper", "paper@gravity_m_s2=4.905").stdout
     assert "+41.4 %" in text
+
+
+def test_diff_tells_runs_of_one_name_apart_by_their_folders(toy):
+    toy("roll", "--runs", "here")
+    toy("roll", "--runs", "there", "--set", "gravity_m_s2=4.905", "--set", "name=paper")
+    (there,) = (toy.folder / "there").iterdir()
+    there.rename(toy.folder / "there" / "paper")
+    head = toy("diff", "here/paper", "there/paper").stdout.splitlines()[1]
+    assert head.split() == ["here/paper", "there/paper"]
+
+
+def test_diff_shows_no_per_cent_of_errors_and_of_rounding():
+    assert percent(Pair("period_s", 1.0, 1.5, 0.5)) == "+50 %"
+    assert percent(Pair("period_s", 1.5, 1.5, 0.0)) == "the same"
+    assert percent(Pair("energy_drift_J", 1e-3, 2e-3, 1.0)) == ""
+    assert percent(Pair("max_scuff_depth_m", 1e-17, 3e-17, 2.0)) == ""
+
+
+def test_diff_of_unequal_walks_prints_few_lines_and_all_on_request():
+    steps = [{f"x{place}": float(place) for place in range(500)}, {f"x{place}": 2.0 * place for place in range(500)}]
+    first, second = ({"contact-sim": Content({}, {"steps": 2, "step_periods_s": [0.7, t], "of": one})}
+                     for t, one in zip((0.7, 0.8), steps, strict=True))  # fmt: skip
+    found = difference(first, second, (None, None))
+    folders = (RunFolder(Path("runs"), "one"), RunFolder(Path("runs"), "two"))
+    short, whole = (lines(folders, found, [], every) for every in (False, True))
+    assert [line.split() for line in short if "last_step_period_s" in line] == [
+        ["last_step_period_s", "0.7", "0.8", "+14.3", "%"]
+    ]
+    assert len(short) <= 2 + 2 + MOST + 1
+    assert short[-1] == "500 other numbers and words differ; --all shows them"
+    assert len(whole) > 500
 
 
 def test_status_lists_all_runs_and_tells_of_one(toy):

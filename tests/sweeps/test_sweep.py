@@ -18,13 +18,13 @@ from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.plan import Planner
 from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
-from walkerlab.store.content import untimed
+from walkerlab.store.content import Variable, untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
 from walkerlab.sweeps.chunk import FOLDER, row_of, without_outputs
 from walkerlab.sweeps.flat import said_in
-from walkerlab.sweeps.result import as_csv
+from walkerlab.sweeps.result import as_csv, last_of_lists
 
 GRAVITIES = "gravity_m_s2=1:9:5"
 
@@ -217,7 +217,27 @@ def test_the_table_has_a_row_for_each_point(toy):
         ("1.2", "8"),
     ]
     assert [row["period_s"] for row in rows] == ["1.0", "0.5", "", ""]
-    assert rows[0]["state_1"] == "1.0"
+
+
+def test_the_table_has_headline_numbers_and_lists_only_if_all_is_asked_for(toy):
+    swept = toy.run("drop", "gravity_m_s2=[2, 8]")
+    short, whole = (
+        list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question, every)))) for every in (False, True)
+    )
+    assert "state_1" not in short[0]
+    assert whole[0]["state_1"] == "1.0"
+    assert short[0].keys() < whole[0].keys()
+
+
+def test_the_last_step_of_walks_of_different_length_is_each_ones_own():
+    lists = {
+        "step_periods_s": Variable(
+            np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]), ("x", "i"), "s", "", missing=True
+        )
+    }
+    last = last_of_lists(lists, 1)["last_step_period_s"]
+    assert last.values[:2].tolist() == [0.8, 0.6]
+    assert np.isnan(last.values[2])
 
 
 def test_the_file_says_what_was_asked(toy):

@@ -92,6 +92,7 @@ class Request:
     open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")] = (
         False
     )
+    every: Annotated[bool, typer.Option("--all", help="Every number, not the headline numbers alone.")] = False
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")] = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")] = False

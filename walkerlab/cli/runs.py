@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,21 +14,28 @@ from walkerlab.stages.graph import Graph
 
 if TYPE_CHECKING:
     from walkerlab.stages.runs import Pair, RunDifference, RunSummary
+    from walkerlab.store.runfolder import RunFolder
 
 SAME = 1e-12
 """Relative change below which two numbers are shown as the same."""
+DIGITS = 6
+"""Significant digits of a headline number."""
+IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
+"""In the names of numbers that are errors: a relative change of one says nothing."""
+ROUNDING = 1e-9
+"""Numbers (SI) below it are at rounding or at the solver's tolerance."""
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the commands to a program for a pipeline."""
 
-    @command(app, "runs", "as_json", "verbose")
+    @command(app, "runs", "every", "as_json")
     def diff(
         request: Request,
         first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
         second: Annotated[str, typer.Argument(metavar="RUN_B", help="Another one.")],
     ) -> None:
-        """Say how two runs differ: configs, numbers with relative change, walks over one another."""
+        """Say how two runs differ: configs, headline numbers with relative change, walks over one another."""
         with exit_on_failure("diff", request):
             from walkerlab.errors import StaleError
             from walkerlab.stages.runs import config_of, difference, results_in, run_named
@@ -43,15 +51,21 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             if request.as_json:
                 print_json(as_object(folders, found_difference, figures))
             else:
-                print("\n".join(lines(folders, found_difference, figures, request.verbose)))
+                print("\n".join(lines(folders, found_difference, figures, request.every)))
 
 
-def draw(folders: tuple[Any, Any], results: list[dict[str, Any]]) -> list[Path]:
+def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+    """What two runs are called: their names, or their folders where both have one name."""
+    first, second = folders
+    return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
+
+
+def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
     """The figure of both walks, in the first run's folder of figures."""
     from walkerlab.figures.overlay import overlaid
     from walkerlab.store.files import make_folder, write_atomically
 
-    drawn = overlaid(results[0], results[1], (folders[0].name, folders[1].name))
+    drawn = overlaid(results[0], results[1], told_apart(folders))
     if drawn is None:
         return []
     make_folder(folders[0].figures)
@@ -61,8 +75,8 @@ def draw(folders: tuple[Any, Any], results: list[dict[str, Any]]) -> list[Path]:
     return paths
 
 
-def as_object(folders: tuple[Any, Any], found: RunDifference, figures: list[Path]) -> dict[str, Any]:
-    """A difference as JSON."""
+def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path]) -> dict[str, Any]:
+    """A difference as JSON, with every number."""
     return {
         "stage": "diff",
         "runs": [str(folder.path) for folder in folders],
@@ -79,23 +93,32 @@ def as_object(folders: tuple[Any, Any], found: RunDifference, figures: list[Path
     }
 
 
-def lines(folders: tuple[Any, Any], found: RunDifference, figures: list[Path], verbose: bool) -> list[str]:
-    """A difference for people: what differs, and with `verbose` what does not."""
+def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path], every: bool) -> list[str]:
+    """A difference for people: keys of the config, and of each stage its headline numbers.
+
+    every  all numbers that differ instead
+    """
     from walkerlab.cli.text import in_words
     from walkerlab.report.tables import aligned
 
-    names = [folder.name for folder in folders]
+    names = told_apart(folders)
     result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
     if not found.config:
         result[1:] = ["  the same"]
+    left = 0
     for stage, pairs in found.numbers.items():
-        shown = [pair for pair in pairs if verbose or differs(pair)]
-        rows = [[pair.name, in_words(pair.first), in_words(pair.second), percent(pair)] for pair in shown]
-        result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
+        differing = [pair for pair in pairs if differs(pair)]
+        shown = differing if every else list(found.headlines[stage]) if differing else []
+        left += 0 if every else len(differing) - sum(pair in differing for pair in shown)
+        told = in_words if every else in_short
+        rows = [[pair.name, told(pair.first), told(pair.second), percent(pair)] for pair in shown]
+        if rows or not differing:
+            result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
     for name, only in zip(names, (found.only_first, found.only_second), strict=True):
         if only:
             result.append(f"only in {name}: {', '.join(only)}")
-    return [*result, *(f"figure: {path}" for path in figures[1:])]
+    more = [f"{left} other numbers and words differ; --all shows them"] if left else []
+    return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
 
 
 def differs(pair: Pair) -> bool:
@@ -105,9 +128,19 @@ def differs(pair: Pair) -> bool:
     return bool(pair.first != pair.second)
 
 
+def in_short(value: Any) -> str:
+    """A value on one line, a number to the digits that are read."""
+    from walkerlab.cli.text import in_words
+    from walkerlab.report.numbers import number
+
+    return number(value, DIGITS) if isinstance(value, float) else in_words(value)
+
+
 def percent(pair: Pair) -> str:
-    """A relative change in per cent."""
-    return "" if pair.change is None else f"{100.0 * pair.change:+.3g} %"
+    """A relative change in per cent; nothing for what is an error itself, or is at rounding in both runs."""
+    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING:
+        return ""
+    return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"
 
 
 def rows_of_runs(found: list[RunSummary]) -> list[list[str]]:

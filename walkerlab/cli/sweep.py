@@ -47,13 +47,15 @@ ChunkSeconds = Annotated[
     float | None, typer.Option("--chunk-seconds", metavar="S", help="How long a chunk is to take; default by engine.")
 ]
 Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="A number to draw; may be repeated.")]
-AsCsv = Annotated[bool, typer.Option("--csv", help="Print the points as a table, and keep it beside the result.")]
+AsCsv = Annotated[
+    bool, typer.Option("--csv", help="Print the points with the headline numbers as a table, kept beside the result.")
+]
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the command to a program for a pipeline."""
 
-    @command(app, *OF_A_RUN, "force", "dry_run", "no_wait", *OF_TALK)
+    @command(app, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK)
     def sweep(
         request: Request,
         over: Over = None,
@@ -206,7 +208,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
         "html": str(drawn.page),
     }
     if as_csv:
-        table = table_of(swept.content, swept.question)
+        table = table_of(swept.content, swept.question, request.every)
         beside = swept.path.with_suffix(".csv")
         write_atomically(beside, table.encode())
         value["csv"] = str(beside)

@@ -14,6 +14,7 @@ from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import typed
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.report.numbers import listed
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import survey
@@ -220,11 +221,13 @@ class RunDifference:
 
     config       keys with both values, as JSON
     numbers      by stage, every number and word of the two summaries; stages that only one has are left out
+    headlines    by stage, the few of them that say most
     only_first, only_second  stages that only one has
     """
 
     config: tuple[tuple[str, Any, Any], ...]
     numbers: Mapping[str, tuple[Pair, ...]]
+    headlines: Mapping[str, tuple[Pair, ...]]
     only_first: tuple[str, ...]
     only_second: tuple[str, ...]
 
@@ -236,7 +239,8 @@ def difference(
     both = [name for name in first if name in second]
     return RunDifference(
         config_difference(*configs),
-        {name: pairs(first[name].summary, second[name].summary) for name in both},
+        {name: pairs(*(dict(single_values(run[name].summary)) for run in (first, second))) for name in both},
+        {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
     )
@@ -258,10 +262,16 @@ def leaves_of(block: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ...]:
-    """Numbers and words of two summaries side by side; lists number by number."""
-    one, other = dict(single_values(first)), dict(single_values(second))
-    return tuple(Pair(name, one.get(name), other.get(name), change(one.get(name), other.get(name)))
-                 for name in {**one, **other})  # fmt: skip
+    """Numbers and words of two results side by side, by name."""
+    return tuple(Pair(name, first.get(name), second.get(name), change(first.get(name), second.get(name)))
+                 for name in {**first, **second})  # fmt: skip
+
+
+def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of a stage's summary that say most, by name."""
+    last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
+    every = dict(single_values(summary)) | last
+    return {name: every[name] for name in headlines(stage, every)}
 
 
 def single_values(summary: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.canonical import canonical_json
+from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.store.runfolder import RunFolder
@@ -130,24 +131,45 @@ def result_path(folder: RunFolder, name: str) -> Path:
     return folder.path / f"{name}.h5"
 
 
-def as_csv(content: Content, question: Question) -> str:
-    """A table with a row for each point: its parameters first, then every number and text; lists take columns."""
+def as_csv(content: Content, question: Question, every: bool = False) -> str:
+    """A table with a row for each point: its parameters, how it ended, and the stage's headline numbers.
+
+    every  all numbers and texts instead; lists take columns
+    """
     import csv
 
-    group = content[""]
-    count = len(question)
+    group, dimensions = content[""], len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, name in enumerate(question.names):
         values = parameter_values(question, place)
-        columns[name] = [values[question.places(index)[place]] for index in range(count)]
-    for name, variable in group.variables.items():
+        columns[name] = [values[question.places(index)[place]] for index in range(len(question))]
+    variables = dict(group.variables)
+    if not every:
+        variables |= last_of_lists(variables, dimensions)
+        found = headlines(question.stage, (name for name, one in variables.items() if len(one.dims) == dimensions))
+        variables = {name: variables[name] for name in dict.fromkeys(("outcome", *found, "said"))}
+    for name, variable in variables.items():
         if name not in columns:
-            columns.update(flat_columns(name, variable, len(question.shape)))
+            columns.update(flat_columns(name, variable, dimensions))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
     return text.getvalue()
+
+
+def last_of_lists(variables: Mapping[str, Variable], dimensions: int) -> dict[str, Variable]:
+    """The last value of each list that has a headline of its own, a gap where a point has none."""
+    found = {}
+    for name, whole in LAST_OF.items():
+        if whole in variables:
+            values = np.asarray(variables[whole].values, float)
+            there = np.isfinite(values).sum(axis=-1, keepdims=True)
+            last = np.where(there > 0, np.take_along_axis(values, np.maximum(there - 1, 0), axis=-1), np.nan)
+            found[name] = Variable(
+                last[..., 0], variables[whole].dims[:dimensions], variables[whole].units, name, missing=True
+            )
+    return found
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:

@@ -1,0 +1,58 @@
+"""The numbers of each stage's summary that say most: at most ten of them, for differences and tables of many runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import islice
+from typing import Final
+
+HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
+    "fixedpoint": (
+        "period_s", "step_length_m", "spectral_radius", "stable", "knee_strike_s", "energy_J", "min_normal_force_N",
+        "max_friction_ratio", "max_scuff_depth_m", "gaits_found",
+    ),
+    "simulate": (
+        "outcome", "steps", "last_step_period_s", "last_step_length_m", "mean_energy_J", "min_normal_force_N",
+        "max_friction_ratio", "max_scuff_depth_m", "energy_drift_J",
+    ),
+    "contact-sim": (
+        "outcome", "steps", "last_step_period_s", "last_step_length_m", "slip_per_step_m", "max_penetration_m",
+        "static_penetration_m", "damping_ratio", "end_time_s", "energy_balance_residual_J",
+    ),
+    "tune": (
+        "adjustment.needed", "adjustment.found", "adjustment.scale_dtheta1", "adjustment.scale_dtheta2",
+        "map.walks_share", "gait.found", "gait.period_s", "gait.step_length_m", "gait.spectral_radius", "gait.slip_m",
+    ),
+    "compare": ("verdicts.", "outcomes.", "steps.", "orbit_distance"),
+    "accuracy": ("best.",),
+    "stability": ("passed", "failed"),
+    "continuation": ("first_doubling.", "cascades.", "bifurcations."),
+    "basin": ("share_walking", "share_walking_gaussian", "margin", "unsettled_cells", "outcomes."),
+    "plot": (),
+    "report": (),
+}  # fmt: skip
+"""By stage; a name that ends in a point stands for all numbers below it."""
+MOST: Final = 10
+LAST_OF: Final[Mapping[str, str]] = {
+    "last_step_period_s": "step_periods_s",
+    "last_step_length_m": "step_lengths_m",
+}
+"""Headlines that are the last of a list, with the name of the list."""
+
+
+def headlines(stage: str, names: Iterable[str]) -> list[str]:
+    """The names of a stage's headline numbers, in order; of a stage without any on record, its first numbers.
+
+    names  all numbers that there are, dotted
+    """
+    there = list(dict.fromkeys(names))
+    if stage not in HEADLINES:
+        found = (name for name in there if "." not in name)
+    else:
+        found = (name for wanted in HEADLINES[stage] for name in there if is_meant(wanted, name))
+    return list(islice(found, MOST))
+
+
+def is_meant(wanted: str, name: str) -> bool:
+    """Whether a headline, or the block of one, stands for a number."""
+    return name.startswith(wanted) if wanted.endswith(".") else name == wanted
