@@ -6,6 +6,7 @@ import math
 import re
 import runpy
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Protocol
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
+from walkerlab.figures import illustration
 from walkerlab.stages.graph import PIPELINE, Stage, results_of
 from walkerlab.store.content import Content, Group, Variable
 
@@ -61,7 +63,10 @@ def code_to_add():
     return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)
 
 
-def test_the_figure_of_the_docs_is_drawn():
+def test_the_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
+    words = re.search(r"^```jinja\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)[1]
+    (tmp_path / "slip-per-step.j2").write_text(words, encoding="utf-8")
+    monkeypatch.setattr(illustration, "WORDS", replace(illustration.WORDS, folder=tmp_path))
     names = {}
     exec(next(code for code in code_to_add() if "FIGURE =" in code), names)
     figure = names["FIGURE"]
@@ -69,7 +74,9 @@ def test_the_figure_of_the_docs_is_drawn():
     steps = Group({"slip_m": Variable(np.array([5e-4, 6e-4]), ("step",), "m", "slip")})
     walk = SimpleNamespace(groups={"steps": steps})
     assert figure.why_left_out({"contact-sim": walk}, {}) is None
-    assert b"slip (mm)" in figure.drawn({"contact-sim": walk}).svg
+    drawing = figure.drawn({"contact-sim": walk})
+    assert b"slip (mm)" in drawing.svg
+    assert drawing.caption.endswith("contact model, at most 0.6 mm.")
 
 
 def test_the_stage_of_the_docs_runs():

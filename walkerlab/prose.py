@@ -16,6 +16,16 @@ BLANKS = re.compile(r"[ \n]+")
 """Where a template's lines end; the narrow and the unbreakable blanks of numbers are others."""
 
 
+def f(value: float, spec: str) -> str:
+    """A number in a format of Python's, such as .4f."""
+    return format(value, spec)
+
+
+def percent(share: float, digits: int = 3) -> str:
+    """A share in percent."""
+    return f"{100.0 * share:.{digits}g} %"
+
+
 @dataclass(frozen=True)
 class Prose:
     """The paragraphs of a folder, as plain text.

@@ -109,7 +109,7 @@ def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
 
 
 def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
-    assert Illustration("run-time", "Error against run time", (), str, str).called == "figure run-time"
+    assert Illustration("run-time", (), str, tuple).called == "figure run-time"
 
 
 @functools.cache

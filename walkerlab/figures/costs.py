@@ -114,15 +114,13 @@ def plot_methods(scene: str, results: Results) -> Figure:
     left, right = figure.subplots(1, 2, sharey=True)
     panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides (1)"))
     for axes, cost, label in panels:
-        axes.set_xscale("log")
+        axes.set(xscale="log", xlabel=label)
         axes.axhspan(SMALLEST, floor, color=PALE, zorder=0)
         for one in every:
             draw_method(axes, one, one.runs[cost].astype(float), floor, failed)
-        axes.set_xlabel(label)
         decades(axes)
         axes.set_ylim(0.3 * floor, 4.0 * failed)
-    left.set_ylabel("error of the end state (SI)")
-    left.set_title("(a) against run time")
+    left.set(ylabel="error of the end state (SI)", title="(a) against run time")
     right.set_title("(b) against right-hand sides")
     legend_above(figure, entries(every, floor))
     return figure
@@ -144,57 +142,32 @@ def entries(every: Sequence[MethodSeries], floor: float) -> list[Line2D]:
     return [*methods, *([] if all(one.reached.all() for one in every) else [cross]), known]
 
 
-def say_methods(scene: str, results: Results) -> str:
-    """The conclusion, the reference, and what did not reach the end."""
-    summary = results["accuracy"].summary
+def tell_methods(scene: str, results: Results) -> tuple[Any, ...]:
+    """The conclusion, the reference, whether it is measured too, and what did not reach the end."""
+    summary, every = results["accuracy"].summary, list(series_of(scene, results))
     reference = summary["reference"][scene]
     failures = [
-        f"{one.look.label} at {tolerance:.0e} ({outcome})"
-        for one in series_of(scene, results)
+        (one.look.label, tolerance, outcome)
+        for one in every
         for tolerance, outcome, reached in zip(one.runs["tolerance"], one.runs["outcome"], one.reached, strict=True)
         if not reached
     ]
-    itself = any(one.look.label == reference["method"] for one in series_of(scene, results))
-    own = f" {reference['method']} itself is measured by {reference['second_method']}." if itself else ""
-    missed = f" The end was not reached by {', '.join(failures)}." if failures else ""
-    return (
-        f"Largest error of the end state, tolerance by tolerance, warm, medians. {summary['conclusions'][scene]} "
-        f"The reference is {reference['method']}, from which {reference['second_method']} differs by "
-        f"{reference['agreement']:.1e}; smaller errors are drawn there.{own}{missed}"
-    )
+    itself = any(one.look.label == reference["method"] for one in every)
+    return summary["conclusions"][scene], reference, itself, failures
 
 
-def figure_for(scene: str, title: str) -> Illustration:
+def methods_on(scene: str) -> Illustration:
     """The figure of one scene."""
     need = Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"it did not measure the scene {scene}")
-    seen = (
-        "Two plots of error on logarithmic axes, against run time and against evaluations of the right-hand side: "
-        "a falling line for each method."
-    )
-    return Illustration(
-        f"accuracy-{scene}", title, (need,), partial(say_methods, scene), partial(plot_methods, scene), seen=seen
-    )
+    plot, told = partial(plot_methods, scene), partial(tell_methods, scene)
+    return Illustration(f"accuracy-{scene}", (need,), plot, told, words="accuracy", scene=scene)
 
 
-ACCURACY = (
-    figure_for("rigid", "Error against run time: the rigid model"),
-    figure_for("contact", "Error against run time: the contact model"),
-    figure_for("contact-near-rigid", "Error against run time: contact near the rigid limit"),
-)
+ACCURACY = tuple(methods_on(scene) for scene in ("rigid", "contact", "contact-near-rigid"))
 
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
-ENGINE_VARIABLES = (
-    "scene",
-    "engine",
-    "experiment",
-    "integrator",
-    "start",
-    "step_s",
-    "error",
-    "wall_s",
-    "period_s",
-    "outcome",
-)
+OF_A_SERIES = ("step_s", "error", "wall_s", "period_s", "outcome")
+ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *OF_A_SERIES)
 COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
 OTHER_ENGINES = (ORANGE, PURPLE, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
@@ -240,7 +213,7 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Engine
     for number, key in enumerate(keys):
         mine = here & (engine == key[0]) & (name == key[1]) & (rows["start"] == 1.0)
         place = [before for before, _ in keys[:number]].count(key[0])
-        yield EngineSeries(*key, place, {variable: rows[variable][mine] for variable in ENGINE_VARIABLES})
+        yield EngineSeries(*key, place, {variable: rows[variable][mine] for variable in OF_A_SERIES})
 
 
 def plot_errors(scene: str, results: Results) -> Figure:
@@ -254,10 +227,8 @@ def plot_errors(scene: str, results: Results) -> Figure:
         few_ticks(axes)
         decades(axes)
         axes.set_xlabel("run time (s)")
-    left.set_ylabel("error of the end state (SI)")
-    right.set_ylabel("difference of the step period (s)")
-    left.set_title("(a) ADAMS's law in each integrator")
-    right.set_title("(b) each engine's own contact")
+    left.set(ylabel="error of the end state (SI)", title="(a) ADAMS's law in each integrator")
+    right.set(ylabel="difference of the step period (s)", title="(b) each engine's own contact")
     legend_above(figure, [one.line for one in (*same, *own) if np.isfinite(one.runs["error"]).any()])
     return figure
 
@@ -295,33 +266,22 @@ def plot_periods(scene: str, results: Results) -> Figure:
         level, look = reference["rigid_period_s"], RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
         levels.append(axes.axhline(level, **look, label="rigid gait"))
     few_ticks(axes)
-    axes.set_xlabel("step size (s)")
-    axes.set_ylabel("period of the last step (s)")
+    axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
     legend_above(figure, [*levels, *(one.line for one in every if one.walked.any())])
     return figure
 
 
-def caption_errors(scene: str, results: Results) -> str:
-    """The conclusion on the same law."""
+def tell_errors(scene: str, results: Results) -> tuple[Any, ...]:
+    """The reference, and the conclusion on the same law."""
     summary = results[ENGINES_STAGE].summary
-    reference = summary["reference"][scene]
-    return (
-        f"{scene}: (a) the same law in every integrator, its end state after {reference['until_s']:.3g} s against "
-        f"walkerlab's own at tight tolerance, which two methods agree on to {reference['agreement']:.1e}; (b) own "
-        f"contact, the last of ten steps. Runs that ended otherwise are left out. "
-        f"{summary['conclusions'][scene][SAME_LAW]}"
-    )
+    return summary["reference"][scene], summary["conclusions"][scene][SAME_LAW]
 
 
-def caption_periods(scene: str, results: Results) -> str:
-    """The conclusion on own contacts, with what did not walk to the end."""
-    failed = [
-        f"{one.label} at {', '.join(f'{step:.3g}' for step in one.runs['step_s'][~one.walked])} s"
-        for one in engines_of(scene, OWN_LAW, results)
-        if not one.walked.all()
-    ]
-    missed = f" Not walked to the end: {'; '.join(failed)}." if failed else ""
-    return f"{scene}: {results[ENGINES_STAGE].summary['conclusions'][scene][OWN_LAW]}{missed}"
+def tell_periods(scene: str, results: Results) -> tuple[Any, ...]:
+    """The conclusion on own contacts, and the steps of what did not walk to the end."""
+    every = engines_of(scene, OWN_LAW, results)
+    failed = [(one.label, one.runs["step_s"][~one.walked]) for one in every if not one.walked.all()]
+    return results[ENGINES_STAGE].summary["conclusions"][scene][OWN_LAW], failed
 
 
 @dataclass(frozen=True)
@@ -338,28 +298,18 @@ class SceneNeed(Need):
         return missing
 
 
-def figures_for(scene: str) -> tuple[Illustration, Illustration]:
+def engines_on(scene: str) -> tuple[Illustration, Illustration]:
     """The figures of one scene."""
     need = SceneNeed(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
-    return (
-        Illustration(
-            f"engines-errors-{scene}",
-            f"Other engines, {scene}: error against run time",
-            (need,),
-            partial(caption_errors, scene),
-            partial(plot_errors, scene),
-        ),
-        Illustration(
-            f"engines-periods-{scene}",
-            f"Other engines, {scene}: step period with their own contact",
-            (need,),
-            partial(caption_periods, scene),
-            partial(plot_periods, scene),
-        ),
-    )
+
+    def one(about: str, plot: Any, tell: Any) -> Illustration:
+        made = partial(plot, scene), partial(tell, scene)
+        return Illustration(f"engines-{about}-{scene}", (need,), *made, words=f"engines-{about}", scene=scene)
+
+    return one("errors", plot_errors, tell_errors), one("periods", plot_periods, tell_periods)
 
 
-ENGINES = (*figures_for("compass"), *figures_for("kneed"))
+ENGINES = (*engines_on("compass"), *engines_on("kneed"))
 
 ALIGNED, VELOCITY, RAW = "angle_error_rad", "velocity_error_rad_s", "raw_angle_error_rad"
 NUMERICAL, WALL = "numerical_time_s", "wall_s"
@@ -389,8 +339,7 @@ def plot_limit(results: Results) -> Figure:
         draw_limit(axes, rows)
         if redoes_the_paper(results):
             axes.axhline(ANGLE_ERROR.value, color=BLACK, linestyle=CLAIM, linewidth=1.0)
-        axes.set_title(title)
-        axes.set_xlabel("run time of the walk (s)")
+        axes.set(title=title, xlabel="run time of the walk (s)")
     both[0].set_ylabel("error")
     key: list[Artist] = [entry(look.label, **look.line, marker=look.marker, markersize=4) for _, look in ERRORS]
     if redoes_the_paper(results):
@@ -415,28 +364,14 @@ def draw_limit(axes: Axes, rows: Group) -> None:
         axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
         if name != NUMERICAL:
             axes.plot(rows[WALL][:1], values[:1], "o", markersize=9, color=BLACK, fillstyle="none")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
 
 
-def say_limit(results: Results) -> str:
-    """What the config's contact and the most rigid one amount to."""
-    found = limits(results)
-    rows = found[0][0]
-    point = "" if len(found) == 1 else f", and by {found[1][0][ALIGNED][-1]:.2g} rad with point feet besides"
-    paper = f" The paper claims about {ANGLE_ERROR.text}." if redoes_the_paper(results) else ""
-    return (
-        f"Largest difference from the rigid walk as stiffness, damping and stiction velocity are led to the rigid "
-        f"limit together: in phase, between impacts, angles differ by {rows[ALIGNED][0]:.2g} rad with the config's "
-        f"contact, by {rows[ALIGNED][-1]:.2g} rad with the most rigid one{point}.{paper}"
-    )
+def tell_limit(results: Results) -> tuple[Any, ...]:
+    """What the config's contact and the most rigid one amount to, with point feet besides, and the paper's claim."""
+    errors = [rows[ALIGNED] for rows, _ in limits(results)]
+    point_feet = errors[1][-1] if len(errors) > 1 else None
+    return errors[0][0], errors[0][-1], point_feet, ANGLE_ERROR.text if redoes_the_paper(results) else ""
 
 
-FIGURE_12 = paper_figure(
-    12,
-    "What the rigid limit takes",
-    LIMIT,
-    say_limit,
-    plot_limit,
-    "Error against run time on logarithmic axes, for feet as they are and, where they are small balls, for points.",
-)
+FIGURE_12 = paper_figure(12, LIMIT, plot_limit, tell_limit)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -139,13 +139,16 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
     return ((model, group) for model, group in found if group is not None)
 
 
+def model_entries(drawn: Sequence[DrawnBranch], **look: Any) -> list[Artist]:
+    """What the legend has of the models whose branches are drawn."""
+    models = {branch.model for branch in drawn}
+    return [entry(f"{model} model", color=colour, **look) for model, colour in MODELS.items() if model in models]
+
+
 def key_of(results: Results, kinds: set[str]) -> list[Artist]:
     """What the legend has; kinds of the bifurcations that are drawn."""
     drawn = list(branches_of(results))
-    models = {branch.model for branch in drawn}
-    found: list[Artist] = [
-        entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in MODELS.items() if model in models
-    ]
+    found = model_entries(drawn, linewidth=1.5)
     if any(branch.colour == OTHER for branch in drawn):
         found.append(entry("other gaits", color=OTHER, linewidth=1.0))
     found.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
@@ -223,23 +226,11 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     return float(values.min()) - room, float(values.max()) + room
 
 
-def say_branches(results: Results) -> str:
-    """How far gaits are stable, and where they change."""
+def tell_branches(results: Results) -> tuple[Any, ...]:
+    """Where the model's gaits of one step change, where cascades accumulate, and the unit of both."""
     summary = results[STAGE].summary
-    unit = f" {summary['unit']}" if summary["unit"] not in ("", "1") else ""
-    said = ["Gaits over the parameter: solid where small disturbances die out, dashed where they grow."]
-    said += [
-        f"The {model} model's gait of one step first doubles its period at {first:.6g}{unit}."
-        for model, first in summary["first_doubling"].items()
-    ]
-    said += [
-        f"A cascade of the {cascade['model']} model from {cascade['flips'][0]:.6g}{unit} on accumulates at "
-        f"{cascade['accumulates_at']:.6g}{unit}, the last ratio of its flips' distances being "
-        f"{cascade['ratios'][-1]:.4g}."
-        for cascade in summary["cascades"]
-        if cascade["period"] == 1 and "accumulates_at" in cascade
-    ]
-    return " ".join(said)
+    cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
+    return summary["first_doubling"], cascades, "" if summary["unit"] == "1" else summary["unit"]
 
 
 FARTHEST: Final = 1.6
@@ -252,53 +243,35 @@ def plot_multipliers(results: Results) -> Figure:
     left, right = figure.subplots(1, 2)
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
     for branch in drawn:
-        in_the_plane(left, branch)
-        over_the_parameter(right, branch)
+        draw_multipliers(left, right, branch)
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
-    left.set_xlim(-FARTHEST, FARTHEST)
-    left.set_ylim(-FARTHEST, FARTHEST)
-    left.set_aspect("equal")
-    left.set_xlabel("real part")
-    left.set_ylabel("imaginary part")
-    left.set_title("(a) in the complex plane")
+    left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
+    left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
-    right.set_ylim(0.0, 2.0 * FARTHEST)
-    right.set_xlabel(label_of(results))
-    right.set_ylabel("magnitude")
-    right.set_title("(b) over the parameter")
-    models = {branch.model for branch in drawn}
-    shown = {model: colour for model, colour in MODELS.items() if model in models}
-    handles = [entry(f"{model} model", color=colour, marker="o", markersize=3) for model, colour in shown.items()]
+    right.set(xlabel=label_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter")
+    handles = model_entries(drawn, marker="o", markersize=3)
     end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
     legend_above(figure, [*handles, end])
     return figure
 
 
-def in_the_plane(axes: Axes, branch: DrawnBranch) -> None:
-    """Every multiplier along the branch, its last place marked."""
+def draw_multipliers(plane: Axes, over: Axes, branch: DrawnBranch) -> None:
+    """Every multiplier along the branch, its last place marked; magnitudes, largest first, so that each is a line."""
     real, imag = branch.group["multiplier_real"], branch.group["multiplier_imag"]
-    axes.plot(real.ravel(), imag.ravel(), linestyle="none", marker="o", markersize=1.6, color=branch.colour)
+    dots: dict[str, Any] = {"color": branch.colour, "marker": "o", "markersize": 1.6}
+    plane.plot(real.ravel(), imag.ravel(), linestyle="none", **dots)
     last = int(np.argmax(branch.group["value"]))
-    axes.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
+    plane.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
+    over.plot(branch.group["value"], np.hypot(real, imag), linewidth=1.0, **dots)
 
 
-def over_the_parameter(axes: Axes, branch: DrawnBranch) -> None:
-    """Magnitudes, largest first, so that each is a line."""
-    size = np.hypot(branch.group["multiplier_real"], branch.group["multiplier_imag"])
-    axes.plot(branch.group["value"], size, color=branch.colour, linewidth=1.0, marker="o", markersize=1.6)
-
-
-def say_multipliers(results: Results) -> str:
-    """What the largest multipliers are where the span begins and ends."""
-    said = ["Multipliers of the step map along the gaits of one step; inside the circle a disturbance dies out."]
-    summary = results[STAGE].summary
-    alone = [one for one in summary["bifurcations"] if one["period"] == 1]
-    for model, kind in dict.fromkeys((one["model"], one["kind"]) for one in alone):
-        values = [one["value"] for one in alone if (one["model"], one["kind"]) == (model, kind)]
-        *others, last = [f"{value:.6g}" for value in sorted(values)]
-        at = f"{', '.join(others)} and {last}" if others else last
-        said.append(f"The {model} model has {f'a {kind}' if len(values) == 1 else f'{kind}s'} at {at}.")
-    return " ".join(said)
+def tell_multipliers(results: Results) -> tuple[Any, ...]:
+    """Where gaits of one step bifurcate, by model and kind."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for one in results[STAGE].summary["bifurcations"]:
+        if one["period"] == 1:
+            found.setdefault((one["model"], one["kind"]), []).append(one["value"])
+    return ({which: sorted(values) for which, values in found.items()},)
 
 
 CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
@@ -360,47 +333,17 @@ def draw_curves(axes: Axes, drawn: list[tuple[str, Group]]) -> list[Artist]:
     ]
 
 
-def say_plane(results: Results) -> str:
+def tell_plane(results: Results) -> tuple[Any, ...]:
     """What the curves divide, and how much of the plane walks."""
     drawn = curves(results)
     kinds = sorted({str(group.attrs["kind"]) for _, group in drawn}, key=list(MARKS).index)
-    models = " and ".join(model for model in CURVE_COLOURS if any(model == one for one, _ in drawn))
-    said = [
-        f"Curves of {' and '.join(f'{kind}s' for kind in kinds)} of the {models} model's gaits over two parameters."
-    ]
+    models = [model for model in CURVE_COLOURS if any(model == one for one, _ in drawn)]
     regions = results[STAGE].groups.get("rigid/regions")
-    if regions is not None:
-        shares = ", ".join(f"{name} in {100.0 * where.mean():.3g} %" for _, name, where in region_kinds(regions))
-        said.append(
-            "Shaded: what walks of the rigid model settle on, led from cell to cell from the gait of one step: "
-            f"{shares} of the plane."
-        )
-    return " ".join(said)
+    shares = [] if regions is None else [(name, where.mean()) for _, name, where in region_kinds(regions)]
+    return kinds, models, shares
 
 
-FIGURE_13 = paper_figure(
-    13,
-    "Families of gaits over a parameter",
-    (NEED,),
-    say_branches,
-    plot_branches,
-    "Step period and stance angle of gaits over the parameter: stable branches solid, unstable ones "
-    "dashed, bifurcations marked; both models where both were followed.",
-)
-FIGURE_14 = paper_figure(
-    14,
-    "Multipliers over a parameter",
-    (NEED,),
-    say_multipliers,
-    plot_multipliers,
-    "Multipliers of the gaits, in the complex plane with the unit circle and as magnitudes over the parameter.",
-)
-FIGURE_16 = paper_figure(
-    16,
-    "Where gaits change, over two parameters",
-    (CURVES_NEED,),
-    say_plane,
-    plot_plane,
-    "A plane of two parameters, shaded by what walks settle on, with the curves of flips and folds between.",
-)
+FIGURE_13 = paper_figure(13, (NEED,), plot_branches, tell_branches)
+FIGURE_14 = paper_figure(14, (NEED,), plot_multipliers, tell_multipliers)
+FIGURE_16 = paper_figure(16, (CURVES_NEED,), plot_plane, tell_plane)
 FIGURES = (FIGURE_13, FIGURE_14, FIGURE_16)

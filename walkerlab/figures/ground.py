@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -61,20 +61,16 @@ def plot_forces(results: Results) -> Figure:
         (normal, NORMAL, "normal force", "(a) normal force"),
         (friction, FRICTION, "friction", "(b) friction, downhill positive"),
     ):
-        axes.set_ylabel(walk.label(words, name))
-        axes.set_title(title)
-        axes.set_xlim(0.0, float(walk.time[-1]))
+        axes.set(ylabel=walk.label(words, name), title=title, xlim=(0.0, float(walk.time[-1])))
     normal.set_ylim(-0.03 * top, top)
     friction.sharex(normal)
     friction.set_xlabel("time (s)")
     normal.tick_params(labelbottom=False)
     reach = 1.1 * max(float(np.abs(walk[FRICTION][walk[NORMAL] < top]).max()), 1e-9)
     friction.set_ylim(-reach, reach)
-    cone.set_xlim(0.0, top)
-    cone.set_ylim(-max(reach, 0.6 * steepest * top), max(reach, 0.6 * steepest * top))
-    cone.set_xlabel(walk.label("normal force", NORMAL))
-    cone.set_ylabel(walk.label("friction", FRICTION))
-    cone.set_title("(c) against the friction cone")
+    wide = max(reach, 0.6 * steepest * top)
+    cone.set(xlabel=walk.label("normal force", NORMAL), ylabel=walk.label("friction", FRICTION))
+    cone.set(xlim=(0.0, top), ylim=(-wide, wide), title="(c) against the friction cone")
     legs: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
     cones = [entry(label, color=BLACK, linewidth=1.0, linestyle=style) for label, style, _ in cone_of(results)]
     legend_above(figure, [*legs, *cones])
@@ -108,17 +104,13 @@ def in_sight(walk: Walk) -> float:
     return 1.1 * float(np.quantile(load, OF_SAMPLES)) if load.size else 1.0
 
 
-def say_forces(results: Results) -> str:
-    """What is shown, how steep the force gets, and how large an impact's is."""
+def tell_forces(results: Results) -> tuple[Any, ...]:
+    """How many strides are shown if not all, how steep the force gets, and how large an impact's is."""
     walk = walk_of(results[CONTACT_STAGE], CONTACT)
     shown, load = walk.first(STRIDES), walk[NORMAL]
     borne = load > 0.1 * float(np.median(load.max(axis=1)))
     ratio = float((np.abs(walk[FRICTION][borne]) / load[borne]).max()) if borne.any() else 0.0
-    extent = "" if shown is walk else f" over the first {STRIDES} strides"
-    return (
-        f"Forces of the contact model's ground on both feet{extent}. Where a foot bears a tenth of the weight or more, "
-        f"friction is at most {ratio:.3g} of the normal force; impacts, which are cut off, reach {load.max():.4g} N."
-    )
+    return 0 if shown is walk else STRIDES, ratio, load.max()
 
 
 def losses(walk: Walk) -> dict[tuple[str, str], Array]:
@@ -142,41 +134,19 @@ def plot_losses(results: Results) -> Figure:
         axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
         below += lost[: steps.size]
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("step number (1)")
-    axes.set_ylabel("energy lost (J)")
+    axes.set(xlabel="step number (1)", ylabel="energy lost (J)")
     legend_above(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
     return figure
 
 
-def say_losses(results: Results) -> str:
-    """How much a step loses, and to what."""
+def tell_losses(results: Results) -> tuple[Any, ...]:
+    """How much a step loses (J), and to what."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
-    later = {label: lost[min(1, lost.size - 1) :] for (label, _), lost in found.items()}
-    total = sum(float(lost.mean()) for lost in later.values())
-    parts = ", ".join(
-        f"{100.0 * float(lost.mean()) / (total or 1.0):.3g} % to {label}" for label, lost in later.items()
-    )
-    return (
-        "Energy that the contact model loses in each step; an impact counts to the step that it begins, so that the "
-        f"first has none. The others lose {total:.4g} J in the mean: {parts}."
-    )
+    later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
+    return later, sum(later.values())
 
 
 FIGURES = (
-    Illustration(
-        "ground-forces",
-        "Forces of the ground and the friction cone",
-        (FORCES,),
-        say_forces,
-        plot_forces,
-        seen="Two plots over time, one force above the other, and beside them friction against normal force in a cone.",
-    ),
-    Illustration(
-        "energy-lost",
-        "Energy lost step by step",
-        (ENERGY, STEPS_TAKEN_CONTACT),
-        say_losses,
-        plot_losses,
-        seen="A bar for each step, divided by what took the energy.",
-    ),
+    Illustration("ground-forces", (FORCES,), plot_forces, tell_forces),
+    Illustration("energy-lost", (ENERGY, STEPS_TAKEN_CONTACT), plot_losses, tell_losses),
 )

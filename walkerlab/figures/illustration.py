@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from walkerlab.figures.canvas import as_file, settle, styled
 from walkerlab.figures.style import POINT
+from walkerlab.prose import Prose, f, percent
 from walkerlab.store.artifact import Stored
+
+WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
 
 Results = Mapping[str, Stored]
 """Results by the name of their stage."""
@@ -50,22 +55,40 @@ class Drawing:
 class Illustration:
     """An illustration drawn from stored results.
 
-    name     of its files, without suffix
-    title    a few words, without a full stop
-    needs    what it cannot be drawn without; what else is there is drawn too
-    caption  one or two sentences with numbers of the results
-    plot     the figure; called within the common style
-    number   the paper's; None if the paper has no such figure
-    seen     what one sees, in a sentence or two, for those who do not see it
+    name    of its files, without suffix
+    needs   what it cannot be drawn without; what else is there is drawn too
+    plot    the figure; called within the common style
+    told    what the caption's template takes of the results
+    number  the paper's; None if the paper has no such figure
+    words   file in `words/` with its title, its caption and what one sees; the figure's name if empty
+    scene   what those words are about, if a file serves several figures
     """
 
     name: str
-    title: str
     needs: tuple[Need, ...]
-    caption: Callable[[Results], str]
     plot: Callable[[Results], Figure]
+    told: Callable[[Results], tuple[Any, ...]]
     number: int | None = None
-    seen: str = ""
+    words: str = ""
+    scene: str = ""
+
+    def say(self, what: str, *values: Any) -> str:
+        """A paragraph of its words."""
+        return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
+
+    @property
+    def title(self) -> str:
+        """A few words, without a full stop."""
+        return self.say("title")
+
+    @property
+    def seen(self) -> str:
+        """What one sees, in a sentence or two, for those who do not see it; may be empty."""
+        return self.say("seen")
+
+    def caption(self, results: Results) -> str:
+        """One or two sentences with numbers of the results."""
+        return self.say("caption", *self.told(results))
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -107,12 +130,7 @@ class Illustration:
 
 
 def paper_figure(
-    number: int,
-    title: str,
-    needs: tuple[Need, ...],
-    caption: Callable[[Results], str],
-    plot: Callable[[Results], Figure],
-    seen: str,
+    number: int, needs: tuple[Need, ...], plot: Callable[[Results], Figure], told: Callable[[Results], tuple[Any, ...]]
 ) -> Illustration:
     """A figure of the paper, drawn anew."""
-    return Illustration(f"figure-{number:02d}", title, needs, caption, plot, number, seen)
+    return Illustration(f"figure-{number:02d}", needs, plot, told, number)

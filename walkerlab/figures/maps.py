@@ -108,8 +108,7 @@ def plot_starts(results: Results) -> Figure:
     swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
     for axes, (outcome, steps, title) in zip(both, MODELS, strict=True):
         seen |= draw_starts(axes, cells, outcome, steps)
-        axes.set_title(title)
-        axes.set_xlabel(f"factor on the velocity of {swing}")
+        axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
     marks = [mark for axes in both for mark in draw_marks(axes, cells)]
     unique = {str(mark.get_label()): mark for mark in marks}
@@ -141,42 +140,20 @@ def draw_marks(axes: Axes, cells: Group) -> list[Line2D]:
             [where[0]], [where[1]], linestyle="", marker=marker, markersize=size, color=BLACK, markerfacecolor=face,
             label=label, zorder=5,
         )  # fmt: skip
-    axes.set_xlim(cells[SWING][0], cells[SWING][-1])
-    axes.set_ylim(cells[STANCE][0], cells[STANCE][-1])
+    axes.set(xlim=cells[SWING][[0, -1]], ylim=cells[STANCE][[0, -1]])
     return drawn
 
 
-def say_starts(results: Results) -> str:
-    """How many starts walk, and where the paper's own lies."""
-    summary = results[TUNE_STAGE].summary
-    cells, wanted = summary["map"], results[TUNE_STAGE]["map"].attrs["steps_wanted"]
-    rigid = cells["rigid"].get("walked", 0) / cells["cells"]
-    return (
-        f"How walks of {wanted} steps end when the velocities of the rigid start are scaled: of {cells['cells']} "
-        f"starts {100 * cells['walks_share']:.3g} % walk and settle in the contact model, {100 * rigid:.3g} % walk in "
-        f"the rigid one. "
-        f"Thin lines separate 1, 2, 3 and 5 steps.{papers_start(results)}"
-    )
+def tell_starts(results: Results) -> tuple[Any, ...]:
+    """How many starts walk, and the factors at which the paper's own would lie; none of these for another scene."""
+    result = results[TUNE_STAGE]
+    coordinates = ("dtheta_1", "dtheta_2") if redoes_the_paper(results) else ()
+    rows = [result.summary["table2"][name] for name in coordinates]
+    paper = [abs(row["paper_adams"] / row["ours_rigid"]) for row in rows]
+    return result.summary["map"], result["map"].attrs["steps_wanted"], paper
 
 
-def papers_start(results: Results) -> str:
-    """Where the paper's start would lie; nothing for another scene."""
-    if not redoes_the_paper(results):
-        return ""
-    table = results[TUNE_STAGE].summary["table2"]
-    factors = [abs(table[name]["paper_adams"] / table[name]["ours_rigid"]) for name in ("dtheta_1", "dtheta_2")]
-    return f" The paper's ADAMS start would lie at {factors[0]:.3g} and {factors[1]:.3g}."
-
-
-FIGURE_11 = paper_figure(
-    11,
-    "Starts that walk",
-    (MAP,),
-    say_starts,
-    plot_starts,
-    "Two maps of scaled starts, one a model, coloured by how the walk from each ends, with marks for the rigid start, "
-    "the adjusted one and the contact gait.",
-)
+FIGURE_11 = paper_figure(11, (MAP,), plot_starts, tell_starts)
 
 BASIN: Final = "basin"
 CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no start was walked")
@@ -189,7 +166,7 @@ NO_ATTRACTOR: Final = -1
 def plot_basins(results: Results) -> Figure:
     """Attractors and failures by colour on the left, steps to settle by brightness on the right."""
     cells = results[BASIN]["basin"]
-    across, up = plane_of(results)[:2]
+    across, up = (str(name) for name in results[BASIN].summary["plane"][:2])
     figure = blank(3.9)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     patches = draw_kinds(partial(draw_plane, left, cells, (across, up)), kinds_of_fates(cells, results[BASIN].summary))
@@ -211,11 +188,6 @@ def plot_basins(results: Results) -> Figure:
         axes.set_xlabel(axis_of(cells, across))
     legend_above(figure, [*patches, marks[0]])
     return figure
-
-
-def plane_of(results: Results) -> list[str]:
-    """The coordinates of the grid."""
-    return [str(name) for name in results[BASIN].summary["plane"]]
 
 
 def slice_of(values: NDArray[Any]) -> NDArray[Any]:
@@ -265,44 +237,19 @@ def mark_gait(axes: Axes, cells: Group, plane: tuple[str, str]) -> Line2D:
         [place[0]], [place[1]], linestyle="", marker="o", markersize=4.5, color=BLACK, markerfacecolor=WHITE,
         label="rigid gait of one step",
     )  # fmt: skip
-    axes.set_xlim(*sides_of(cells[plane[0]]))
-    axes.set_ylim(*sides_of(cells[plane[1]]))
+    axes.set(xlim=sides_of(cells[plane[0]]), ylim=sides_of(cells[plane[1]]))
     return mark
 
 
-def say_basins(results: Results) -> str:
-    """What is walked, and how much of the window walks."""
+def tell_basins(results: Results) -> tuple[Any, ...]:
+    """What is walked, how much of the window walks, and to which attractors."""
     summary = results[BASIN].summary
-    cells = " x ".join(f"{number:,}" for number in summary["cells"])
-    held = ", ".join(f"{name} = {value:.4g} rad/s" if name != "theta_2" else f"{name} = {value:.4g} rad"
-                     for name, value in summary["held"].items())  # fmt: skip
-    said = [
-        f"Walks of the {summary['model']} model from {cells} starts just after heel strike"
-        f"{f', {held}' if held else ', of which the middle plane is shown'}: "
-        f"{100.0 * summary['share_walking']:.3g} % of the window walk, and "
-        f"{100.0 * summary['share_walking_gaussian']:.3g} % of a normal distribution whose three standard deviations "
-        "fill it."
-    ]
-    said += [
-        f"The {attractor_name(number, summary['attractors'])} is reached from {row['cells']:,} cells, after "
-        f"{row['median_steps_to_settle']:.3g} steps in the median."
-        for number, row in enumerate(summary["attractors"])
-        if row["cells"]
-    ]
-    if summary["unsettled_cells"]:
-        unsettled, steps = summary["unsettled_cells"], summary["steps_wanted"]
-        said.append(f"{unsettled:,} cells still walk after {steps} steps and have settled on no gait.")
-    return " ".join(said)
+    attractors = summary["attractors"]
+    reached = [(attractor_name(number, attractors), row) for number, row in enumerate(attractors) if row["cells"]]
+    return summary, reached
 
 
-FIGURE_15 = paper_figure(
-    15,
-    "Basins of attraction",
-    (CELLS,),
-    say_basins,
-    plot_basins,
-    "The window of starts, each cell coloured by what becomes of its walk.",
-)
+FIGURE_15 = paper_figure(15, (CELLS,), plot_basins, tell_basins)
 
 MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
@@ -376,11 +323,8 @@ def panels(figure: Figure, cells: Group, up: str) -> tuple[Axes, Axes]:
     """Two panels over stiffness."""
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes in (left, right):
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_xlim(*edges(cells[STIFFNESS])[[0, -1]])
-        axes.set_ylim(*edges(cells[up])[[0, -1]])
-        axes.set_xlabel(axis_of(cells, STIFFNESS))
+        axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS))
+        axes.set(xlim=edges(cells[STIFFNESS])[[0, -1]], ylim=edges(cells[up])[[0, -1]])
         axes.xaxis.set_major_locator(LogLocator(numticks=7))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_minor_locator(NullLocator())
@@ -409,54 +353,16 @@ def overlay(axes: Axes, cells: Group, up: str, mask: NDArray[np.bool_], colour: 
         draw_over_stiffness(axes, cells, up, shown, cmap=ListedColormap([colour]))
 
 
-def caption_stiction(results: Results) -> str:
+def tell_maps(which: str, results: Results) -> tuple[Any, ...]:
     """What is walked, and how many cells come out how."""
-    summary, cells = results[MAPS].summary, results[MAPS]["stiction"]
-    compared = summary["median_error"] is not None
-    otherwise = summary["ends_otherwise_sharper"]
-    sizes = f"{summary['median_error']:.0e} in the median, {summary['largest_error']:.0e} at most; " if compared else ""
-    return (
-        f"{cells.attrs['steps_wanted']} steps of the paper's walk by the default method, at most "
-        f"{cells.attrs['budget']:,} right-hand sides, over the ground's stiffness and the stiction velocity (friction "
-        f"velocity ten times that), all else the paper's: {counted(summary['outcomes'])}. (b) Difference of touches "
-        "and end from a run at a tolerance ten times tighter, in legs, radians and pendulum times: "
-        f"{sizes}{otherwise} cells end otherwise there."
-    )
-
-
-def caption_step(results: Results) -> str:
-    """What is walked, and how many cells come out how."""
-    summary, cells = results[MAPS].summary, results[MAPS]["step"]
-    return (
-        f"{cells.attrs['steps_wanted']} steps of the paper's walk by semi-implicit Euler, as game engines integrate, "
-        "over the ground's stiffness and the step, all else the paper's, against our implicit method at a sharp "
-        f"tolerance: {counted(summary['fixed_step'])}. Fine is an error of the state at the end below "
-        f"{cells.attrs['fine']:g} legs, radians and pendulum times; black cells run away."
-    )
-
-
-def counted(cells: Mapping[str, int]) -> str:
-    """Cells by name."""
-    return ", ".join(f"{name} {many}" for name, many in cells.items()) + " cells"
+    return results[MAPS].summary, results[MAPS][which].attrs
 
 
 NEVER = "it has no such map"
+STICTION_NEED = Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER)
+STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER)
 STABILITY = (
-    Illustration(
-        "stability-stiction",
-        "Stability over stiffness and stiction velocity",
-        (Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER),),
-        caption_stiction,
-        plot_stiction,
-        seen="A map of small squares, coloured by how each walk ended, and one of its error.",
-    ),
-    Illustration(
-        "stability-step",
-        "Stability over stiffness and step size",
-        (Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER),),
-        caption_step,
-        plot_step,
-        seen="A map of small squares, coloured by what became of each walk with a fixed step, and one of its error.",
-    ),
+    Illustration("stability-stiction", (STICTION_NEED,), plot_stiction, partial(tell_maps, "stiction")),
+    Illustration("stability-step", (STEP_NEED,), plot_step, partial(tell_maps, "step")),
 )
 FIGURES = (FIGURE_11, FIGURE_15)

@@ -39,18 +39,16 @@ def trajectory(results: Mapping[str, Content], stage: str) -> Group | None:
     return results[stage].groups.get("trajectory") if stage in results else None
 
 
-def drawn(
-    shown: list[str], runs: tuple[Mapping[str, Content], Mapping[str, Content]], names: tuple[str, str]
-) -> Figure:
+def drawn(shown: list[str], runs: tuple[Mapping[str, Content], ...], names: tuple[str, str]) -> Figure:
     """A column for each walk, a row for angles and one for the energy."""
     figure = blank(0.5 + 1.9 * len(ROWS))
     axes = figure.subplots(len(ROWS), len(shown), sharex="col", sharey="row", squeeze=False)
+    for (first, *_), (_, label) in zip(axes, ROWS, strict=True):
+        first.set_ylabel(label)
     for column, stage in enumerate(shown):
         axes[0][column].set_title(stage)
         axes[-1][column].set_xlabel("time (s)")
-        for row, (variable, label) in enumerate(ROWS):
-            if column == 0:
-                axes[row][column].set_ylabel(label)
+        for row, (variable, _) in enumerate(ROWS):
             for run, look in zip(runs, LOOKS, strict=True):
                 group = trajectory(run, stage)
                 if group is not None and variable in group.variables:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
@@ -47,6 +47,7 @@ ARC_MIDDLE = np.zeros(1)
 """How much of a sole's arc is drawn, rad from the leg's line."""
 SMALL_FOOT = 0.01
 """Radius of a sole, in leg lengths, below which it is a point to the eye."""
+AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 SHAPE = 0.68
 """Height of the axes in parts of their width, unless the walker is taller or longer."""
 
@@ -176,19 +177,20 @@ def framed(sticks: Sticks) -> tuple[Figure, Axes]:
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
     points = sticks.in_plane(seen).reshape(-1, 2)
-    length = sticks.leg_length
-    left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
-    right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
+    left, bottom, right, top = surrounding(points, sticks.leg_length)
     widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(1.05 + (WIDTH - 0.7) * (top - bottom) / (right - left))
     axes = figure.add_subplot()
-    axes.set_aspect("equal")
-    axes.set_xlim(left, right)
-    axes.set_ylim(bottom, top)
-    axes.set_xlabel("horizontal position (m)")
-    axes.set_ylabel("height (m)")
+    axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
     return figure, axes
+
+
+def surrounding(points: Array, length: float) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of what is in sight around points (points, 2); m."""
+    left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
+    right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
+    return left, bottom, right, top
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
@@ -252,26 +254,18 @@ def entries(sticks: Sticks) -> list[Artist]:
     return [*legs, strike, between, hip, *torso]
 
 
-def cycle_caption(sticks: Sticks) -> str:
-    """How long the steps of the cycle take and how far they go."""
+def tell_cycle(sticks: Sticks) -> tuple[Any, ...]:
+    """How long the steps of the cycle take and how far they go, whether it was completed, and what is drawn."""
     strikes = sticks.strikes[:CYCLE]
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
-    measures = ", ".join(f"{period:.4g} s and {length:.4g} m" for period, length in steps)
-    unfinished = "" if strikes.size == CYCLE else "; the cycle was not completed"
-    torso = "" if sticks.head is None else ", the torso up to its centre of mass"
-    return f"Steps of {measures}{unfinished}; legs are drawn thick where a foot comes down{torso}."
+    return list(steps), strikes.size == CYCLE, sticks.head is not None
 
 
-SEEN = "Legs as lines from the hip to the feet, fanned out from one foothold to the next, "
 TERRAIN = "terrain"
 PAD_HEIGHT = 0.028
 """Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
 HATCHES = ("////", "||||")
 PAD_NAMES = ("pad of leg 1", "pad of leg 2")
-PLANES = {
-    "plane": "on a plane",
-    "after-mid-swing": "on a plane that a swing foot can touch only once it has passed the stance foot",
-}
 
 
 def plot_rigid(results: Results) -> Figure:
@@ -283,9 +277,9 @@ def plot_rigid(results: Results) -> Figure:
     return figure
 
 
-def say_rigid(results: Results) -> str:
+def tell_rigid(results: Results) -> tuple[Any, ...]:
     """The cycle's measures."""
-    return f"One gait cycle of the rigid model, to scale. {cycle_caption(sticks_of(results[RIGID_STAGE]))}"
+    return tell_cycle(sticks_of(results[RIGID_STAGE]))
 
 
 def plot_contact(results: Results) -> Figure:
@@ -319,34 +313,20 @@ def pad_look(leg: int) -> dict[str, Any]:
     return {"facecolor": "white", "edgecolor": LEGS[leg].colour, "hatch": HATCHES[leg], "linewidth": 0.7}
 
 
-def say_contact(results: Results) -> str:
-    """The cycle's measures, and what the ground is."""
+def tell_contact(results: Results) -> tuple[Any, ...]:
+    """The cycle's measures, the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some."""
     result = results[CONTACT_STAGE]
-    asked, sticks = result.identity.config_slice, sticks_of(result)
-    feet = f"round feet of {1e3 * sticks.radius:.3g} mm radius" if sticks.radius else "point feet"
-    on_pads = f"each leg on its own lane of pads laid at {float(result.summary['pitch_m']):.4g} m"
-    ground = on_pads if TERRAIN in result.groups else PLANES[asked["contact"]["terrain"]]
-    return (
-        "One gait cycle of the contact model, to scale but for the feet's marks and the ground's depth: "
-        f"{feet}, {ground}. {cycle_caption(sticks)}"
-    )
+    sticks, terrain = sticks_of(result), result.identity.config_slice["contact"]["terrain"]
+    pitch = result.summary["pitch_m"] if TERRAIN in result.groups else None
+    return *tell_cycle(sticks), sticks.radius, terrain, pitch
 
 
+PLACES = (*STATES, *JOINTS)
 FIGURE_2 = paper_figure(
-    2,
-    "Stick diagram of the rigid model",
-    (Need(RIGID_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), STEPS_TAKEN_RIGID),
-    say_rigid,
-    plot_rigid,
-    f"{SEEN}down the slope to the right.",
+    2, (Need(RIGID_STAGE, TRAJECTORY, PLACES, NO_STATES), STEPS_TAKEN_RIGID), plot_rigid, tell_rigid
 )
 FIGURE_6 = paper_figure(
-    6,
-    "Stick diagram of the contact model",
-    (Need(CONTACT_STAGE, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), STEPS_TAKEN_CONTACT),
-    say_contact,
-    plot_contact,
-    f"{SEEN}and the ground under them.",
+    6, (Need(CONTACT_STAGE, TRAJECTORY, PLACES, NO_STATES), STEPS_TAKEN_CONTACT), plot_contact, tell_contact
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
@@ -373,13 +353,8 @@ def pictures(sticks: Sticks, at: Array) -> Iterator[NDArray[np.uint8]]:
         figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        axes.set_aspect("equal")
-        length = sticks.leg_length
-        points = shown.reshape(-1, 2)
-        axes.set_xlim(points[:, 0].min() - SIDEROOM * length, points[:, 0].max() + SIDEROOM * length)
-        axes.set_ylim(points[:, 1].min() - FOOTROOM * length, points[:, 1].max() + HEADROOM * length)
-        axes.set_xlabel("horizontal position (m)")
-        axes.set_ylabel("height (m)")
+        left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
+        axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
         draw_slope(axes, sticks)
         legs = [axes.plot([], [], color=look.colour, linestyle=look.style, linewidth=2.2)[0] for look in LEGS]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)

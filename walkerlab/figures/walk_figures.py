@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from walkerlab.figures.canvas import blank, entry, legend_above
 from walkerlab.figures.illustration import Need, Results, paper_figure
@@ -18,6 +18,7 @@ from walkerlab.figures.walks import (
     CONTACT_ENERGIES,
     CONTACT_STATES,
     NO_STATES,
+    PAPER_STRIDES,
     RIGID_ENERGIES,
     RIGID_STAGE,
     RIGID_STATES,
@@ -72,29 +73,13 @@ def plot_adjusted(results: Results) -> Figure:
     return figure
 
 
-def say_adjusted(results: Results) -> str:
+def tell_adjusted(results: Results) -> tuple[Any, ...]:
     """What the start was, and how the walk went."""
-    found = results[TUNE_STAGE].summary["adjustment"]
-    extent = shown(adjusted_walks(results))[1]
-    start = (
-        "the rigid start as it stands, since no adjustment is needed"
-        if not found["needed"]
-        else f"the rigid start with velocities scaled by {found['scale_dtheta1']:.4g} and {found['scale_dtheta2']:.4g}"
-    )
-    legs = "links" if redoes_the_procedure(results) else "legs"
-    walked = f"and walks {found['walked_steps']} steps"
-    return f"Angular velocities of both {legs}{extent}; the contact model begins at {start}, {walked}."
+    extent, links = shown(adjusted_walks(results))[1], redoes_the_procedure(results)
+    return results[TUNE_STAGE].summary["adjustment"], extent, links
 
 
-FIGURE_5 = paper_figure(
-    5,
-    "Angular velocities from the adjusted start",
-    (ADJUSTED, FROM_RIGID),
-    say_adjusted,
-    plot_adjusted,
-    "Two plots over time, one a link: each velocity rises to one hump while its leg swings and to a lower "
-    "one while it stands.",
-)
+FIGURE_5 = paper_figure(5, (ADJUSTED, FROM_RIGID), plot_adjusted, tell_adjusted)
 
 STATES_IN_TIME = (
     ("angle", "angle", 0, "(a1) angle of leg 1"),
@@ -114,20 +99,14 @@ def plot_states(results: Results) -> Figure:
     return figure
 
 
-def say_states(results: Results) -> str:
-    """What is shown, and how the walks went."""
-    walks = walks_with(results, RIGID_STATES, CONTACT_STATES)
-    return f"Angles from the vertical and angular velocities of both legs{shown(walks)[1]}. {sentence(walks)}"
+def tell_walks(rigid: Need, contact: Need, strides: int, results: Results) -> tuple[Any, ...]:
+    """How much is shown, and how the walks went."""
+    walks = walks_with(results, rigid, contact)
+    return shown(walks, strides)[1], sentence(walks)
 
 
 FIGURE_7 = paper_figure(
-    7,
-    "Angles and angular velocities of the legs",
-    (RIGID_STATES,),
-    say_states,
-    plot_states,
-    "Four plots over time below one another: angle of each leg, rising fast and falling slowly, and its "
-    "angular velocity.",
+    7, (RIGID_STATES,), plot_states, partial(tell_walks, RIGID_STATES, CONTACT_STATES, PAPER_STRIDES)
 )
 
 AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
@@ -184,46 +163,30 @@ def draw_errors(axes: Axes, results: Results, rigid: Walk, quantity: Quantity, l
     steps = min(rigid.strikes.size, aligned[quantity.aligned].shape[0])
     aligned_error = np.abs(aligned[quantity.aligned][:steps, :, leg])
     line(axes, raw["time"][early], raw_error, AT_SAME_TIME)
-    for time, error in zip(times_of(rigid, aligned["phase"]), aligned_error, strict=False):
-        line(axes, time, error, IN_PHASE)
+    begins = np.concatenate(([0.0], rigid.strikes[:-1]))
+    for begin, end, error in zip(begins, rigid.strikes, aligned_error, strict=False):
+        line(axes, begin + (end - begin) * aligned["phase"], error, IN_PHASE)
     largest, paper = max(float(raw_error.max()), float(aligned_error.max())), quantity.printed.value
     bottom, top = ZERO_CROSSING * largest, ROOM * largest
     if redoes_the_paper(results):
         axes.axhline(paper, **PAPER.line)
         bottom, top = min(paper / ROOM, bottom), max(ROOM * paper, top)
     axes.set_yscale("log", subs=[])
-    axes.set_ylim(bottom, top)
-    axes.set_ylabel(with_unit("error", raw.variables[quantity.raw].units))
+    axes.set(ylim=(bottom, top), ylabel=with_unit("error", raw.variables[quantity.raw].units))
     axes.set_title(f"({quantity.letter}{leg + 1}) {quantity.name} of leg {leg + 1}")
 
 
-def times_of(walk: Walk, phases: Array) -> Array:
-    """Times (steps, phases) at which a walk is at the phases of its steps (s)."""
-    begins = np.concatenate(([0.0], walk.strikes[:-1]))
-    return np.asarray(begins[:, None] + np.outer(walk.strikes - begins, phases))
+def tell_differences(results: Results) -> tuple[Any, ...]:
+    """The largest errors of all that was compared, in both ways, and the paper's."""
+    raw, aligned = results[COMPARE_STAGE][RAW], results[COMPARE_STAGE][ALIGNED]
+    largest = [
+        (of.name, np.abs(raw[of.raw]).max(), np.abs(aligned[of.aligned]).max(), raw.variables[of.raw].units)
+        for of in QUANTITIES
+    ]
+    return largest, ANGLE_ERROR.text if redoes_the_paper(results) else ""
 
 
-def say_differences(results: Results) -> str:
-    """The largest errors of all that was compared, in both ways."""
-    parts = []
-    for quantity in QUANTITIES:
-        raw, aligned = results[COMPARE_STAGE][RAW], results[COMPARE_STAGE][ALIGNED]
-        unit = raw.variables[quantity.raw].units
-        at_once, in_phase = np.abs(raw[quantity.raw]).max(), np.abs(aligned[quantity.aligned]).max()
-        parts.append(f"{quantity.name} {at_once:.2g} {unit} at the same time, {in_phase:.2g} {unit} in phase")
-    paper = f" The paper's largest is about {ANGLE_ERROR.text}." if redoes_the_paper(results) else ""
-    return f"Difference of the contact model from the rigid one; largest: {'; '.join(parts)}.{paper}"
-
-
-FIGURE_8 = paper_figure(
-    8,
-    "Difference between the models",
-    (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID),
-    say_differences,
-    plot_differences,
-    "Four plots over time on logarithmic axes, one for each leg's angle and velocity: the difference at the same time "
-    "and that at the same phase.",
-)
+FIGURE_8 = paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), plot_differences, tell_differences)
 
 CYCLES = 20
 """Strides that are shown: a transient is over by then; more lines would only lie on one another."""
@@ -244,13 +207,15 @@ def plot_cycles(results: Results) -> Figure:
             show_cycles(one, walk, leg)
             mark_strikes(one, walk, leg)
         show_direction(one, walks[0], leg)
-        one.set_title(f"({'ab'[leg]}) leg {leg + 1}")
-        one.set_xlabel(walks[0].label("angle", "angle"))
+        one.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
     axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
     earlier = any(walk.strikes.size > LAST_STRIDE for walk in walks)
     lines = [entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH)] if earlier else []
     faces = {"heel strike of this leg": GREY, "heel strike of the other leg": "white"}
-    marks = [mark_entry(label, face) for label, face in faces.items()]
+    marks = [
+        entry(label, linestyle="none", marker="o", markersize=4.5, color=GREY, markerfacecolor=face)
+        for label, face in faces.items()
+    ]
     legend_above(figure, [*model_lines(walks), *lines, *marks])
     return figure
 
@@ -274,11 +239,6 @@ def mark_strikes(axes: Axes, walk: Walk, leg: int) -> None:
         )  # fmt: skip
 
 
-def mark_entry(label: str, face: str) -> Line2D:
-    """Legend entry of a heel strike, of whichever model."""
-    return entry(label, linestyle="none", marker="o", markersize=4.5, color=GREY, markerfacecolor=face)
-
-
 def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
     """Arrowheads in the middle of the first swing and the first stance of a leg."""
     carries = walk["stance_leg"] == leg
@@ -293,24 +253,7 @@ def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
         axes.annotate("", xy=head, xytext=tail, arrowprops=arrow, zorder=7)
 
 
-def say_cycles(results: Results) -> str:
-    """What is shown, and how the walks went."""
-    walks = walks_with(results, RIGID_STATES, CONTACT_STATES)
-    return (
-        f"Angle and angular velocity of each leg{shown(walks, CYCLES)[1]}, the last stride drawn thick; at heel "
-        f"strikes the velocities jump. {sentence(walks)}"
-    )
-
-
-FIGURE_9 = paper_figure(
-    9,
-    "Limit cycles of the legs",
-    (RIGID_STATES,),
-    say_cycles,
-    plot_cycles,
-    "Two phase portraits, one a leg: a closed loop, round above for the swing, notched below for the "
-    "stance, with jumps at the heel strikes.",
-)
+FIGURE_9 = paper_figure(9, (RIGID_STATES,), plot_cycles, partial(tell_walks, RIGID_STATES, CONTACT_STATES, CYCLES))
 
 ENERGIES_IN_TIME = (
     ("kinetic_J", "energy", None, "(a) kinetic energy"),
@@ -322,10 +265,6 @@ SMALLEST_SPAN = 0.005
 MARGIN = 0.08
 FEW = 0.005
 """Part of the samples that lie within impacts."""
-IMPACTS = (
-    "From a touch to the end of its impact, a few milliseconds, the contact model has the energy of the old step over "
-    "the new foothold: peaks that the samples catch in part. "
-)
 
 
 def plot_energies(results: Results) -> Figure:
@@ -346,17 +285,12 @@ def span_without_impacts(axes: Axes, energies: list[Array]) -> None:
     axes.set_ylim(bottom - room, top + room)
 
 
-def say_energies(results: Results) -> str:
-    """What is shown, and the means of the mechanical energy."""
+def tell_energies(results: Results) -> tuple[Any, ...]:
+    """How much is shown, the means of the mechanical energy, and how the walks went."""
     walks = walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES)
     cut, extent = shown(walks)
-    means = ", ".join(f"{walk.look.label} {mean_energy(walk):.5g} J" for walk in cut)
-    last = "; Table 3 has that of the contact model's last five steps" if redoes_the_paper(results) else ""
-    return (
-        f"Energies of the whole walker{extent}, the potential one from the current stance foot. "
-        f"Time mean of the mechanical energy over all that is shown: {means}{last}. "
-        f"{IMPACTS if any(walk.look is CONTACT for walk in walks) else ''}{sentence(walks)}"
-    )
+    means = [(walk.look.label, mean_energy(walk)) for walk in cut]
+    return extent, means, redoes_the_paper(results), any(walk.look is CONTACT for walk in walks), sentence(walks)
 
 
 def mean_energy(walk: Walk) -> float:
@@ -367,13 +301,5 @@ def mean_energy(walk: Walk) -> float:
     return float(mean) / duration if duration else float(energy[0])
 
 
-FIGURE_10 = paper_figure(
-    10,
-    "Kinetic, potential and mechanical energy",
-    (RIGID_ENERGIES,),
-    say_energies,
-    plot_energies,
-    "Three plots over time: kinetic energy with a peak at each heel strike, potential energy with a dip "
-    "there, and their sum.",
-)
+FIGURE_10 = paper_figure(10, (RIGID_ENERGIES,), plot_energies, tell_energies)
 FIGURES = (FIGURE_5, FIGURE_7, FIGURE_8, FIGURE_9, FIGURE_10)

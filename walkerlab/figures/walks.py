@@ -156,8 +156,7 @@ def in_time(
     for one, (name, words, leg, title) in zip(axes, rows, strict=True):
         for walk in walks:
             line(one, walk.time, walk[name] if leg is None else walk[name][:, leg], walk.look)
-        one.set_ylabel(walks[0].label(words, name))
-        one.set_title(title)
+        one.set(ylabel=walks[0].label(words, name), title=title)
     return figure, axes
 
 

@@ -10,13 +10,7 @@ from pathlib import Path
 
 from walkerlab.paper import arithmetic, printed
 from walkerlab.paper.judged import agreement
-from walkerlab.prose import Prose
-
-
-def f(value: float, spec: str) -> str:
-    """A number in a format of Python's, such as .4f."""
-    return format(value, spec)
-
+from walkerlab.prose import Prose, f
 
 KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi, "agreement": agreement}
 prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})
