@@ -41,12 +41,11 @@ import plain_walk
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import UNEXPLAINED, ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import UNEXPLAINED, ContactWalkResult
 from walkerlab.hybrid.contact_walk import EVENT_TIME
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 TIMES = 5.0  # the numerical error that walks may differ by
 TIGHTER = (1.0, 1e-2, 1e-4)  # than the config's tolerances
@@ -278,10 +277,8 @@ def rounding(plain: plain_walk.Plain, rounds: int) -> dict[str, float]:
 def ours_at(scene: ContactScene, config: Config, start: Any, steps: int, tighter: float) -> ContactWalkResult:
     """Our walk with the config's tolerances, or tighter ones."""
     settings = config.solver.contact
-    methods = MethodSettings(method_named(settings.method), tighter * settings.rtol, tighter * settings.atol, BUDGET)
-    return walk_contact(
-        scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start_state(scene, start), methods, steps, None
-    )
+    tolerances = Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, BUDGET)
+    return scene.walk(start_state(scene, start), steps, tolerances)
 
 
 def compare(drawn: Drawn, steps: int) -> Compared:

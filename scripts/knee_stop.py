@@ -17,12 +17,10 @@ from pathlib import Path
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 STIFFNESSES = (1e3, 1e4, 1e5, 1e6, 1e7)  # N m/rad
 DAMPING, AT = 90.0, 1e5  # N m s/rad at a stiffness: the config's defaults
@@ -41,9 +39,7 @@ def last_step(config: Config, steps: int) -> tuple[float, float]:
     if gait is None:
         raise SystemExit("the rigid model has no gait to start from")
     scene = contact_scene(config, gait.step_length, gait.step_length)
-    methods = MethodSettings(method_named("radau5"), RTOL, ATOL, BUDGET)
-    start = start_state(scene, gait.state)
-    walk = walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, steps, None)
+    walk = scene.walk(start_state(scene, gait.state), steps, Tolerances("radau5", RTOL, ATOL, BUDGET))
     if walk.touch_time_s.size < steps or walk.touch_time_s.size < 2:
         raise SystemExit(f"{walk.outcome.label} after {walk.touch_time_s.size} of {steps} steps: nothing to compare")
     return float(walk.periods_s[-1]), float(walk.knee_strike_s[-1] - walk.touch_time_s[-2])

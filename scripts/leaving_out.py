@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -20,10 +20,8 @@ from statistics import median
 
 from walkerlab.config import loader
 from walkerlab.config.schema import Config
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.scene.contact import contact_scene, start_state
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
@@ -76,9 +74,8 @@ def with_books(kept: bool) -> None:
     """A walk of the paper's model, with or without the energy balance: what damping, friction and edges took."""
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
-    methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, BUDGET)
-    start = start_state(scene, GAIT)
-    walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, 10, None, track_energy=kept)
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, BUDGET)
+    replace(scene, pinned=None).walk(start_state(scene, GAIT), 10, tolerances, track_energy=kept)
 
 
 @dataclass(frozen=True)

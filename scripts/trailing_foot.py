@@ -25,12 +25,12 @@ from walkerlab.ground.merged import ByKnees, as_fewer, merged_state
 from walkerlab.ground.motion import OnGround, motion_gradient
 from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
 from walkerlab.hybrid.contact_events import feet_motion
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.mechanics.tree import mass_matrix, sines_cosines
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.in_tuples import derivative
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 GROUNDS = (
@@ -61,7 +61,7 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[ContactWalker
     gait = find_gaits(rigid, config.seed).gait
     assert gait is not None, "the slope has a gait"
     trial = contact_trial(config, tuple(gait.state), gait.step_length, 1)
-    methods = MethodSettings(method_named("radau5"), 1e-10, 1e-13, 10**7)
+    methods = Tolerances("radau5", 1e-10, 1e-13, 10**7)
     y = walk_contact(trial.walker, trial.ground, None, TRAILING, trial.start, methods, 1, None, False).end_state
     walker = trial.walker
     if isinstance(walker.knees, NoKnees):

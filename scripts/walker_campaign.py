@@ -36,7 +36,7 @@ from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.orbits.step_map import WALKED, evaluate, on_section, section_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import T
 
 Draw = np.random.Generator
@@ -260,8 +260,7 @@ def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
     if not faults and found[LONG_PERIOD] == found[SHORT_PERIOD]:
         faults.append("both seeds lead to one gait")
     for gait in search.gaits:
-        method = method_named("scipy-dop853").new(len(gait.state), 1e-11, 1e-13, BUDGET)
-        step = take_walk(walker, method, gait.state, 1)
+        step = take_walk(walker, Tolerances("scipy-dop853", 1e-11, 1e-13, BUDGET), gait.state, 1)
         if step.steps < 1 or np.abs(np.subtract(step.final_state, gait.state)).max() > RETURNS_TO:
             faults.append(f"the gait of {gait.period:.4g} s does not repeat itself")
     walkable = [gait for gait in search.gaits if not gait.objections]
@@ -297,8 +296,8 @@ def differences(walker: Standing, z: NDArray[np.float64], aside: float) -> NDArr
 
 def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
     """Section coordinates after each of ten steps from z."""
-    method = method_named("dop853").new(len(walker.blank), RTOL, ATOL, BUDGET)
-    return [section_of(walker, y) for y in take_walk(walker, method, on_section(walker, z.tolist()), STEPS).after]
+    tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
+    return [section_of(walker, y) for y in take_walk(walker, tolerances, on_section(walker, z.tolist()), STEPS).after]
 
 
 ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked", "none found")

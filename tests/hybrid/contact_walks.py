@@ -3,10 +3,8 @@
 import functools
 
 from walkerlab.config.loader import load
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, walk_contact
 from walkerlab.scene.contact import contact_scene, start_state
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 # the corrected rigid gait at 1 deg
 FIXED_POINT = (-0.2044455, 0.1695390, -0.6057394, -0.8617140)
@@ -28,20 +26,11 @@ def scene_of(*sets, step=RIGID_STEP):
 
 
 def settings(tolerance=TOLERANCE, method="radau5", budget=PLENTY):
-    return MethodSettings(method_named(method), tolerance, 1e-2 * tolerance, budget)
+    return Tolerances(method, tolerance, 1e-2 * tolerance, budget)
 
 
 @functools.cache
 def walked(*sets, start=FIXED_POINT, steps=10, step=RIGID_STEP, interval=None, **method):
     """A walk in the paper's scene at 1 deg, changed by `sets`."""
     scene = scene_of(*sets, step=step)
-    return walk_contact(
-        scene.walker,
-        JudgedGround(scene.terrain, scene.frame),
-        scene.pinned,
-        STANCE_FOOT,
-        start_state(scene, start),
-        settings(**method),
-        steps,
-        interval,
-    )
+    return scene.walk(start_state(scene, start), steps, settings(**method), interval)

@@ -6,8 +6,7 @@ import numpy as np
 from contact_walks import settings
 
 from walkerlab.config.contact import Contact
-from walkerlab.ground.compliant import STANCE_FOOT, KneeRules
-from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.ground.compliant import KneeRules
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.scene.contact import assembled_scene, start_state
 
@@ -46,7 +45,7 @@ def walked(steps=3, rules=None, interval=None, tolerance=1e-8, scale=1.0, **chan
     """A walk from the rigid gait."""
     scene = scene_of(rules, scale=scale, **changes)
     start = start_state(scene, (*RIGID_ANGLES, *(rate / scale**0.5 for rate in RIGID_RATES)))
-    return walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, settings(tolerance), steps, interval)
+    return scene.walk(start, steps, settings(tolerance), interval)
 
 
 AT_TOUCH = KneeRules(release_at_touch=True)

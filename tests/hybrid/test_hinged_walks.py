@@ -8,7 +8,6 @@ import pytest
 from contact_walks import scene_of, settings
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.scene.contact import start_state
 
@@ -51,9 +50,7 @@ def walked(walk, tolerance=1e-7):
         f"walker.foot_radius_m={walk.radius}", f"contact.pad_pitch={MEASURE}", step=MEASURE,
     )  # fmt: skip
     start = start_state(scene, walk.state)
-    return walk_contact(
-        scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start, settings(tolerance), walk.steps, None
-    )
+    return scene.walk(start, walk.steps, settings(tolerance))
 
 
 def plainly(walk, step_s=1e-5):

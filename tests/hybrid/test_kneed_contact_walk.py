@@ -23,12 +23,12 @@ from kneed_walks import (
     walked,
 )  # fmt: skip
 
-from walkerlab.ground.compliant import STANCE_FOOT, KneeRules, contact_walker
+from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.hybrid.contact_events import feet_motion
 from walkerlab.hybrid.contact_knee import locked
-from walkerlab.hybrid.contact_run import MethodSettings, by_channel, walk_contact
+from walkerlab.hybrid.contact_run import by_channel
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, Particle
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
@@ -36,7 +36,7 @@ from walkerlab.orbits.contact_gait import find_gait_from, section_points
 from walkerlab.orbits.contact_section import coordinates_of, state_on_section, step_from_section
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.in_tuples import derivative, jacobian
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 KNEE_STRIKE = 0.348612  # s after heel strike, of the rigid gait
 BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
@@ -190,8 +190,7 @@ def test_a_twin_of_another_size_walks_the_same_steps():
 def test_a_library_walks_it_with_as_few_bodies():
     scene = scene_of()
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
-    theirs = MethodSettings(method_named("scipy-radau"), 1e-6, 1e-8, 10**6)
-    walk = walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, theirs, 2, 0.01)
+    walk = scene.walk(start, 2, Tolerances("scipy-radau", 1e-6, 1e-8, 10**6), 0.01)
     ours = walked(steps=2)
     np.testing.assert_allclose(walk.touch_time_s, ours.touch_time_s, atol=1e-5)
     np.testing.assert_allclose(walk.knee_strike_s, ours.knee_strike_s, atol=1e-5)

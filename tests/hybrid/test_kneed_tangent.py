@@ -5,24 +5,23 @@ import pytest
 from kneed_walks import AT_TOUCH, RIGID_ANGLES, RIGID_RATES, STEP, scene_of
 
 from walkerlab.ground.compliant import KneeRules
-from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import section_points
 from walkerlab.orbits.contact_section import step_from_section
 from walkerlab.scene.contact import start_state
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
-METHODS = MethodSettings(method_named("radau5"), 1e-10, 1e-12, 10**7)
+TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10**7)
 
 
 @pytest.mark.parametrize("rules", [KneeRules(), AT_TOUCH], ids=["compression", "touch"])
 def test_the_derivative_of_a_step_is_that_of_differences(rules):
     scene = scene_of(rules)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
-    _, z = next(section_points(scene.walker, scene.ground, METHODS, start))
+    _, z = next(section_points(scene.walker, scene.ground, TOLERANCES, start))
 
     def step(z):
-        taken = step_from_section(scene.walker, scene.ground, METHODS, z, STEP)
+        taken = step_from_section(scene.walker, scene.ground, TOLERANCES, z, STEP)
         assert taken.outcome is Outcome.WALKED
         return taken
 

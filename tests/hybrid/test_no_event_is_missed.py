@@ -8,16 +8,14 @@ from contact_walks import TOLERANCE, settings, walked
 from kneed_walks import RIGID_ANGLES, RIGID_RATES
 
 from walkerlab.config.loader import load
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.contact_events import leaves_side
-from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.events import new_crossing_finder
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 AFTER_MID_SWING = "contact.terrain=after-mid-swing"
 HINGED = ("contact.stance=pinned", "walker.foot_radius_m=0", "slope_deg=0.7")
@@ -42,7 +40,7 @@ def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE):
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     scene = contact_scene(config, gait.step_length)
     start = start_state(scene, gait.state)
-    return walk_contact(scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start, settings(tolerance), steps, None)
+    return scene.walk(start, steps, settings(tolerance))
 
 
 @pytest.mark.parametrize(
@@ -98,8 +96,7 @@ def test_a_knee_strikes_at_its_time_at_any_tolerance():
     start = (*RIGID_ANGLES, *RIGID_RATES)
 
     def strike(rtol):
-        method = method_named("dop853").new(len(start), rtol, 1e-2 * rtol, 10_000)
-        return take_walk(walker, method, start, 1).knee_strikes[0]
+        return take_walk(walker, Tolerances("dop853", rtol, 1e-2 * rtol, 10_000), start, 1).knee_strikes[0]
 
     exact, tolerances = strike(1e-13), np.geomspace(1e-12, 1e-7, 101)
     late = np.array([strike(float(rtol)) - exact for rtol in tolerances])

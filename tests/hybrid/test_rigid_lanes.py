@@ -7,7 +7,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 STEPS = 10
 ONE_DEGREE = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, np.deg2rad(1.0), CORRECTED)
@@ -51,10 +51,10 @@ def test_ten_steps_end_where_the_reference_does(rtol, error):
 def test_random_starts_fare_as_they_do_one_by_one(walker):
     starts = random_starts(walker, 200)
     fates, strikes = in_lanes(walker, starts, 1e-11)  # on the steep slope errors grow with every step
-    method = method_named("dop853").new(4, 1e-12, 1e-14, 10**7)
+    tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
     time = np.sqrt(walker.leg_length / walker.gravity)
     for i, start in enumerate(starts.tolist()):
-        walk = take_walk(assembled(walker), method, tuple(start), STEPS)
+        walk = take_walk(assembled(walker), tolerances, tuple(start), STEPS)
         walked = walk.steps == STEPS  # a ground that would have to pull does not end a rigid walk
         assert (fates.outcome[i], fates.steps[i]) == (0 if walked else walk.outcome, walk.steps)
         assert strikes.times[i, : walk.steps] == pytest.approx(walk.heel_strikes, abs=1e-6 * time)
@@ -65,8 +65,8 @@ def test_starts_around_a_gait_walk_as_they_do_one_by_one():
     generator = np.random.default_rng(3)
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
-    method = method_named("dop853").new(4, 1e-11, 1e-13, 10**7)
-    walks = [take_walk(assembled(ONE_DEGREE), method, tuple(start), STEPS) for start in starts.tolist()]
+    tolerances = Tolerances("dop853", 1e-11, 1e-13, 10**7)
+    walks = [take_walk(assembled(ONE_DEGREE), tolerances, tuple(start), STEPS) for start in starts.tolist()]
     assert [walk.steps for walk in walks] == fates.steps.tolist()
     assert 10 < np.count_nonzero(fates.steps == STEPS) < 60
     for i, walk in enumerate(walks):

@@ -22,7 +22,7 @@ from walkerlab.paper.appendix_a import (
     potential_energy,
     swing_foot_height,
 )
-from walkerlab.solvers.registry import METHODS, method_named
+from walkerlab.solvers.registry import METHODS, Tolerances
 
 
 def find_gaits(walker, *rest, **options):
@@ -52,7 +52,7 @@ def start_of(walker, z=X_P):
 
 
 def walked(walker, start, steps, rtol=1e-10, method="dop853", **options):
-    return take_walk(walker, method_named(method).new(4, rtol, 1e-2 * rtol, 10**6), start, steps, **options)
+    return take_walk(walker, Tolerances(method, rtol, 1e-2 * rtol, 10**6), start, steps, **options)
 
 
 # ten steps from x_p at one degree: two tools agree on these to 1e-36

@@ -19,7 +19,7 @@ from walkerlab.orbits.basin import (
     on_section,
 )
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 
 def at_slope(degrees):
@@ -44,8 +44,8 @@ def gentle():
 
 
 def walked(walker, z, steps):
-    method = method_named("dop853").new(4, 1e-12, 1e-14, 10**7)
-    return take_walk(walker.model, method, tuple(on_section(walker, np.atleast_2d(z))[0].tolist()), steps)
+    tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
+    return take_walk(walker.model, tolerances, tuple(on_section(walker, np.atleast_2d(z))[0].tolist()), steps)
 
 
 def test_the_only_attractor_of_a_gentle_slope_is_its_gait(gentle):

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.orbits import contact_gait as search
 from walkerlab.orbits.contact_gait import GaitAnswer, gait_near
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 # state and step length of the rigid gait at one degree
 RIGID_STATE = (-0.2044455, 0.1695390, -0.6057394, -0.8617140)
@@ -44,9 +42,7 @@ def test_energy_lost_by_channel_is_the_height_lost(gait):
 def test_a_long_walk_on_pads_of_its_own_pitch_settles_on_the_gait(gait):
     config = config_at_one_degree("contact.pad_pitch=own")
     scene: ContactScene = contact_scene(config, RIGID_STEP, gait.step.length_m)
-    methods = MethodSettings(method_named("radau5"), 1e-8, 1e-10, 10**8)
-    start = start_state(scene, RIGID_STATE)
-    walk = walk_contact(scene.walker, scene.ground, None, STANCE_FOOT, start, methods, 40, None)
+    walk = scene.walk(start_state(scene, RIGID_STATE), 40, Tolerances("radau5", 1e-8, 1e-10, 10**8))
     assert walk.touch_time_s.size == 40
     assert walk.periods_s[-1] == pytest.approx(gait.step.period_s, abs=1e-7)
     assert walk.lengths_m[-1] == pytest.approx(gait.step.length_m, abs=1e-7)

@@ -13,7 +13,7 @@ from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, wi
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.step_map import evaluate, new_shooting, newton, on_section, variation_size
 from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import Tolerances, finder_for
 
 ROUND_FEET = straight_legs(Limb(0.4, 1.0, 0.1, 0.0, 0.01), 0.0, Arc(0.1))
 MCGEER = straight_legs(Limb(1.0, 1.0, 0.37, 0.0, 0.32**2), 0.0, Arc(0.3))
@@ -67,8 +67,7 @@ def test_the_knee_strikes_when_the_published_one_does():
     model, shooting = shooting_of(parts, slope, gravity)
     z = np.array([angle - slope, swing, stance])
     newton(shooting, z, 1e-13)
-    method = new_dop853(len(model.blank), 1e-12, 1e-14, 10**6)
-    walk = take_walk(model, method, on_section(model, z), 3, sampled=True)
+    walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), on_section(model, z), 3, sampled=True)
     assert walk.outcome is Outcome.WALKED
     assert walk.knee_strikes[0] == pytest.approx(0.348612, abs=1e-6)
     assert walk.energy_drift < 1e-10

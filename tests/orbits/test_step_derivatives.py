@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
-from walkerlab.hybrid.contact_run import MethodSettings
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import EVENTS
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait, step_from_section
@@ -17,7 +16,7 @@ from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.contact import contact_scene
 from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for, method_named
+from walkerlab.solvers.registry import Tolerances, finder_for
 
 
 def find_gaits(walker, *rest, **options):
@@ -113,7 +112,7 @@ def scene():
 
 
 def stepped(scene, z, tolerance):
-    methods = MethodSettings(method_named("radau5"), tolerance, 1e-2 * tolerance, 10**6)
+    methods = Tolerances("radau5", tolerance, 1e-2 * tolerance, 10**6)
     step = step_from_section(scene.walker, scene.ground, methods, z, PITCH)
     assert step.outcome is Outcome.WALKED
     return step
@@ -136,7 +135,7 @@ def test_contact_derivative_converges_with_the_tolerance(scene):
 
 def test_newton_converges_quadratically_on_the_contact_step_map(scene):
     # the walk's own error has to be below the last residual
-    methods = MethodSettings(method_named("radau5"), 1e-11, 1e-13, 10**6)
+    methods = Tolerances("radau5", 1e-11, 1e-13, 10**6)
 
     def moves(tolerance):
         found = find_contact_gait(scene.walker, scene.ground, methods, NEAR_THE_GAIT + ASIDE, PITCH, tolerance)

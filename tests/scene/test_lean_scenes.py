@@ -1,5 +1,7 @@
 """Each reduced scene gives the numbers of the full one with the part set to nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from compass_parts import CompassParts, compass_assembly
@@ -7,19 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
-from walkerlab.ground.compliant import STANCE_FOOT, contact_walker
+from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb, Frictionless, switching_count
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.walker import FootMotion, foot_force
 from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL, feet_motion
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.mechanics.parts import Assembly, Body, Particle
 from walkerlab.mechanics.tree import mass_matrix, with_centrifugal
 from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.in_tuples import derivative, jacobian
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute, preview
@@ -127,10 +128,9 @@ def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
     ends = []
     for law in (NO_FRICTION, Frictionless()):
         scene = contact_scene(load(None, ()).config, 0.3714)
-        walker = scene.walker._replace(friction=law)
-        ground = scene.ground._replace(frame=scene.frame._replace(locate_switching=False))
-        methods = MethodSettings(method_named("radau5"), 1e-7, 1e-9, 10**6)
-        walk = walk_contact(walker, ground, None, STANCE_FOOT, start_state(scene, START), methods, 2, 0.01)
+        frame = scene.frame._replace(locate_switching=False)
+        scene = replace(scene, walker=scene.walker._replace(friction=law), frame=frame)
+        walk = scene.walk(start_state(scene, START), 2, Tolerances("radau5", 1e-7, 1e-9, 10**6), 0.01)
         ends.append((walk.outcome, walk.end_time_s, walk.end_state, walk.samples.states.tolist(), walk.work.tolist()))
     assert ends[0] == ends[1]
 

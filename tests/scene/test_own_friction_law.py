@@ -1,6 +1,7 @@
 """A law of friction says what is asked of it itself, so that one of a user's own is treated as ADAMS's is."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import NamedTuple, get_args
 
@@ -13,11 +14,10 @@ from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.hybrid.contact_run import MethodSettings, walk_contact
 from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity
 from walkerlab.orbits.rigid_limit import STICTION, series_of, with_contact_of
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.contact_sim import tell_unresolved_slip
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)
@@ -85,12 +85,9 @@ def test_a_law_that_counts_its_formulas_must_also_tell_where_they_change(own, mo
 
 
 def test_a_law_without_a_body_is_told_in_words_by_compiled_code(own):
-    walker, methods = (
-        own.walker._replace(friction=Wordless(0.5)),
-        MethodSettings(method_named("radau5"), 1e-7, 1e-9, 1000),
-    )
+    wordless = replace(own, walker=own.walker._replace(friction=Wordless(0.5)))
     with pytest.raises(TypeError, match=r"^friction_coefficient has no body for Wordless: "):
-        walk_contact(walker, own.ground, None, 1, start_state(own, START), methods, 1, None)
+        wordless.walk(start_state(own, START), 1, Tolerances("radau5", 1e-7, 1e-9, 1000))
 
 
 def test_every_word_of_the_config_is_a_law():

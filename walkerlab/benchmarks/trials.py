@@ -17,7 +17,7 @@ from walkerlab.hybrid.rigid_walk import walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import Standing
 from walkerlab.paper.appendix_a import RigidWalker
-from walkerlab.solvers.registry import METHODS, Method, finder_for
+from walkerlab.solvers.registry import METHODS, Method, Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
 
 if TYPE_CHECKING:
@@ -121,16 +121,14 @@ class ContactTrial:
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
-        from walkerlab.hybrid.contact_run import MethodSettings
+        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget)
+        return lambda: self._walk(tolerances)
 
-        settings = MethodSettings(METHODS[method], rtol, rtol * ATOL_PER_RTOL, budget)
-        return lambda: self._walk(settings)
-
-    def _walk(self, settings: Any) -> TrialRun:
+    def _walk(self, tolerances: Tolerances) -> TrialRun:
         from walkerlab.hybrid.contact_run import walk_contact
 
         result = walk_contact(
-            self.walker, self.ground, None, self.stance, self.start, settings, self.steps, None, track_energy=False
+            self.walker, self.ground, None, self.stance, self.start, tolerances, self.steps, None, track_energy=False
         )
         return finished(result.outcome, np.array(result.end_state), result.work)
 

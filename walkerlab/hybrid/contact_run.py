@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -53,7 +54,7 @@ from walkerlab.hybrid.contact_walk import AT_LIFT, walk_part
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import kernel, uncompiled
 from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.registry import Method, finder_for
+from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import T
 from walkerlab.solvers.system import State
 from walkerlab.solvers.vectors import load
@@ -70,26 +71,6 @@ USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
 FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
-
-
-@dataclass(frozen=True)
-class MethodSettings:
-    """Which method integrates, and how exactly."""
-
-    method: Method
-    rtol: float
-    atol: float
-    budget: int  # right-hand sides
-
-    def new(self, n: int) -> Any:
-        """The method with memory for n equations."""
-        return self.method.new(n, self.rtol, self.atol, self.budget)
-
-    def of(self, walker: ContactWalker) -> Any:
-        """The method with memory for a walker with both feet free, with as few bodies as its knees allow."""
-        if isinstance(walker.merging, ByKnees):
-            return method_by_knees(walker.merging, len(walker.blank), self.new)
-        return self.new(len(walker.blank))
 
 
 @dataclass(frozen=True)
@@ -303,23 +284,24 @@ def new_observer(
     walker: ContactWalker,
     walk_state: WalkState,
     y: State,
-    interval_s: float = 1.0,
-    samples: int = 0,
+    times: Floats | None = None,
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
     """An observer of a walk from state y.
 
-    interval_s, samples  time between samples, and how many there is room for
-    track_energy         whether to keep the energy balance, by which a walk is judged; ladders of methods do not
-    directions           how many directions of the start to carry along as the tangent
+    times         (samples,) rising, in s; no samples without them
+    track_energy  whether to keep the energy balance, by which a walk is judged; ladders of methods do not
+    directions    how many directions of the start to carry along as the tangent
     """
+    times = np.zeros(0) if times is None else times
+    samples = times.size
     extremes = np.zeros(4)
     extremes[START_ENERGY] = total_energy(walker, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1])), y)
     extremes[AT_HAND] = extremes[START_ENERGY] + walker.tree.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
-        interval_s * np.arange(samples),
+        times,
         np.zeros((samples, len(walker.blank))),
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
@@ -347,19 +329,19 @@ def walk_contact(
     pinned: Pinned | None,
     stance: int,
     start: State,
-    methods: MethodSettings,
+    tolerances: Tolerances,
     steps: int,
-    interval_s: float | None,
+    sampling: float | Floats | None,
     track_energy: bool = True,
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
-    pinned      the hinged first step, or None
-    stance      the foot that carries the first step
-    start       state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
-    methods     how to integrate
-    interval_s  time between samples, or None for none
-    track_energy      whether to keep the energy balance, by which the walk is judged; ladders of methods do without
+    pinned        the hinged first step, or None
+    stance        the foot that carries the first step
+    start         state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
+    tolerances    how to integrate
+    sampling      time between samples, their times (samples,), rising, in s, or None for none
+    track_energy  whether to keep the energy balance, by which the walk is judged; ladders of methods do without
 
     The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
     """
@@ -367,14 +349,15 @@ def walk_contact(
     if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
         here = Stopped(0.0, start, np.zeros(4, np.int64))
-        return gather(Outcome.REJECTED, here, walk_state, new_observer(walker, walk_state, start), walker, methods)
-    room = 0 if interval_s is None else int(USUAL_STEP * steps * frame.pendulum_time / interval_s) + 2
+        return gather(Outcome.REJECTED, here, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
+    room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
-        observer = new_observer(walker, walk_state, start, interval_s or 1.0, room, track_energy)
-        outcome, stopped = run_parts(walker, ground, pinned, start, methods, observer, walk_state)
+        times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
+        observer = new_observer(walker, walk_state, start, times, track_energy)
+        outcome, stopped = run_parts(walker, ground, pinned, start, tolerances, observer, walk_state)
         if room == 0 or observer.recorded[0] < room:
-            return gather(outcome, stopped, walk_state, observer, walker, methods)
+            return gather(outcome, stopped, walk_state, observer, walker, tolerances)
         room *= 2
 
 
@@ -383,7 +366,7 @@ def run_parts(
     ground: JudgedGround,
     pinned: Pinned | None,
     start: State,
-    methods: MethodSettings,
+    tolerances: Tolerances,
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> tuple[Outcome, Stopped]:
@@ -394,10 +377,10 @@ def run_parts(
     t, y = 0.0, start
     spent = np.zeros(4, np.int64)
     if pinned is not None:
-        method = methods.new(len(pinned.blank))
+        method = tolerances.new(len(pinned.blank))
         angles = len(pinned.tree.arm_x)
         hinged = (*start[2 : 2 + angles], *start[4 + angles :])
-        hinged_walk = walk_hinged if methods.method.compiled else uncompiled(walk_hinged)
+        hinged_walk = walk_hinged if tolerances.compiled else uncompiled(walk_hinged)
         outcome = Outcome(
             hinged_walk(pinned, ground, method, finder_for(method, EVENT_FUNCTIONS), observer, walk_state, hinged)
         )
@@ -406,16 +389,42 @@ def run_parts(
         release_hinge(walker, pinned.foot, walk_state, y)
         if outcome is not Outcome.WALKED:
             return outcome, Stopped(t, y, spent)
-    method = methods.of(walker)
     walk_state.times[AIRBORNE_SINCE] = t
-    free_walk = walk_free if methods.method.compiled else uncompiled(walk_free)
-    finder = finder_for(method, EVENT_FUNCTIONS)
+    free_walk, method, finder = free_walk_by(tolerances, walker)
     outcome = Outcome(free_walk(walker, ground, method, finder, observer, walk_state, t, y, NEVER))
     stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
     if outcome is Outcome.WALKED:
         unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
         free_walk(walker, ground, method, finder, unseen, walk_state, stopped.time_s, stopped.state, AT_LIFT)
     return outcome, stopped
+
+
+def free_walk_by(tolerances: Tolerances, walker: ContactWalker) -> tuple[Callable[..., int], Any, CrossingFinder]:
+    """`walk_free`, in Python for a library's method; that method, for as few bodies as the knees allow; its finder."""
+    n = len(walker.blank)
+    merging = walker.merging
+    method = method_by_knees(merging, n, tolerances.new) if isinstance(merging, ByKnees) else tolerances.new(n)
+    return walk_free if tolerances.compiled else uncompiled(walk_free), method, finder_for(method, EVENT_FUNCTIONS)
+
+
+def walk_on(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    walk_state: WalkState,
+    observer: ContactObserver,
+    start: State,
+    stop_passing_after: int = NEVER,
+) -> tuple[Outcome, Stopped]:
+    """Walk with both feet free from a walk state that is at hand; the outcome, with its energy balance, and the end.
+
+    start               state (4 + 2 n) at time 0
+    stop_passing_after  see `walk_free`
+    """
+    free_walk, method, finder = free_walk_by(tolerances, walker)
+    ended = free_walk(walker, ground, method, finder, observer, walk_state, 0.0, start, stop_passing_after)
+    stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), method.counts[:4].copy())
+    return balanced(ended, observer, tolerances), stopped
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
@@ -433,22 +442,22 @@ def release_hinge(walker: ContactWalker, foot: int, walk_state: WalkState, y: St
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
-def explained_residual(observer: ContactObserver, methods: MethodSettings) -> float:
+def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
     """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
 
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
     exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum()
-    return float(UNEXPLAINED * max(methods.rtol, FINEST) * exchanged)
+    return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
-def balanced(ended: int, observer: ContactObserver, methods: MethodSettings) -> Outcome:
+def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
     """How a walk ended: `SOLVER_FAILED`, however it did, if its energy balance does not close.
 
     This detects faults and estimates no error: a walk may be off by far more than its balance.
     """
-    closes = observer.extremes[RESIDUAL] <= explained_residual(observer, methods)
+    closes = observer.extremes[RESIDUAL] <= explained_residual(observer, tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
@@ -458,7 +467,7 @@ def gather(
     walk_state: WalkState,
     observer: ContactObserver,
     walker: ContactWalker,
-    methods: MethodSettings,
+    tolerances: Tolerances,
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
     done, lifted, seen = int(walk_state.feet[STEPS]), steps_with_lift(walk_state), int(observer.recorded[0])
@@ -473,7 +482,7 @@ def gather(
             observer.sampled_dissipation[:seen],
         )
     return ContactWalkResult(
-        balanced(outcome, observer, methods),
+        balanced(outcome, observer, tolerances),
         walk_state.touch_time[:done],
         walk_state.touch_along[:done],
         walk_state.slip[:lifted],
@@ -482,7 +491,7 @@ def gather(
         stopped.state,
         float(observer.extremes[MAX_PENETRATION]),
         float(observer.extremes[RESIDUAL]),
-        explained_residual(observer, methods),
+        explained_residual(observer, tolerances),
         observer.dissipated.copy(),
         walk_state.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
         stopped.work,

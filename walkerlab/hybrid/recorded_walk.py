@@ -27,8 +27,7 @@ from walkerlab.hybrid.rigid_observer import (
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, Mode, Standing, linked, rolled_distance, swing_foot
-from walkerlab.solvers.registry import finder_for
-from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
 from walkerlab.solvers.system import State
 
@@ -101,23 +100,21 @@ def as_state(values: Any) -> State:
 
 def take_walk(
     walker: Standing,
-    method: Any,
+    tolerances: Tolerances,
     start: State,
     steps: int,
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
-    budget: int | None = None,
 ) -> RecordedWalk:
     """Walk `steps` steps from `start`, or until the walk ends.
 
-    method   an integrator for the walker's equations
-    sampled  whether states in time are wanted
-    advance  told how many more steps were taken
-    budget   right-hand sides of the whole walk; none: what any step needs, for each
+    tolerances  how to integrate; no step is given more right-hand sides than any step needs
+    sampled     whether states in time are wanted
+    advance     told how many more steps were taken
 
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
-    recorder = Recorder(walker, method, start, sampled, budget)
+    recorder = Recorder(walker, tolerances, start, sampled)
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
@@ -132,15 +129,16 @@ def take_walk(
 class Recorder:
     """Walks on from where it is, and keeps what was seen."""
 
-    def __init__(self, walker: Standing, method: Any, start: State, sampled: bool, budget: int | None = None) -> None:
+    def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
-        self.walker, self.method, self.sampled, self.budget = walker, method, sampled, budget
+        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
+        self.method = method = tolerances.new(len(walker.blank))
         self.start = self.state = start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS)
         # a library's method is integrated with in Python
-        self.walk: Callable[..., tuple[int, int]] = uncompiled(walk) if isinstance(method, ScipyMethod) else walk
+        self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.blank), walker.kneed
         first = new_observer(np.zeros(0), self.numbers)
         observe_start(first, Mode(walker, BENT), start)
@@ -182,8 +180,7 @@ class Recorder:
 
     def _left_for(self, steps: int) -> int:
         """Right-hand sides that the next steps may evaluate."""
-        enough = steps * BUDGET_OF_A_STEP
-        return enough if self.budget is None else min(enough, self.budget - int(self.counts[RHS]))
+        return min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
 
     def _grid(self, steps: int) -> Array:
         """Times of the samples that the next steps may reach, from the start of the first of them."""

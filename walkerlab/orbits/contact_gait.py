@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING
+from walkerlab.hybrid.contact_events import PASSING
 from walkerlab.hybrid.contact_rules import STANCE, STEPS
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
+from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ class GaitAnswer:
     advice: str = ""
 
 
-def find_gait_from(walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State) -> GaitAnswer:
+def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
     """The contact gait near a start with both feet on the ground (state of the free walker, 8 numbers).
 
     Never raises for want of a gait: the answer says why there is none and what to try.
@@ -50,14 +50,14 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, methods: MethodS
     hopeless = why_there_is_none(walker)
     if hopeless:
         return GaitAnswer(None, *hopeless)
-    methods = replace(methods, budget=BUDGET_OF_A_STEP)
+    tolerances = replace(tolerances, budget=BUDGET_OF_A_STEP)
     said = "the start does not even let the feet pass each other"
-    for steps, z in section_points(walker, ground, methods, start):
-        gait = gait_near(walker, ground, methods, z, ground.terrain.stride_measure)
+    for steps, z in section_points(walker, ground, tolerances, start):
+        gait = gait_near(walker, ground, tolerances, z, ground.terrain.stride_measure)
         if isinstance(gait, ContactGait):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         said = f"Newton's method found none after {steps} steps from the start: {gait}"
-    followed = follow_from_rigid(walker, ground, methods, start)
+    followed = follow_from_rigid(walker, ground, tolerances, start)
     if followed.gait is not None:
         return followed
     return GaitAnswer(None, f"{said}; {followed.reason}", followed.advice)
@@ -83,28 +83,26 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
 
 
 def section_points(
-    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State
 ) -> Iterator[tuple[int, Floats]]:
     """Points of the section that walks from the start pass through, and after how many steps each."""
     for steps in WARM_UP:
         walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
-        method = replace(methods, budget=(steps + 1) * methods.budget).of(walker)
-        finder = finder_for(method, EVENT_FUNCTIONS)
-        ended = walk_free(walker, ground, method, finder, observer, walk_state, 0.0, start, steps)
-        outcome = balanced(ended, observer, methods)
+        enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
+        outcome, stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
         if outcome == Outcome.WALKED and walk_state.at_zero[PASSING]:
-            yield steps, coordinates_of(walker, method.y, int(walk_state.feet[STANCE]))
+            yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.feet[STANCE]))
         elif walk_state.feet[STEPS] > steps:
             return
 
 
 def gait_near(
-    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, z: Floats, pitch_m: float
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float
 ) -> ContactGait | str:
     """Newton's method from section coordinates z (6,): the gait, or what came in its way."""
     try:
-        found = find_contact_gait(walker, ground, methods, z, pitch_m, most_steps=NEWTON_STEPS)
+        found = find_contact_gait(walker, ground, tolerances, z, pitch_m, most_steps=NEWTON_STEPS)
     except np.linalg.LinAlgError:
         return "its matrix is singular, since a multiplier is 1"
     if not isinstance(found, ContactGait):
@@ -129,11 +127,11 @@ def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     return walker._replace(normal=harder, friction=walker.friction.with_creep(1.0 / stickier))
 
 
-def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, start: State) -> GaitAnswer:
+def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
     """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
     pitch, last = ground.terrain.stride_measure, None
-    for _steps, z in section_points(with_rigidity(walker, 1.0), ground, methods, start):
-        found = gait_near(with_rigidity(walker, 1.0), ground, methods, z, pitch)
+    for _steps, z in section_points(with_rigidity(walker, 1.0), ground, tolerances, start):
+        found = gait_near(with_rigidity(walker, 1.0), ground, tolerances, z, pitch)
         if isinstance(found, ContactGait):
             last = found
             break
@@ -149,7 +147,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, methods: Meth
         guess = last.z
         if before is not None:
             guess = last.z + (last.z - before[1]) * (ahead - rigidity) / (rigidity - before[0])
-        found = gait_near(with_rigidity(walker, ahead), ground, methods, guess, last.step.length_m)
+        found = gait_near(with_rigidity(walker, ahead), ground, tolerances, guess, last.step.length_m)
         if isinstance(found, ContactGait):
             before, last, rigidity, stride = (rigidity, last.z), found, ahead, 1.5 * stride
             if rigidity == 0.0:

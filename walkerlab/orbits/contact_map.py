@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
+from walkerlab.hybrid.contact_run import JudgedGround
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import Floats, SectionStep, angled_bodies, step_from_section, turning_bodies
 from walkerlab.orbits.step_maps import (
@@ -23,6 +23,7 @@ from walkerlab.orbits.step_maps import (
     difference_formula,
     no_step,
 )
+from walkerlab.solvers.registry import Tolerances
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class ContactMap:
         self,
         walker_at: Callable[[float], WalkerOnGround | None],
         scale: float,
-        methods: MethodSettings,
+        tolerances: Tolerances,
         step_length_m: float,
         on_pads: bool,
         like: ContactWalker,
@@ -59,14 +60,14 @@ class ContactMap:
 
         walker_at      walker and ground at a value of the parameter; None where it makes no walker
         scale          magnitude of changes of the parameter that matter
-        methods        the integrator and its tolerances
+        tolerances     how to integrate a step
         step_length_m  that steps are judged by
         on_pads        whether the ground that was asked for has pads, so that tripping is to be watched
         like           one of the walkers
         """
         self._at = lru_cache(REMEMBERED)(walker_at)
         self._near = lru_cache(REMEMBERED)(self._formula)
-        self._scale, self._methods, self._measure, self._on_pads = scale, methods, step_length_m, on_pads
+        self._scale, self._tolerances, self._measure, self._on_pads = scale, tolerances, step_length_m, on_pads
         self._units: Floats | None = None
         angled, turning = angled_bodies(like, STANCE_FOOT), turning_bodies(like, STANCE_FOOT)
         self._angles, self._rates = len(angled), len(turning)
@@ -93,7 +94,7 @@ class ContactMap:
         units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
         measure = terrain.stride_measure if terrain.has_pads else self._measure
         return step_from_section(
-            here.walker, JudgedGround(terrain, here.ground.frame), self._methods, z * units, measure
+            here.walker, JudgedGround(terrain, here.ground.frame), self._tolerances, z * units, measure
         )
 
     def _terrain(self, here: WalkerOnGround) -> Terrain:

@@ -23,14 +23,13 @@ from walkerlab.ground.held import Held, IdealLock, Knees, held_flags, stop_flags
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, PASSING, feet_motion, material_along
+from walkerlab.hybrid.contact_events import PASSING, feet_motion, material_along
 from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_rules import WalkState
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
+from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import right_hand_side
-from walkerlab.solvers.stepping import T
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -161,7 +160,7 @@ def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: 
 
 
 def step_from_section(
-    walker: ContactWalker, ground: JudgedGround, methods: MethodSettings, z: Floats, pitch_m: float
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float
 ) -> SectionStep:
     """Walk from the section to the section.
 
@@ -175,25 +174,23 @@ def step_from_section(
     stand_on_section(walk_state, walker, laid, start, stance)
     observer = new_observer(walker, walk_state, start, directions=z.size)
     observer.tangent.Phi[:, :] = directions(walker, start, stance)
-    method = methods.of(walker)
-    finder = finder_for(method, EVENT_FUNCTIONS)
-    ended = walk_free(walker, laid, method, finder, observer, walk_state, 0.0, start, 1)
-    end = method.y.copy()
-    slipped, rolled = since_touch(walker, walk_state, tuple(end.tolist()), 1 - stance)
+    outcome, stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    end = np.array(stopped.state)
+    slipped, rolled = since_touch(walker, walk_state, stopped.state, 1 - stance)
     DP = section_derivative(walker, walk_state, observer, end, 1 - stance)
     lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
-        balanced(ended, observer, methods),
+        outcome,
         coordinates_of(walker, end, 1 - stance),
         DP,
-        float(method.clock[T]),
+        stopped.time_s,
         float(end[ALONG] - start[ALONG]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
         observer.dissipated.copy(),
         float(lost),
-        method.counts[:4].copy(),
+        stopped.work,
         float(walk_state.touch_time[0]),
         float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
     )
@@ -258,7 +255,7 @@ class ContactGait:
 def find_contact_gait(
     walker: ContactWalker,
     ground: JudgedGround,
-    methods: MethodSettings,
+    tolerances: Tolerances,
     z: Any,
     pitch_m: float,
     tolerance: float = 1e-10,
@@ -272,7 +269,7 @@ def find_contact_gait(
     Returns the gait, or the last step that could be walked if no gait is near.
     """
     z = np.asarray(z, float).copy()
-    step = step_from_section(walker, ground, methods, z, pitch_m)
+    step = step_from_section(walker, ground, tolerances, z, pitch_m)
     iteration, walked = 0, 1
     while step.outcome is Outcome.WALKED and walked < most_steps:
         residual = float(np.max(np.abs(step.z - z)))
@@ -281,7 +278,7 @@ def find_contact_gait(
             order = np.argsort(-np.abs(multipliers), kind="stable")
             return ContactGait(z, step, multipliers[order], residual, iteration)
         move = np.linalg.solve(np.eye(z.size) - step.DP, step.z - z)
-        z, step, tried = damped(walker, ground, methods, z, move, residual, step)
+        z, step, tried = damped(walker, ground, tolerances, z, move, residual, step)
         iteration, walked = iteration + 1, walked + tried
     return step
 
@@ -289,7 +286,7 @@ def find_contact_gait(
 def damped(
     walker: ContactWalker,
     ground: JudgedGround,
-    methods: MethodSettings,
+    tolerances: Tolerances,
     z: Floats,
     move: Floats,
     residual: float,
@@ -303,7 +300,7 @@ def damped(
     while True:
         tried += 1
         candidate = z + scale * move
-        ahead = step_from_section(walker, ground, methods, candidate, step.length_m)
+        ahead = step_from_section(walker, ground, tolerances, candidate, step.length_m)
         fine = ahead.outcome is Outcome.WALKED and float(np.max(np.abs(ahead.z - candidate))) < 2.0 * residual
         if fine or scale < 1e-3:
             return candidate, ahead, tried

@@ -27,7 +27,7 @@ from walkerlab.orbits.slope_branch import SlopeBranch
 from walkerlab.orbits.small_slope import Vector, seeds
 from walkerlab.orbits.step_map import Shooting, new_shooting, newton, variation_size
 from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import Tolerances, finder_for
 
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
@@ -139,7 +139,7 @@ class Search:
         self.lost: list[str] = []
         self.drawn = 0
         rtol, atol = settings.solved_rtol, settings.solved_atol
-        self.method = new_dop853(len(self.walker.blank), rtol, atol, settings.budget)
+        self.tolerances = Tolerances("dop853", rtol, atol, settings.budget)
         self.looking = shooting(self.walker, settings.rtol, settings.atol, settings.budget)
         self.solving = shooting(self.walker, rtol, atol, settings.budget)
 
@@ -185,7 +185,7 @@ class Search:
             return False
         if self.known(z, by):
             return True
-        gait = measured(self.walker, self.units, self.method, z, self.solving.DP)
+        gait = measured(self.walker, self.units, self.tolerances, z, self.solving.DP)
         if gait is None or gait.residual > self.settings.residual:
             return False
         self.found.append(FoundGait(z, self.solving.DP.copy(), gait, [by]))

@@ -1,7 +1,6 @@
 """A periodic gait of a rigid walker, and what is to be known of it."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from walkerlab.mechanics.standing import Standing, swing_foot_motion
 from walkerlab.orbits.similarity import Units
 from walkerlab.orbits.small_slope import Vector
 from walkerlab.orbits.step_map import on_section
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 
@@ -52,15 +52,14 @@ class Gait:
         return tuple(found)
 
 
-def measured(walker: Standing, units: Units, method: Any, z: Vector, DP: Vector) -> Gait | None:
+def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Vector, DP: Vector) -> Gait | None:
     """The gait at section coordinates z (d,), after walking one step of it; None if that step does not end.
 
     walker  the unit walker, whose units are `units`
-    method  an integrator for the walker's equations
     DP      (d, d) derivative of the step map there
     """
     start = on_section(walker, z)
-    step = take_walk(walker, method, start, 1)
+    step = take_walk(walker, tolerances, start, 1)
     if step.steps == 0:
         return None
     values = sorted((complex(value) for value in np.linalg.eigvals(DP)), key=lambda value: (-abs(value), -value.imag))

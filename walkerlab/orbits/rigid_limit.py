@@ -25,9 +25,9 @@ from walkerlab.hybrid.comparison import (
     difference_in_time,
     sampled_at_strikes,
 )
-from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, walk_contact
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 METHOD, BUDGET = "radau5", 50_000_000
@@ -145,9 +145,9 @@ class Limit:
 
     def gait(self, walker: ContactWalker, near: ContactGait, tolerance: float) -> ContactGait | None:
         """The gait on this ground near another one's; None if it is not found."""
-        methods = settings(tolerance)
+        how = settings(tolerance)
         try:
-            found = find_contact_gait(walker, self.ground, methods, near.z, near.step.length_m, most_steps=30)
+            found = find_contact_gait(walker, self.ground, how, near.z, near.step.length_m, most_steps=30)
         except np.linalg.LinAlgError:
             return None
         return found if isinstance(found, ContactGait) else None
@@ -215,9 +215,9 @@ def motion_of_legs(states: NDArray[np.float64], walker: ContactWalker) -> tuple[
     return states[:, 2 + upper], states[:, 4 + n + upper]
 
 
-def settings(tolerance: float) -> MethodSettings:
+def settings(tolerance: float) -> Tolerances:
     """The method at a relative tolerance."""
-    return MethodSettings(method_named(METHOD), tolerance, ABSOLUTE * tolerance, BUDGET)
+    return Tolerances(METHOD, tolerance, ABSOLUTE * tolerance, BUDGET)
 
 
 def observed_orders(distances: list[Distance]) -> NDArray[np.float64]:

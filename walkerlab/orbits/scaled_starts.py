@@ -15,15 +15,13 @@ import numpy as np
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS
-from walkerlab.hybrid.contact_rules import STEPS
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings, balanced, new_observer, new_walk_state, walk_free
+from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, walk_contact
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.solvers.registry import finder_for, method_named
+from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.stepping import RHS
 from walkerlab.solvers.system import State
 
-METHOD = "radau5"
-NEVER = -1
+TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
 SETTLED = 0.02  # of the gait's period and step length
 MARGIN_STEP = 0.02  # how far apart factors are tried until one fails
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
@@ -45,15 +43,6 @@ class StartTrial(NamedTuple):
         return self.outcome == Outcome.WALKED and self.settled
 
 
-class ScaledWalk(NamedTuple):
-    """A walk's end and its touches."""
-
-    outcome: int
-    touch_time: np.ndarray  # (steps,) s
-    touch_along: np.ndarray  # (steps,) m
-    evaluations: int  # right-hand sides
-
-
 @dataclass(frozen=True)
 class ScaledStarts:
     """One scene, walked from its start with scaled velocities."""
@@ -65,9 +54,7 @@ class ScaledStarts:
     by_stance: State  # (2 + n) and the stance leg's
     steps: int
     gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if that is not asked
-    rtol: float = 1e-7
-    atol: float = 1e-9
-    budget: int = 10_000_000  # right-hand sides of a walk
+    tolerances: Tolerances = TOLERANCES
 
     def start(self, swing: float, stance: float) -> State:
         """The free walker's state with the velocities scaled by these factors."""
@@ -77,38 +64,27 @@ class ScaledStarts:
     def walk(self, swing: float, stance: float) -> StartTrial:
         """Walk from a scaled start."""
         walk = self.walked_from(self.start(swing, stance))
-        settled = walk.outcome == Outcome.WALKED and self.is_settled(walk.touch_time, walk.touch_along)
-        return StartTrial(walk.outcome, walk.touch_time.size, bool(settled), walk.evaluations)
+        settled = walk.outcome is Outcome.WALKED and (self.gait is None or self.settled_after(walk) is not None)
+        return StartTrial(walk.outcome, walk.touch_time_s.size, settled, int(walk.work[RHS]))
 
-    def walked_from(self, start: State) -> ScaledWalk:
+    def walked_from(self, start: State) -> ContactWalkResult:
         """Walk from a state of the free walker."""
-        walk_state = new_walk_state(self.walker, self.ground.terrain, STANCE_FOOT, self.steps, start)
-        observer = new_observer(self.walker, walk_state, start)
-        methods = MethodSettings(method_named(METHOD), self.rtol, self.atol, self.budget)
-        method = methods.of(self.walker)
-        finder = finder_for(method, EVENT_FUNCTIONS)
-        ended = walk_free(self.walker, self.ground, method, finder, observer, walk_state, 0.0, start, NEVER)
-        outcome = balanced(ended, observer, methods)
-        steps = int(walk_state.feet[STEPS])
-        return ScaledWalk(
-            int(outcome), walk_state.touch_time[:steps], walk_state.touch_along[:steps], int(method.counts[0])
-        )
+        return walk_contact(self.walker, self.ground, None, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
-    def is_settled(self, touch_time: np.ndarray, touch_along: np.ndarray) -> bool:
-        """Whether the last of a walk's steps is the gait's."""
+    def settled_after(self, walk: ContactWalkResult) -> int | None:
+        """Steps after which all periods and lengths are the gait's; None if the last step's are not, or without one."""
         if self.gait is None:
-            return True
+            return None
         period, length = self.gait
-        last_period = touch_time[-1] - (touch_time[-2] if touch_time.size > 1 else 0.0)
-        last_length = touch_along[-1] - (touch_along[-2] if touch_along.size > 1 else 0.0)
-        return bool(
-            abs(last_period - period) <= SETTLED * period and abs(last_length - length) <= SETTLED * abs(length)
-        )
+        off_period, off_length = np.abs(walk.periods_s - period), np.abs(walk.lengths_m - length)
+        off = np.flatnonzero((off_period > SETTLED * period) | (off_length > SETTLED * abs(length)))
+        first = int(off[-1]) + 1 if off.size else 0
+        return first if first < walk.periods_s.size else None
 
     def coarser(self, rtol: float, atol: float, budget: int) -> ScaledStarts:
-        """The same with other tolerances and no joins located: what a map can afford."""
+        """The same with other tolerances and no switching points located: what a map can afford."""
         quick = JudgedGround(self.ground.terrain, self.ground.frame._replace(locate_switching=False))
-        return replace(self, ground=quick, rtol=rtol, atol=atol, budget=budget)
+        return replace(self, ground=quick, tolerances=Tolerances(self.tolerances.method, rtol, atol, budget))
 
 
 def scaled_starts(

@@ -11,12 +11,11 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.scaled_starts import ScaledStarts
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 
 Integers = NDArray[np.int64]
-RIGID_METHOD, RIGID_RTOL, RIGID_ATOL = "dop853", 1e-7, 1e-9
-ENDLESS = 2**62
+RIGID = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
 # columns of a cell
 OUTCOME, STEPS, SETTLED, COLUMNS = 0, 1, 2, 3
 
@@ -52,13 +51,12 @@ def rigid_map(
     walker: Standing, state: State, swing: NDArray[np.float64], stance: NDArray[np.float64], steps: int
 ) -> StartMap:
     """The same starts in the rigid model, whose ground may also pull: then the outcome is `lifted-off`."""
-    method = method_named(RIGID_METHOD).new(len(state), RIGID_RTOL, RIGID_ATOL, ENDLESS)
     rows = []
     for factor_2 in stance:
         row = []
         for factor_1 in swing:
             start = with_scaled_rates(walker, state, float(factor_1), float(factor_2))
-            walk = take_walk(walker, method, start, steps)
+            walk = take_walk(walker, RIGID, start, steps)
             row.append((int(walk.outcome), walk.steps, walk.steps == steps))
         rows.append(np.array(row, np.int64))
     return as_map(swing, stance, rows)

@@ -25,14 +25,15 @@ from walkerlab.orbits.parameter_step import step_with_parameter, walk_with_tange
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import Shooting, new_shooting, on_section, variation_size
 from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
 from walkerlab.solvers.stepping import clear_counts
 
 Floats = NDArray[np.float64]
 W = TypeVar("W")
 
 RTOL, ATOL, BUDGET = 1e-13, 1e-13, 20_000
-QUICK_RTOL, QUICK_ATOL, ENDLESS = 1e-9, 1e-11, 2**62  # of long walks
+TOLERANCES = Tolerances("dop853", RTOL, ATOL, ENDLESS)
+QUICK_RTOL, QUICK_ATOL = 1e-9, 1e-11  # of long walks
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far
 CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
@@ -155,7 +156,7 @@ class RigidMap:
         self._section, self._places = len(like.picked), list(like.picked)
         self.names = SECTION_NAMES[: self._section]
         walking = new_dop853(n, RTOL, ATOL, BUDGET)
-        self._finder, self._method = finder_for(walking, EVENTS), walking
+        self._finder = finder_for(walking, EVENTS)
         self._with_variation = new_dop853(varied, RTOL, ATOL, BUDGET)
         self._quick = new_dop853(n, QUICK_RTOL, QUICK_ATOL, ENDLESS)
         self._quick_variation = new_dop853(varied, QUICK_RTOL, QUICK_ATOL, ENDLESS)
@@ -207,7 +208,7 @@ class RigidMap:
         unit = self._unit_at(p)
         assert unit is not None, "what is watched was walked"
         walker, units = unit
-        taken = take_walk(walker, self._method, on_section(walker, z), steps)
+        taken = take_walk(walker, TOLERANCES, on_section(walker, z), steps)
         return np.array(
             [
                 taken.min_normal_force * units.force,

@@ -16,7 +16,7 @@ from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
-from walkerlab.paper.measured import tight_method
+from walkerlab.paper.measured import TIGHT
 from walkerlab.paper.printed import adams_start_as_printed
 from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
@@ -85,7 +85,7 @@ class AdamsWalk:
 
 def adams_start(walker: Standing, state: State) -> AdamsStart:
     """Walk a step of the rigid model from Table 2's ADAMS start."""
-    walk = take_walk(walker, tight_method(), state, 1, sampled=True)
+    walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
     start = np.array([state])
     return AdamsStart(

@@ -13,12 +13,11 @@ from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies
 from walkerlab.paper.appendix_a import RigidWalker, assembled, step_length
-from walkerlab.solvers.dop853 import Dop853, new_dop853
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 
-EQUATIONS = 4
-RTOL, ATOL = 1e-12, 1e-14
-ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
+TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
+"""The error is far below any printed digit."""
 CYCLES = 5  # that the paper walks
 ENERGY_STEPS = 5  # over which the paper averages the energy
 
@@ -95,14 +94,9 @@ class RigidModel:
     energy_drift: float
 
 
-def tight_method() -> Dop853:
-    """An integrator whose error is far below any printed digit."""
-    return new_dop853(EQUATIONS, RTOL, ATOL, ENDLESS)
-
-
 def five_cycles(walker: RigidWalker, start: State) -> RecordedWalk:
     """Ten steps of the rigid model with samples in time."""
-    return take_walk(assembled(walker), tight_method(), start, 2 * CYCLES, sampled=True)
+    return take_walk(assembled(walker), TIGHT, start, 2 * CYCLES, sampled=True)
 
 
 def energy_record(walker: RigidWalker, walk: RecordedWalk) -> Array:

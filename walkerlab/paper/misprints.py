@@ -10,7 +10,7 @@ from scipy.optimize import root
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.paper.appendix_a import RigidWalker, assembled
-from walkerlab.paper.measured import tight_method
+from walkerlab.paper.measured import TIGHT
 from walkerlab.solvers.system import State
 
 RIGHT, MISPRINTED = 1.0, -1.0  # sign of the second row of P and E
@@ -76,7 +76,7 @@ def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float
 
 def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
     """One step with the impact of (A.57): the state after it; None if there is no heel strike."""
-    walk = take_walk(assembled(walker), tight_method(), start, 1)
+    walk = take_walk(assembled(walker), TIGHT, start, 1)
     if walk.steps == 0:
         return None
     before = as_state(walk.before[0])

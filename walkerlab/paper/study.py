@@ -12,12 +12,12 @@ from walkerlab.paper.adams_start import AdamsStart, adams_start
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.paper.measured import (
     ENERGY_STEPS,
+    TIGHT,
     Characteristics,
     RigidModel,
     characteristics,
     five_cycles,
     rigid_model,
-    tight_method,
 )
 from walkerlab.paper.misprints import (
     MISPRINTED,
@@ -98,9 +98,9 @@ def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
     printed, right = walker_of_the_paper(AS_PRINTED), walker_of_the_paper(CORRECTED)
     gaits = {name: settled(walker_of_the_paper(sign)) for name, sign in SIGNS.items()}
-    one_step = take_walk(assembled(printed), tight_method(), gaits["as-printed"], 1, sampled=True)
+    one_step = take_walk(assembled(printed), TIGHT, gaits["as-printed"], 1, sampled=True)
     cycles = five_cycles(printed, fixed_point_as_printed())
-    five_steps = take_walk(assembled(printed), tight_method(), fixed_point_as_printed(), ENERGY_STEPS)
+    five_steps = take_walk(assembled(printed), TIGHT, fixed_point_as_printed(), ENERGY_STEPS)
     slope, rounding = slope_of(*X_P[:2])
     return PaperStudy(
         slope=slope,
@@ -121,7 +121,7 @@ def study_the_paper() -> PaperStudy:
 
 def settled(walker: RigidWalker) -> State:
     """The stable gait that walking from x_p leads to."""
-    walk = take_walk(assembled(walker), tight_method(), fixed_point_as_printed(), SETTLING_STEPS)
+    walk = take_walk(assembled(walker), TIGHT, fixed_point_as_printed(), SETTLING_STEPS)
     if walk.steps < SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
     return walk.final_state

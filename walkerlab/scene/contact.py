@@ -23,21 +23,20 @@ from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
-from walkerlab.hybrid.contact_run import JudgedGround, MethodSettings
+from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, JudgedGround, walk_contact
 from walkerlab.mechanics.parts import Assembly, Position
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.scene.parts import AnyWalker, assembly_of
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig, RigidConfig
     from walkerlab.config.schema import Contact
 
-GAIT_METHOD, GAIT_RTOL, GAIT_ATOL = "radau5", 1e-10, 1e-12  # the tangent is exact for this method
+GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
-GAIT_BUDGET = 10_000_000  # right-hand sides
 
 
 @dataclass(frozen=True)
@@ -55,6 +54,19 @@ class ContactScene:
     def ground(self) -> JudgedGround:
         """What a walk happens on and is judged by."""
         return JudgedGround(self.terrain, self.frame)
+
+    def walk(
+        self,
+        start: State,
+        steps: int,
+        tolerances: Tolerances,
+        sampling: float | Floats | None = None,
+        track_energy: bool = True,
+    ) -> ContactWalkResult:
+        """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`."""
+        return walk_contact(
+            self.walker, self.ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling, track_energy
+        )
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
@@ -153,8 +165,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     rigid_step_length_m  what the pads are laid for to begin with
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
-    methods = MethodSettings(method_named(GAIT_METHOD), GAIT_RTOL, GAIT_ATOL, GAIT_BUDGET)
-    return find_gait_from(scene.walker, scene.ground, methods, start_state(scene, rigid_state))
+    return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
 
 
 def wants_own_pitch(contact: Contact) -> bool:

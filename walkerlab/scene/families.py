@@ -10,13 +10,14 @@ from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.step_maps import RigidMap
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
     from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
 
-CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET = 1e-10, 1e-12, 60_000
-"""Of one step of the contact model; right-hand sides."""
+CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
+"""Of one step of the contact model."""
 
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
@@ -53,13 +54,10 @@ def walkers_on_ground(
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
-    from walkerlab.hybrid.contact_run import MethodSettings
     from walkerlab.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
-    from walkerlab.solvers.registry import method_named
 
-    methods = MethodSettings(method_named("radau5"), CONTACT_RTOL, CONTACT_ATOL, CONTACT_BUDGET)
     on_pads = config.contact is not None and config.contact.terrain == "checkerboard"
     walkers = walkers_on_ground(config, parameter, step_length_m)
     like = contact_scene(config, step_length_m, step_length_m).walker
-    return ContactMap(walkers, scale, methods, step_length_m, on_pads, like)
+    return ContactMap(walkers, scale, CONTACT, step_length_m, on_pads, like)

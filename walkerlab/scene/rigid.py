@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
+from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
 from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
 from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig, SimulateConfig
     from walkerlab.config.schema import Equations
 
 REMEMBERED = 16  # walkers: over a slope the same one is asked for again and again
-ENDLESS = 2**62  # right-hand sides; a walk is given its budget step by step
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class RigidScene:
     """A walker on its slope, ready to walk."""
 
     walker: Standing
-    method: Any  # integrator for the swing phase
+    tolerances: Tolerances
     names: tuple[str, ...]  # of the state's numbers
     knee_m: tuple[float, float] | None  # the knee in its thigh's frame
     states: bool  # whether angles and velocities in time are wanted
@@ -39,6 +41,12 @@ class RigidScene:
         """Whether anything in time is wanted."""
         return self.states or self.energies or self.forces
 
+    def walk(
+        self, start: State, steps: int, tolerances: Tolerances, advance: Callable[[int], None] | None = None
+    ) -> RecordedWalk:
+        """Walk up to `steps` steps from a state (2 n), sampled if anything in time is wanted; see `take_walk`."""
+        return take_walk(self.walker, tolerances, start, steps, self.sampled, advance)
+
 
 def rigid_scene(config: SimulateConfig) -> RigidScene:
     """The scene of a config: its equations, its method, and of the outputs those that it asks for."""
@@ -47,7 +55,7 @@ def rigid_scene(config: SimulateConfig) -> RigidScene:
     wanted = config.outputs
     return RigidScene(
         walker=walker,
-        method=method_named(settings.method).new(len(walker.blank), settings.rtol, settings.atol, ENDLESS),
+        tolerances=Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS),
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
         states="states" in wanted,

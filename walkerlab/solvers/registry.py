@@ -51,6 +51,34 @@ def method_named(name: str) -> Method:
     raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
 
 
+ENDLESS = 2**62
+"""A budget for a walk that is given its right-hand sides step by step."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """By which method a walk is integrated, and how exactly.
+
+    method      its name
+    rtol, atol  on the error of a step
+    budget      right-hand sides of a walk
+    """
+
+    method: str
+    rtol: float
+    atol: float
+    budget: int
+
+    @property
+    def compiled(self) -> bool:
+        """Whether whole walks compile with the method."""
+        return method_named(self.method).compiled
+
+    def new(self, n: int) -> Any:
+        """The method with memory for n equations."""
+        return method_named(self.method).new(n, self.rtol, self.atol, self.budget)
+
+
 def sharing(method: Any, clock: Any, counts: Any) -> Any:
     """The method with another's clock and counts for its own: both integrate one walk, by turns."""
     if isinstance(method, ScipyMethod):
@@ -64,4 +92,4 @@ def finder_for(method: Any, event_functions: int) -> CrossingFinder:
     return new_crossing_finder(dense_degree(method), event_functions)
 
 
-__all__ = ["METHODS", "Method", "ScipyMethod", "finder_for", "method_named", "sharing"]
+__all__ = ["ENDLESS", "METHODS", "Method", "ScipyMethod", "Tolerances", "finder_for", "method_named", "sharing"]

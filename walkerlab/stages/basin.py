@@ -19,7 +19,7 @@ from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.basin import NONE, Attractors, Floats, Window, edge_cells, find_attractors
-from walkerlab.orbits.scaled_starts import scaled_starts
+from walkerlab.orbits.scaled_starts import TOLERANCES, scaled_starts
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import contact_gait, start_state
@@ -161,7 +161,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 
     starts = scaled_starts(scene.walker, scene.ground, start_of, config.basin.contact_steps, own)
     settings = config.solver.contact
-    starts = replace(starts, rtol=settings.rtol, atol=settings.atol)
+    starts = replace(starts, tolerances=replace(TOLERANCES, rtol=settings.rtol, atol=settings.atol))
     usual = starts.walk(1.0, 1.0).evaluations
     return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
 

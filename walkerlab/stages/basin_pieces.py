@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 OUTCOMES: Final = 16  # more than there are
 ATTRACTORS: Final = 4096
-SETTLED: Final = 0.02  # of the gait's period and step length: a contact walk whose last steps are so near has settled
 
 
 @dataclass(frozen=True)
@@ -85,21 +84,8 @@ class ContactQuestion:
         """Outcome, attractor and steps of one walk."""
         state = on_section(self.rigid, z)
         walk = self.starts.walked_from(start_state(self.scene, state))
-        settled = self.settled_after(walk.touch_time, walk.touch_along) if walk.outcome == Outcome.WALKED else None
-        if settled is None:
-            return walk.outcome, NONE, walk.touch_time.size
-        return walk.outcome, 0, settled
-
-    def settled_after(self, touch_time: Floats, touch_along: Floats) -> int | None:
-        """Steps after which all periods and lengths are the gait's; None if the last step's are not."""
-        if self.starts.gait is None:
-            return None
-        period, length = self.starts.gait
-        periods, lengths = np.diff(touch_time, prepend=0.0), np.diff(touch_along, prepend=0.0)
-        near = (np.abs(periods - period) <= SETTLED * period) & (np.abs(lengths - length) <= SETTLED * abs(length))
-        off = np.flatnonzero(~near)
-        first = int(off[-1]) + 1 if off.size else 0
-        return first if first < near.size else None
+        settled = self.starts.settled_after(walk) if walk.outcome is Outcome.WALKED else None
+        return (walk.outcome, NONE, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
 
 
 Question = RigidQuestion | ContactQuestion

@@ -10,9 +10,8 @@ import numpy as np
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_the_papers
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid.comparison import Array, Motion, sampled_at_strikes
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
@@ -32,9 +31,8 @@ from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.rows import paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
-from walkerlab.scene.contact import GAIT_ATOL, GAIT_METHOD, GAIT_RTOL, contact_scene, start_state
+from walkerlab.scene.contact import GAIT, contact_scene, start_state
 from walkerlab.scene.rigid import compass
-from walkerlab.solvers.registry import method_named
 from walkerlab.solvers.system import State
 from walkerlab.stages.compared_motion import Comparison, compare_motion
 from walkerlab.stages.compared_releases import LEFT_OUT, KneedStart, compare_releases
@@ -45,7 +43,6 @@ from walkerlab.store.content import Content, Group
 
 STEPS_OF_A_STRIDE = 2
 SAMPLES_OF_A_MOTION = 2
-X_P_BUDGET = 2_000_000  # right-hand sides
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 
@@ -195,8 +192,7 @@ def walk_from_x_p(config: ContactConfig, pitch_m: float) -> ContactWalkResult:
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch_m, pitch_m)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
-    methods = MethodSettings(method_named(GAIT_METHOD), GAIT_RTOL, GAIT_ATOL, X_P_BUDGET)
-    return walk_contact(scene.walker, scene.ground, scene.pinned, STANCE_FOOT, start, methods, 2 * CYCLES, None)
+    return scene.walk(start, 2 * CYCLES, GAIT)
 
 
 def energy_of(walk: Content) -> EnergyRecord | None:

@@ -6,25 +6,24 @@ the impact, released at first touch it is free.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from walkerlab.config.reads import ContactConfig, RigidConfig
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Knees
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, by_channel, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
-from walkerlab.scene.contact import GAIT_METHOD, ContactScene, contact_scene, start_state
+from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 RELEASES = {"compression": False, "touch": True}
 """Instants of release, as the config names them, and whether that is the leading foot's first touch."""
 STEPS = 20  # enough for what starts at a gait to come to rest at another one, or to fall
-RIGID_METHOD, RIGID_STEPS = "dop853", 200
-RTOL, ATOL = 1e-8, 1e-10
-BUDGET = 2_000_000  # right-hand sides of one walk
+RIGID_STEPS = 200
+RIGID, CONTACT = Tolerances("dop853", 1e-8, 1e-10, 2_000_000), Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
 LEFT_OUT = (
     {
         "what": "ideal against compliant lock",
@@ -58,8 +57,7 @@ def compare_releases(config: ContactConfig, start: KneedStart) -> dict[str, Any]
 def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str, Any]:
     """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
     model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
-    method = method_named(RIGID_METHOD).new(len(model.blank), RTOL, ATOL, BUDGET)
-    walk = take_walk(model, method, state, RIGID_STEPS)
+    walk = take_walk(model, RIGID, state, RIGID_STEPS)
     last = {} if not walk.steps else {"period_s": float(walk.periods[-1]), "length_m": float(walk.lengths[-1])}
     return {"outcome": walk.outcome.label, "steps": walk.steps, "of": RIGID_STEPS, **last}
 
@@ -68,8 +66,7 @@ def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResu
     """A walk from a state of the rigid model; at_touch: released at the leading foot's first touch."""
     walker = scene.walker._replace(knees=scene.walker.knees._replace(release_at_touch=at_touch))
     pinned = None if scene.pinned is None else scene.pinned._replace(walker=walker)
-    methods = MethodSettings(method_named(GAIT_METHOD), RTOL, ATOL, BUDGET)
-    return walk_contact(walker, scene.ground, pinned, STANCE_FOOT, start_state(scene, state), methods, STEPS, None)
+    return replace(scene, walker=walker, pinned=pinned).walk(start_state(scene, state), STEPS, CONTACT)
 
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:

@@ -11,17 +11,14 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, SceneConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.held import Knees
 from walkerlab.ground.terrain import Terrain
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
     ContactWalkResult,
-    MethodSettings,
     by_channel,
     sampled_energies,
     sampled_feet,
-    walk_contact,
 )
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
@@ -35,7 +32,7 @@ from walkerlab.scene.contact import (
     wants_own_pitch,
 )
 from walkerlab.scene.left_out import of_contact_walk
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
 from walkerlab.stages.walk_columns import TIME, legs, numbers_of_steps, of_body, of_steps, over_time
@@ -53,23 +50,12 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = contact_scene(config, rigid_step, own_pitch(config, rigid_step, rigid_state))
     settings = config.solver.contact
-    methods = MethodSettings(
-        method_named(settings.method), settings.rtol, settings.atol, 2 * config.strides * BUDGET_PER_STEP
-    )
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, 2 * config.strides * BUDGET_PER_STEP)
     sampled = bool(config.outputs)
     interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
     tell_unresolved_slip(settings.atol, scene, progress)
     progress.start("contact-sim", 1)
-    result = walk_contact(
-        scene.walker,
-        scene.ground,
-        scene.pinned,
-        STANCE_FOOT,
-        start_state(scene, rigid_state),
-        methods,
-        2 * config.strides,
-        interval,
-    )
+    result = scene.walk(start_state(scene, rigid_state), 2 * config.strides, tolerances, interval)
     progress.advance()
     if result.samples is not None:
         stored = thinned(result.samples, result.samples.time_s, result.touch_time_s, progress)
@@ -89,10 +75,10 @@ def compile_kernels(config: ContactSimConfig) -> None:
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
     y = start_state(scene, standing(scene))
     settings = config.solver.contact
-    methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, 1)
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, 1)
     interval = scene.frame.pendulum_time if config.outputs else None
     for pinned in dict.fromkeys((scene.pinned, None)):
-        result = walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, y, methods, 1, interval)
+        result = replace(scene, pinned=pinned).walk(y, 1, tolerances, interval)
         groups(config, scene, result)
 
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkerlab.hybrid.recorded_walk import Samples, take_walk
+from walkerlab.hybrid.recorded_walk import Samples
 from walkerlab.mechanics.rigid import knee_of
 from walkerlab.orbits.families import GaitBranch, GaitPoint
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import ENDLESS, RigidScene, coordinates, rigid_walker
-from walkerlab.solvers.dop853 import new_dop853
+from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.stages.simulate import trajectory_group
 from walkerlab.store.content import Group
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
 STRIDE = 2  # steps, after which each leg is where it was
-RTOL, ATOL = 1e-9, 1e-11
+TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 EVERY = 3  # which samples are kept beside those at heel strikes
 
 
@@ -55,12 +55,11 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
     section, n = on_section(unit, point.z), len(walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
-    method = new_dop853(2 * n, RTOL, ATOL, ENDLESS)
-    walk = take_walk(walker, method, start, steps, sampled=True)
+    knee = knee_of(assembly_of(changed.walker, rigid=True))
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, states=True, energies=True, forces=True)
+    walk = scene.walk(start, steps, TOLERANCES)
     if walk.steps < steps or walk.samples is None:
         return
-    knee = knee_of(assembly_of(changed.walker, rigid=True))
-    scene = RigidScene(walker, method, coordinates(changed), knee, states=True, energies=True, forces=True)
     seen = trajectory_group(scene, walk, thinned(walk.samples))
     yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
 

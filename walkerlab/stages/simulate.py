@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.config.reads import SimulateConfig, StartConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state, take_walk
+from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
 from walkerlab.mechanics.standing import STANCE
 from walkerlab.scene.left_out import of_rigid_walk
@@ -27,7 +27,7 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     scene = rigid_scene(config)
     steps = 2 * config.strides
     progress.start("simulate", steps)
-    walk = take_walk(scene.walker, scene.method, start_state(config, inputs), steps, scene.sampled, progress.advance)
+    walk = scene.walk(start_state(config, inputs), steps, scene.tolerances, progress.advance)
     if walk.samples is not None:
         walk = replace(walk, samples=thinned(walk.samples, walk.samples.time, walk.heel_strikes, progress))
     content = Content(groups(scene, walk), summary(config, walk))

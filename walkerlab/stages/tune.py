@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from walkerlab.config.reads import ContactConfig, TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.pinned import Pinned
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import (
+    TOLERANCES,
     Adjustment,
     Margin,
     MarginSearch,
@@ -34,7 +33,7 @@ from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
 from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
 from walkerlab.stages.progress import Progress
@@ -46,7 +45,7 @@ from walkerlab.workers import in_order
 # tolerances of the map: away from edges its outcomes are those of the config's (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
 LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
-RIGID_METHOD, RIGID_RTOL, RIGID_ATOL, ENDLESS = "dop853", 1e-10, 1e-12, 2**62
+RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
 COMPASS_CELLS, CELLS, COARSE = 61, 21, MarginSearch(step=0.05, largest=2.0)
@@ -206,7 +205,8 @@ class TuneRun:
             self.steps,
             own,
         )
-        return replace(starts, rtol=settings.rtol, atol=settings.atol, budget=self.steps * BUDGET_PER_STEP)
+        budget = self.steps * BUDGET_PER_STEP
+        return replace(starts, tolerances=replace(TOLERANCES, rtol=settings.rtol, atol=settings.atol, budget=budget))
 
     def scaled_state(self, swing: float, stance: float) -> State:
         """The rigid start with its velocities scaled."""
@@ -232,16 +232,11 @@ class TuneRun:
     def walk(self, state: State, pinned: Pinned | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples."""
         settings = self.config.solver.contact
-        methods = MethodSettings(
-            method_named(settings.method), settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP
-        )
+        tolerances = Tolerances(settings.method, settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP)
         scene = replace(self.scene, pinned=pinned)
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
-        start = start_state(scene, state)
-        return walk_contact(scene.walker, scene.ground, pinned, STANCE_FOOT, start, methods, self.steps, interval)
+        return scene.walk(start_state(scene, state), self.steps, tolerances, interval)
 
     def rigid_walk(self) -> RecordedWalk:
         """The rigid model from its start, with samples."""
-        method = method_named(RIGID_METHOD).new(len(self.rigid_state), RIGID_RTOL, RIGID_ATOL, ENDLESS)
-        state: Any = self.rigid_state
-        return take_walk(self.rigid, method, state, self.steps, sampled=True)
+        return take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True)

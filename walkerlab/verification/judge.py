@@ -58,7 +58,7 @@ def judge(case: Case, config: Config) -> CaseResult:
         second = second_walk(
             start.settings.method,
             case.budget,
-            lambda method, budget: start.walk(short, replace(methods, method=method, budget=budget)),
+            lambda method, budget: start.walk(short, replace(methods, method=method.name, budget=budget)),
         )
         for what, again in walked_again(start, config, short, second):
             found += time_difference(what, walk, again, case, methods.rtol)

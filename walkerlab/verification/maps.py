@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.hybrid.contact_run import MethodSettings
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TENFOLD
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
@@ -113,7 +112,7 @@ class StepColumn:
         case, config = on_ground(self.stiffness, None, STEPS, REFERENCE_BUDGET)
         start = prepared_on_ground(config, case)
         name, rtol, atol = REFERENCE
-        walk = start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget))
+        walk = start.walk(case, Tolerances(name, rtol, atol, case.budget))
         if not walk.outcome.answered:
             return [float(VERDICTS.index("no reference")), NONE] * self.cells
         arrival = arrival_of("map", walk.record, natural_units(config))

@@ -15,21 +15,11 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.friction import steepest_change
-from walkerlab.hybrid.contact_run import (
-    ContactSamples,
-    ContactWalkResult,
-    MethodSettings,
-    gather,
-    new_observer,
-    new_walk_state,
-    run_parts,
-    sampled_feet,
-)
+from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, sampled_feet
 from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED
 from walkerlab.solvers.system import State
 from walkerlab.verification.masses import Masses
@@ -93,11 +83,11 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
     scale = mass * np.array([speed, speed, speed * leg])
     settings, steps = config.solver.contact, min(case.steps, STEPS)
-    methods = MethodSettings(method_named(settings.method), settings.rtol, settings.atol, case.budget)
-    walk = looked_at(scene, start, methods, steps, np.zeros(0))
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
+    walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)
     for _ in range(PASSES):
-        samples = samples_of(looked_at(scene, start, methods, steps, with_middles(grid)))
+        samples = samples_of(scene.walk(start, steps, tolerances, with_middles(grid)))
         given = impulse_rate(samples, scene, config) / scale
         change = unsettled(samples.time_s, given)
         wanting = change > SETTLED / grid.size
@@ -108,19 +98,9 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     apart = np.abs(held - held[0] - impulse(samples.time_s, given))
     accepted = int(walk.work[ACCEPTED])
     # in a state between the solver's own the slip is known to its tolerance, with another sign in every step
-    slip = methods.atol + methods.rtol * speed
+    slip = tolerances.atol + tolerances.rtol * speed
     push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
     return Balance(float(apart.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
-
-
-def looked_at(
-    scene: ContactScene, start: State, methods: MethodSettings, steps: int, times: Array
-) -> ContactWalkResult:
-    """Walk and keep the states at these times (s); sampling does not change the walk."""
-    walk_state = new_walk_state(scene.walker, scene.terrain, STANCE_FOOT, steps, start)
-    observer = new_observer(scene.walker, walk_state, start, 1.0, times.size)._replace(times=times)
-    outcome, stopped = run_parts(scene.walker, scene.ground, scene.pinned, start, methods, observer, walk_state)
-    return gather(outcome, stopped, walk_state, observer, scene.walker, methods)
 
 
 def samples_of(walk: ContactWalkResult) -> ContactSamples:

@@ -22,10 +22,10 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings
+from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.paper.appendix_a import RigidWalker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
 from walkerlab.verification.scaling import pendulum_time
@@ -84,7 +84,7 @@ def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     name, rtol, atol = REFERENCE
     arrival = arrival_of(
         case.name,
-        start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget)).record,
+        start.walk(case, Tolerances(name, rtol, atol, case.budget)).record,
         natural_units(config),
     )
     if arrival.time_s == 0.0:
@@ -99,7 +99,7 @@ def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     if not isinstance(start, RigidStart) or start.compass is None:
         return ()
     name, rtol, atol = RIGID_REFERENCE
-    walk = start.walk(case, MethodSettings(method_named(name), rtol, atol, case.budget)).record
+    walk = start.walk(case, Tolerances(name, rtol, atol, case.budget)).record
     if not walk.steps:
         return ()
     units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])

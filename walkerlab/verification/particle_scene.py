@@ -17,13 +17,13 @@ from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, FootMotion
-from walkerlab.hybrid.contact_events import EVENT_FUNCTIONS, Frame, feet_motion
+from walkerlab.hybrid.contact_events import Frame, feet_motion
 from walkerlab.hybrid.contact_rules import LAST_TOUCH
-from walkerlab.hybrid.contact_run import NEVER, JudgedGround, MethodSettings, new_observer, new_walk_state, walk_free
+from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
-from walkerlab.solvers.registry import finder_for, method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 Array = NDArray[np.float64]
@@ -84,19 +84,17 @@ def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol
     walk_state = new_walk_state(of.walker, ground.terrain, 1, 1, start)
     walk_state.at_zero[:] = 0
     walk_state.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
-    observer = new_observer(of.walker, walk_state, start, duration_s / SAMPLES, SAMPLES)
-    method = MethodSettings(method_named("radau5"), rtol, atol, BUDGET).new(len(of.walker.blank))
-    finder = finder_for(method, EVENT_FUNCTIONS)
-    outcome = Outcome(walk_free(of.walker, ground, method, finder, observer, walk_state, 0.0, start, NEVER))
+    observer = new_observer(of.walker, walk_state, start, np.arange(SAMPLES, dtype=np.float64) * duration_s / SAMPLES)
+    outcome, stopped = walk_on(of.walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
     if outcome is not Outcome.NO_HEEL_STRIKE:
-        raise ArithmeticError(f"ended as {outcome.label} at {method.clock[1]:.4g} s of {duration_s:.4g} s")
+        raise ArithmeticError(f"ended as {outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
     return ParticleRun(
         observer.times[:seen].copy(),
         observer.states[:seen].copy(),
-        tuple(method.y.tolist()),
+        stopped.state,
         observer.dissipated.copy(),
-        method.counts[:4].copy(),
+        stopped.work,
     )
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig, WalksConfig
 from walkerlab.config.schema import SolverSettings
 from walkerlab.config.stability import Case
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
@@ -23,7 +22,7 @@ from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED, RHS
 from walkerlab.solvers.system import State
 from walkerlab.verification.masses import RigidMasses
@@ -85,10 +84,9 @@ class RigidStart:
         """As far as a case is walked again: no further than times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
-    def walk(self, case: Case, methods: MethodSettings) -> JudgedWalk:
+    def walk(self, case: Case, tolerances: Tolerances) -> JudgedWalk:
         """Walk a case by a method."""
-        solver = methods.new(len(self.walker.blank))
-        walk = take_walk(self.walker, solver, self.start, case.steps, budget=methods.budget)
+        walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
         touches = walk.heel_strikes / pendulum_time(self.config)
         work = walk.work
@@ -141,13 +139,11 @@ class ContactStart:
         """As far as a case is walked again: all the way, since how it ends is compared too."""
         return case
 
-    def walk(self, case: Case, methods: MethodSettings, sampled: bool = False) -> JudgedWalk:
+    def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
         """Walk a case by a method."""
         scene, unit = self.scene, pendulum_time(self.config)
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
-        walk = walk_contact(
-            scene.walker, scene.ground, scene.pinned, STANCE_FOOT, self.start, methods, case.steps, interval
-        )
+        walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
         return JudgedWalk(
             walk.outcome,
@@ -183,10 +179,10 @@ class ContactStart:
 Start = RigidStart | ContactStart
 
 
-def configured(start: Start, case: Case, tighter: float = 1.0) -> MethodSettings:
+def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
     """The config's method, at tolerances so many times its own, within the case's budget."""
     settings = start.settings
-    return MethodSettings(method_named(settings.method), tighter * settings.rtol, tighter * settings.atol, case.budget)
+    return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
 
 
 @cache

@@ -28,12 +28,12 @@ from walkerlab.benchmarks.engines.runs import (
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.held import held_flags, no_stops
-from walkerlab.hybrid.contact_run import ContactWalkResult, MethodSettings, knees_at_start, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
 from walkerlab.mechanics.tree import mass_matrix
 from walkerlab.solvers.in_tuples import derivative
-from walkerlab.solvers.registry import method_named
+from walkerlab.solvers.registry import Tolerances
 
 Floats = NDArray[np.float64]
 
@@ -78,9 +78,9 @@ class Truth:
 
 def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
     """Our walk; with `until_s` also the state then."""
-    settings = MethodSettings(method_named(method), rtol, 1e-2 * rtol, ENDLESS)
+    tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS)
     return walk_contact(
-        scene.ours, scene.ground, None, scene.stance, scene.start, settings, steps, until_s, track_energy=False
+        scene.ours, scene.ground, None, scene.stance, scene.start, tolerances, steps, until_s, track_energy=False
     )
 
 
