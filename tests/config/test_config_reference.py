@@ -33,7 +33,7 @@ def test_the_text_is_a_table_with_one_line_a_key() -> None:
     lines = as_text().splitlines()
     width = lines[0].count("|")
     table = [line for line in lines if line.startswith("|")]
-    assert len(table) == len(keys()) + 2
+    assert len(table) == len(list(keys())) + 2
     assert {line.count("|") for line in table} == {width}
     assert len({len(line) for line in table}) == 1
 

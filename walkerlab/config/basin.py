@@ -13,7 +13,6 @@ Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
 LARGEST: Final = 1e6  # of a window's bounds
 
-_HERE: Final = "this project"
 _UNIT: Final = "rad, rad/s"
 _WIDTH: Final = "the gait's own, 0.15 rad and 0.25 sqrt(g/L) away"
 _Bound = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
@@ -23,7 +22,7 @@ _Bounds = tuple[_Bound, ...]  # empty: the usual window
 class Basin(Block):
     """Starts on a grid over coordinates of the section just after heel strike; the others are the gait's."""
 
-    model: Annotated[Literal["rigid", "contact"], key("", "which model walks", _HERE)] = "rigid"
+    model: Annotated[Literal["rigid", "contact"], key("", "which model walks")] = "rigid"
     plane: Annotated[
         tuple[Coordinate, ...],
         key(
@@ -36,40 +35,29 @@ class Basin(Block):
     ] = ("theta_2", "dtheta_2")
     cells: Annotated[
         tuple[Annotated[int, Field(ge=2, le=4000)], ...],
-        key(
-            "1", "cells along each of them", _HERE, bounds="a number from 2 to 4000 for each coordinate", sequence=True
-        ),
+        key("1", "cells along each of them", bounds="a number from 2 to 4000 for each coordinate", sequence=True),
     ] = (400, 400)
     lower: Annotated[
         _Bounds,
-        key(
-            _UNIT,
-            "where the window begins",
-            _HERE,
-            bounds="a number for each",
-            default=f"below {_WIDTH}",
-            sequence=True,
-        ),
+        key(_UNIT, "where the window begins", bounds="a number for each", default=f"below {_WIDTH}", sequence=True),
     ] = ()
     upper: Annotated[
         _Bounds,
         key(
             _UNIT,
             "where the window ends",
-            _HERE,
             bounds="a number for each, above `lower`",
             default=f"above {_WIDTH}",
             sequence=True,
         ),
     ] = ()
     refine: Annotated[
-        int,
-        key("1", "parts along each axis that cells at edges of basins are divided into; 1: none", _HERE, ge=1, le=32),
+        int, key("1", "parts along each axis that cells at edges of basins are divided into; 1: none", ge=1, le=32)
     ] = 4
     steps: Annotated[
-        int, key("1", "steps of the rigid model after which a walk is called unsettled", _HERE, ge=1, le=1_000_000)
+        int, key("1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
     ] = 300
-    contact_steps: Annotated[int, key("1", "steps that the contact model walks", _HERE, ge=2, le=10_000)] = 12
+    contact_steps: Annotated[int, key("1", "steps that the contact model walks", ge=2, le=10_000)] = 12
 
     @field_validator("plane")
     @classmethod

@@ -35,13 +35,9 @@ class ContactSI:
     dynamic_friction: float
 
 
-def _pitch_kind(value: Any) -> str:
-    return "word" if isinstance(value, str) else "number"
-
-
 PadPitch = Annotated[
     Annotated[Literal["rigid", "own"], Tag("word")] | Annotated[float, Field(ge=1e-6, le=1e4), Tag("number")],
-    Discriminator(_pitch_kind),
+    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
 ]
 
 
@@ -81,8 +77,7 @@ class Contact(Block):
         ),
     ] = 0.7
     stiction_velocity: Annotated[
-        float,
-        key("mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0),
+        float, key("mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0)
     ] = 100.0
     friction_velocity: Annotated[
         float,

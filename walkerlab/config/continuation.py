@@ -12,13 +12,13 @@ from walkerlab.config.fields import Block, key
 FollowedModel = Literal["rigid", "contact", "both"]
 FollowedKey = Annotated[
     str,
-    key("", "key of the config that changes, a number such as slope_deg or walker.hip_mass_kg", "this project",
+    key("", "key of the config that changes, a number such as slope_deg or walker.hip_mass_kg",
         bounds="a key with its blocks, dotted"),
     Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"),
 ]  # fmt: skip
 _UNIT: Final = "that of the key"
-_From = Annotated[float, key(_UNIT, "where the span begins", "this project", bounds="a number below `to`")]
-_To = Annotated[float, key(_UNIT, "where the span ends", "this project", bounds="a number above `from`")]
+_From = Annotated[float, key(_UNIT, "where the span begins", bounds="a number below `to`")]
+_To = Annotated[float, key(_UNIT, "where the span ends", bounds="a number above `from`")]
 
 
 def _above_from(cls: type[Block], value: float, info: ValidationInfo) -> float:  # noqa: ARG001 - pydantic passes it
@@ -63,14 +63,9 @@ class Span(_Span):
 class Continuation(Span):
     """What `walkerlab continuation` follows."""
 
-    model: Annotated[
-        FollowedModel, key("", "which model's gaits: rigid, contact, or both on the same axes", "this project")
-    ] = "rigid"
-    periods: Annotated[
-        int, key("1", "steps of the longest gaits that the cascade is followed to", "this project", ge=1, le=64)
-    ] = 16
-    points: Annotated[int, key("1", "points of one branch, at most", "this project", ge=2, le=100_000)] = 400
-    second: Annotated[
-        Span | None,
-        key("", "a second key, for the curves of folds and flips in the plane of both", "this project"),
-    ] = None
+    model: Annotated[FollowedModel, key("", "which model's gaits: rigid, contact, or both on the same axes")] = "rigid"
+    periods: Annotated[int, key("1", "steps of the longest gaits that the cascade is followed to", ge=1, le=64)] = 16
+    points: Annotated[int, key("1", "points of one branch, at most", ge=2, le=100_000)] = 400
+    second: Annotated[Span | None, key("", "a second key, for the curves of folds and flips in the plane of both")] = (
+        None
+    )

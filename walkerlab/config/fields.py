@@ -22,7 +22,7 @@ class Block(BaseModel):
 def key(
     unit: str,
     meaning: str,
-    source: str,
+    source: str = "this project",
     *,
     bounds: str = "",
     default: str = "",

@@ -48,14 +48,11 @@ def find(path: Path) -> ConfigFile:
     """The file of `--config`: a path, or else the name of a built-in config."""
     if str(path) in builtin_names() and not path.is_file():
         return builtin(str(path))
-    return ConfigFile(path, shown(str(path), SHOWN_PATH))
+    return file_at(path)
 
 
-def find_parent(name: str, child: ConfigFile) -> ConfigFile:
-    """The file of `extends: name` in `child`: the name of a built-in config, or a path from the child's folder."""
-    if name in builtin_names():
-        return builtin(name)
-    path = child.path.parent / name
+def file_at(path: Path) -> ConfigFile:
+    """The file of a path."""
     return ConfigFile(path, shown(str(path), SHOWN_PATH))
 
 
@@ -93,8 +90,7 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
     named = block.entries.get("cases") if isinstance(block, Mapping) else None
     if not isinstance(block, Mapping) or not isinstance(named, Scalar) or not isinstance(named.value, str):
         return layer
-    path = folder / named.value
-    file = ConfigFile(path, shown(str(path), SHOWN_PATH))
+    file = file_at(folder / named.value)
     cases = read(_text_of(file, named.position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
         problem = Problem(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
@@ -110,7 +106,8 @@ def _parent_of(layer: Mapping, file: ConfigFile) -> tuple[ConfigFile | None, Pos
     if extends is None:
         return None, None
     if isinstance(extends, Scalar) and isinstance(extends.value, str) and extends.value:
-        return find_parent(extends.value, file), extends.position
+        named = extends.value in builtin_names()  # else a path from the file's folder
+        return builtin(extends.value) if named else file_at(file.path.parent / extends.value), extends.position
     raise refusal([Problem(extends.position, "extends: is not the name of a config", _what_there_is())])
 
 

@@ -33,9 +33,9 @@ def stacked(layers: Sequence[Mapping]) -> Mapping:
     Raises ConfigError if a layer has more than one slope key.
     """
     merged = layers[0]
-    _refuse_two_slopes(merged)
+    _refuse_two_slopes(merged.keys)
     for layer in layers[1:]:
-        _refuse_two_slopes(layer)
+        _refuse_two_slopes(layer.keys)
         lower = merged.without("name")
         if any(name in layer.entries for name in SLOPE_KEYS):
             lower = lower.without(*SLOPE_KEYS)
@@ -53,12 +53,12 @@ def _merged(lower: Mapping, upper: Mapping) -> Mapping:
     return result
 
 
-def _refuse_two_slopes(layer: Mapping) -> None:
-    given = [(layer.keys[name], name) for name in SLOPE_KEYS if name in layer.keys]
-    if len(given) < len(SLOPE_KEYS):
-        return
-    (there, first), (here, second) = sorted(given, key=lambda one: (one[0].line, one[0].column))
-    raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
+def _refuse_two_slopes(given: dict[str, Position]) -> None:
+    """Raise ConfigError if the slope is given in radians and in degrees; keys in the order in which they stand."""
+    slopes = [(name, place) for name, place in given.items() if name in SLOPE_KEYS]
+    if len(slopes) == len(SLOPE_KEYS):
+        (first, there), (second, here) = slopes
+        raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
 
 
 def parse_settings(texts: Sequence[str]) -> list[ConfigSetting]:
@@ -94,20 +94,12 @@ def with_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
 
     Raises ConfigError if a setting goes into something that is no block.
     """
-    _refuse_slopes_in_conflict(settings)
+    _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
             tree = tree.without(*SLOPE_KEYS)
         tree = _placed(tree, setting, 0)
     return tree
-
-
-def _refuse_slopes_in_conflict(settings: Sequence[ConfigSetting]) -> None:
-    """Raise ConfigError if the slope is set in radians and in degrees."""
-    given = {setting.path[0]: setting.position for setting in settings if setting.path[0] in SLOPE_KEYS}
-    if len(given) == len(SLOPE_KEYS):
-        (first, there), (second, here) = given.items()
-        raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
 
 
 def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:

@@ -98,7 +98,9 @@ def template(
     base = typed(tree) if settings else changed
     refuse_bad_cases(changed, changed_tree)
     config, warnings = on_the_slope(changed, changed_tree)
-    name = run_name(base, changed, _degrees(changed_tree), None if run is None else run.name)
+    slope = changed_tree.entries.get("slope_deg")
+    degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
+    name = run_name(base, changed, degrees, None if run is None else run.name)
     warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
     return Template(LoadedConfig(config, name, warnings, file.label), changed_tree)
 
@@ -139,8 +141,3 @@ def _left_behind(config: Config, tree: Mapping) -> tuple[str, ...]:
         f"{leg}: walker.leg_length_m is {short(walker.leg_length_m)} m, and walker.foot_to_mass_m stays "
         f"{short(walker.foot_to_mass_m)} m, as {mass.source} has it: the mass is not in the middle of the leg",
     )
-
-
-def _degrees(tree: Mapping) -> float | None:
-    node = tree.entries.get("slope_deg")
-    return float(node.value) if isinstance(node, Scalar) and isinstance(node.value, int | float) else None

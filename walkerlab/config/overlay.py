@@ -59,20 +59,16 @@ def refuse_bad_cases(config: Config, tree: Mapping) -> None:
         lines = node.entries.get("config", Mapping(node.position))
         assert isinstance(lines, Mapping), "lines that are typed are a block"
         over = block_over_paper(lines)
-        refuse_without_ground(case, over, lines)
-        refuse_without_pads(case, over, lines)
+        if case.model == "contact":
+            refuse_without_ground(case, over, lines)
 
 
 def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a case of the contact model has none."""
-    if case.model == "contact" and config.contact is None:
+    """Raise ConfigError if a case of the contact model has no ground, or pads as long as a step of no length."""
+    if config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise refusal([Problem(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")])
-
-
-def refuse_without_pads(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a case's pads are as long as its start's step, and that has none."""
-    if case.model != "contact" or config.contact is None or isinstance(config.start, str):
+    if isinstance(config.start, str):
         return
     # a step of no length leaves steps nothing to be judged by on other terrains too
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"

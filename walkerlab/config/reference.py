@@ -37,12 +37,8 @@ class KeyReference:
     source: str
 
 
-def keys() -> tuple[KeyReference, ...]:
+def keys() -> Iterator[KeyReference]:
     """Every key of a config file, in the order of the schema."""
-    return tuple(_keys())
-
-
-def _keys() -> Iterator[KeyReference]:
     builtins = ", ".join(builtin_names())
     yield KeyReference("extends", "text", "", f"a file, {builtins}", "none", EXTENDS_MEANING, "this project")
     for path, field in leaves(Config):
@@ -100,18 +96,15 @@ def as_paragraphs(asked: str = "") -> str:
 def asked_for(asked: str) -> list[KeyReference]:
     """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none."""
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
-    found = [key for key in plain if not asked or any(is_in(asked, name) for name in (key.key, plain[key]))]
+    found = [
+        key for key in plain if not asked or any(f"{name}.".startswith(f"{asked}.") for name in (key.key, plain[key]))
+    ]
     if not found:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
         near = nearest(asked, names) or nearest(asked, {name.split(".")[-1] for name in names})
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
     return found
-
-
-def is_in(asked: str, key: str) -> bool:
-    """Whether a key is the one that was asked for, or in the block that was."""
-    return key == asked or key.startswith(f"{asked}.")
 
 
 def _paragraph(key: KeyReference) -> Iterator[str]:

@@ -84,7 +84,6 @@ class SlopeInDegrees(Block):
         key(
             "deg",
             "slope in degrees; a file has one of slope_rad and slope_deg",
-            "this project",
             bounds="between -90 and 90, both excluded",
             gt=-90.0,
             lt=90.0,
@@ -101,32 +100,31 @@ State = tuple[SwingAngle, StanceAngle, Rate, Rate]
 LongState = tuple[Rate, ...]  # of walkers with more bodies than two legs
 
 
-def _start_kind(value: Any) -> str:
-    if not isinstance(value, list | tuple):
-        return "word"
-    return "state" if len(value) <= 4 else "long"
-
-
 Start = Annotated[
     Annotated[Literal["fixed-point"], Tag("word")]
     | Annotated[State, Field(strict=False), Tag("state")]
     | Annotated[LongState, Field(strict=False), Tag("long")],
-    Discriminator(_start_kind),
+    Discriminator(
+        lambda value: "word" if not isinstance(value, list | tuple) else "state" if len(value) <= 4 else "long"
+    ),
 ]
 
 
 Factor = Annotated[float, Field(ge=-10.0, le=10.0)]
 Factors = tuple[Factor, Factor]
 
-_TOLERANCE = "the measured error against run time"
+_MEASURED: Final = "the measured error against run time"
+_Method = Annotated[Method, key("", "integration method", _MEASURED)]
+_Relative = Annotated[float, key("1", "relative tolerance", _MEASURED, ge=1e-14, le=0.1)]
+_Absolute = Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _MEASURED, gt=0.0, le=1.0)]
 
 
 class SolverSettings(Block):
     """How one model is integrated."""
 
-    method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "dop853"
-    rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-10
-    atol: Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _TOLERANCE, gt=0.0, le=1.0)] = 1.0e-12
+    method: _Method = "dop853"
+    rtol: _Relative = 1.0e-10
+    atol: _Absolute = 1.0e-12
 
     @field_validator("method")
     @classmethod
@@ -143,9 +141,9 @@ class RigidSolver(SolverSettings):
 class ContactSolver(SolverSettings):
     """How the contact model is integrated."""
 
-    method: Annotated[Method, key("", "integration method", _TOLERANCE)] = "radau5"
-    rtol: Annotated[float, key("1", "relative tolerance", _TOLERANCE, ge=1e-14, le=0.1)] = 1.0e-7
-    atol: Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _TOLERANCE, gt=0.0, le=1.0)] = 1.0e-9
+    method: _Method = "radau5"
+    rtol: _Relative = 1.0e-7
+    atol: _Absolute = 1.0e-9
 
 
 class Solvers(Block):
@@ -153,6 +151,12 @@ class Solvers(Block):
 
     rigid: RigidSolver = RigidSolver()
     contact: ContactSolver = ContactSolver()
+
+
+def factors(velocity: str) -> Any:
+    """Metadata of a range of factors."""
+    bounds = "two numbers from -10 to 10, the first below the second"
+    return key("1", f"least and largest factor on the {velocity}", bounds=bounds, sequence=True)
 
 
 class Tune(Block):
@@ -163,39 +167,19 @@ class Tune(Block):
         key(
             "1",
             "cells of the map along each of its axes, the factors on the two velocities",
-            "this project",
             default="61; 21 for other walkers than the paper's compass",
             ge=2,
             le=501,
         ),
     ] = None
-    swing_factors: Annotated[
-        Factors,
-        key(
-            "1",
-            "least and largest factor on the swing leg's initial angular velocity dtheta_1",
-            "this project",
-            bounds="two numbers from -10 to 10, the first below the second",
-            sequence=True,
-        ),
-    ] = (0.0, 2.0)
-    stance_factors: Annotated[
-        Factors,
-        key(
-            "1",
-            "least and largest factor on the stance leg's initial angular velocity dtheta_2",
-            "this project",
-            bounds="two numbers from -10 to 10, the first below the second",
-            sequence=True,
-        ),
-    ] = (0.85, 1.3)
+    swing_factors: Annotated[Factors, factors("swing leg's initial angular velocity dtheta_1")] = (0.0, 2.0)
+    stance_factors: Annotated[Factors, factors("stance leg's initial angular velocity dtheta_2")] = (0.85, 1.3)
 
     rigid_limit: Annotated[
         bool,
         key(
             "",
             "whether the contact is also led towards the rigid limit, to see what 1e-4 takes",
-            "this project",
             bounds="true or false",
         ),
     ] = True
@@ -211,16 +195,12 @@ class Tune(Block):
 class Source(Block):
     """The study that a config redoes, as the report names it."""
 
-    title: Annotated[
-        str, key("", "title of the study", "this project", bounds="any text, not empty"), Field(min_length=1)
-    ]
-    authors: Annotated[str | None, key("", "its authors", "this project", bounds="any text")] = None
-    published: Annotated[str | None, key("", "where and when it was published", "this project", bounds="any text")] = (
-        None
-    )
+    title: Annotated[str, key("", "title of the study", bounds="any text, not empty"), Field(min_length=1)]
+    authors: Annotated[str | None, key("", "its authors", bounds="any text")] = None
+    published: Annotated[str | None, key("", "where and when it was published", bounds="any text")] = None
     url: Annotated[
         str | None,
-        key("", "where it can be read", "this project", bounds="an address that begins with http:// or https://"),
+        key("", "where it can be read", bounds="an address that begins with http:// or https://"),
         Field(pattern=r"^https?://\S+$"),
     ] = None
 
@@ -233,7 +213,6 @@ class Config(Block):
         key(
             "",
             "name of the run folder",
-            "this project",
             default="the file's own name",
             bounds="1 to 64 letters, digits, '.', '_' or '-', no '-' or '.' in front and no '.' at the end",
         ),
@@ -267,7 +246,7 @@ class Config(Block):
             bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
         ),
     ] = "fixed-point"
-    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", "this project", ge=1, le=10_000)] = 5
+    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", ge=1, le=10_000)] = 5
     contact: Contact | None = None
     solver: Solvers = Solvers()
     stability: Stability = Stability()
@@ -276,10 +255,9 @@ class Config(Block):
     basin: Basin = Basin()
     sweep: Sweep | None = None
     outputs: Annotated[
-        tuple[Output, ...],
-        key("", "what is stored", "this project", bounds="a list of states, energies, forces", sequence=True),
+        tuple[Output, ...], key("", "what is stored", bounds="a list of states, energies, forces", sequence=True)
     ] = OUTPUTS
-    seed: Annotated[int, key("1", "seed of everything that is drawn at random", "this project", ge=0, le=2**32 - 1)] = 0
+    seed: Annotated[int, key("1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)] = 0
 
     @field_validator("start")
     @classmethod

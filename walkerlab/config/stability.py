@@ -23,47 +23,38 @@ Fate = Literal[
 ]
 FATES: Final[tuple[Fate, ...]] = get_args(Fate)
 NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
-_HERE: Final = "this project"
 
 
 class Case(Block):
     """One case: a few lines over the paper config, and what must become of it."""
 
     name: Annotated[
-        str,
-        key("", "name of the case", _HERE, bounds="up to 64 letters, digits, '.', '_', '+' or '-'"),
-        Field(pattern=NAME),
+        str, key("", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'"), Field(pattern=NAME)
     ]
-    family: Annotated[
-        str, key("", "what it belongs to, for tables", _HERE, bounds="as a name"), Field(pattern=NAME)
-    ] = "own"
-    model: Annotated[Literal["contact", "rigid"], key("", "which model walks", _HERE)] = "contact"
+    family: Annotated[str, key("", "what it belongs to, for tables", bounds="as a name"), Field(pattern=NAME)] = "own"
+    model: Annotated[Literal["contact", "rigid"], key("", "which model walks")] = "contact"
     config: Annotated[
-        dict[str, Any], key("", "keys of a config, over the paper's", _HERE, bounds="a block of keys", default="none")
+        dict[str, Any], key("", "keys of a config, over the paper's", bounds="a block of keys", default="none")
     ] = Field(default_factory=dict)
-    steps: Annotated[int, key("1", "steps to walk", _HERE, ge=1, le=2_000_000)] = 4
+    steps: Annotated[int, key("1", "steps to walk", ge=1, le=2_000_000)] = 4
     lowered_m: Annotated[
-        float, key("m", "how far the start is sunk into the ground; negative lifts it", _HERE, ge=-1e3, le=1e3)
+        float, key("m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
     ] = 0.0
     expected: Annotated[
-        tuple[Fate, ...],
-        key("", "outcomes that are right", _HERE, bounds=f"a list of {', '.join(FATES)}", sequence=True),
+        tuple[Fate, ...], key("", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}", sequence=True)
     ]
-    reason: Annotated[str, key("", "why that is to be expected", _HERE, bounds="a sentence")]
-    budget: Annotated[int, key("1", "right-hand sides it may evaluate", _HERE, ge=1, le=100_000_000)] = 400_000
+    reason: Annotated[str, key("", "why that is to be expected", bounds="a sentence")]
+    budget: Annotated[int, key("1", "right-hand sides it may evaluate", ge=1, le=100_000_000)] = 400_000
     balance: Annotated[
-        float, key("1", "largest residual of the energy balance, as a share of the walker's energy", _HERE, gt=0.0)
+        float, key("1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
     ] = 1e-6
     agreement: Annotated[
-        float,
-        key("1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", _HERE, gt=0.0),
+        float, key("1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", gt=0.0)
     ] = 1e-4
     compared_steps: Annotated[
-        int, key("1", "steps of which the times are compared: fewer where small errors grow", _HERE, ge=1)
+        int, key("1", "steps of which the times are compared: fewer where small errors grow", ge=1)
     ] = 20
-    twin: Annotated[
-        bool, key("", "whether a walker of another size must do the same", _HERE, bounds="true or false")
-    ] = False
+    twin: Annotated[bool, key("", "whether a walker of another size must do the same", bounds="true or false")] = False
 
     @field_validator("expected")
     @classmethod
@@ -81,9 +72,8 @@ class Stability(Block):
         key(
             "",
             "cases of your own; a file that holds such a list may stand for it",
-            _HERE,
             bounds="a list of cases, or a file",
             sequence=True,
         ),
     ] = ()
-    map_cells: Annotated[int, key("1", "cells along each axis of the maps that --full makes", _HERE, ge=2, le=201)] = 25
+    map_cells: Annotated[int, key("1", "cells along each axis of the maps that --full makes", ge=2, le=201)] = 25

@@ -8,38 +8,32 @@ from pydantic import Field
 
 from walkerlab.config.fields import Block, key
 
-_HERE = "this project"
 Values = str | list[float | int | bool | str]
 
 
 class Sweep(Block):
     """What `walkerlab sweep` asks, unless its options say otherwise."""
 
-    stage: Annotated[str, key("", "stage whose numbers are wanted", _HERE, bounds="a stage that draws nothing")] = (
-        "fixedpoint"
-    )
+    stage: Annotated[str, key("", "stage whose numbers are wanted", bounds="a stage that draws nothing")] = "fixedpoint"
     over: Annotated[
         dict[str, Values],
         key(
             "",
             "keys of a config with their values, in the key's unit; the last key changes fastest",
-            _HERE,
             bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
             default="none",
         ),
     ] = Field(default_factory=dict)
     zip: Annotated[
-        bool,
-        key("", "the n-th values of all keys make the n-th point, not each with each", _HERE, bounds="true or false"),
+        bool, key("", "the n-th values of all keys make the n-th point, not each with each", bounds="true or false")
     ] = False
     sample: Annotated[
         str,
         key(
             "",
             "points drawn from the intervals instead",
-            _HERE,
             bounds="latin-hypercube:N, sobol:N, random:N, or empty",
             default="empty",
         ),
     ] = ""
-    seed: Annotated[int, key("1", "seed of that drawing", _HERE, ge=0, le=2**32 - 1)] = 1
+    seed: Annotated[int, key("1", "seed of that drawing", ge=0, le=2**32 - 1)] = 1

@@ -25,24 +25,29 @@ Point = tuple[Metres, Metres]
 LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
-def length(meaning: str, source: str) -> Any:
+def length(meaning: str, source: str = "this project") -> Any:
     """Metadata of a length."""
     return key("m", meaning, source, ge=1e-3, le=LONGEST)
 
 
-def mass(meaning: str, source: str, least: float = 1e-12) -> Any:
+def mass(meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
     """Metadata of a mass."""
     return key("kg", meaning, source, ge=least, le=HEAVIEST)
 
 
-def inertia(of: str) -> Any:
+def offset(meaning: str, source: str) -> Any:
+    """Metadata of a place beside another one."""
+    return key("m", meaning, source, ge=-LONGEST, le=LONGEST)
+
+
+def inertia(of: str, source: str = "a point mass") -> Any:
     """Metadata of an inertia."""
-    return key("kg m^2", f"inertia of {of} about its own centre of mass", "a point mass", ge=0.0, le=1e9)
+    return key("kg m^2", f"inertia of {of} about its own centre of mass", source, ge=0.0, le=1e9)
 
 
 def point(meaning: str) -> Any:
     """Metadata of a point in a body's frame."""
-    return key("m", meaning, "this project", bounds="two numbers, ahead and up", sequence=True)
+    return key("m", meaning, bounds="two numbers, ahead and up", sequence=True)
 
 
 def refuse(kind: str, reason: str) -> PydanticCustomError:
@@ -53,23 +58,19 @@ def refuse(kind: str, reason: str) -> PydanticCustomError:
 class Torso(Block):
     """An upper body at the hip, kept on the bisector of the legs."""
 
-    mass_kg: Annotated[float, mass("mass of the torso", "this project")]
-    above_hip_m: Annotated[float, key("m", "its centre of mass above the hip", "this project", ge=0.0, le=LONGEST)]
+    mass_kg: Annotated[float, mass("mass of the torso")]
+    above_hip_m: Annotated[float, key("m", "its centre of mass above the hip", ge=0.0, le=LONGEST)]
     inertia_kg_m2: Annotated[float, inertia("the torso")] = 0.0
     held: Annotated[
         Literal["bisecting"], key("", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)")
     ] = "bisecting"
 
 
-def _middle_of_the_leg(data: dict[str, Any]) -> float:
-    return float(data.get("leg_length_m", 1.0)) / 2
-
-
 class CompassWalker(Block):
     """Two straight legs, each with a mass on it, and a mass at the hip."""
 
     type: Annotated[Literal["compass"], key("", "kind of walker", "Fig. 1")] = "compass"
-    leg_length_m: Annotated[float, key("m", "L, from foot to hip", "Table 1", ge=1e-3, le=1e3)] = 1.0
+    leg_length_m: Annotated[float, length("L, from foot to hip", "Table 1")] = 1.0
     foot_to_mass_m: Annotated[
         float,
         key(
@@ -80,13 +81,10 @@ class CompassWalker(Block):
             default="leg_length_m / 2",
             ge=0.0,
         ),
-    ] = Field(default_factory=_middle_of_the_leg)
-    leg_mass_kg: Annotated[float, key("kg", "m, mass of one leg", "Table 1", ge=1e-12, le=1e6)] = 5.0
-    hip_mass_kg: Annotated[float, key("kg", "M_H, mass at the hip", "Table 1", ge=0.0, le=1e6)] = 10.0
-    leg_inertia_kg_m2: Annotated[
-        float,
-        key("kg m^2", "inertia of one leg about its own centre of mass", "section 4: point masses", ge=0.0, le=1e9),
-    ] = 0.0
+    ] = Field(default_factory=lambda data: data.get("leg_length_m", 1.0) / 2)
+    leg_mass_kg: Annotated[float, mass("m, mass of one leg", "Table 1")] = 5.0
+    hip_mass_kg: Annotated[float, mass("M_H, mass at the hip", "Table 1", 0.0)] = 10.0
+    leg_inertia_kg_m2: Annotated[float, inertia("one leg", "section 4: point masses")] = 0.0
     foot_radius_m: Annotated[
         float,
         key(
@@ -105,22 +103,15 @@ class CompassWalker(Block):
         length = info.data.get("leg_length_m")
         if length is None or value < length:
             return value
-        if value == length:
-            reason = (
-                "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
-                "must be below leg_length_m, {length}"
-            )
-        else:
-            reason = "must be below leg_length_m, {length}"
+        massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
+        reason = f"{massless if value == length else ''}must be below leg_length_m, {{length}}"
         raise PydanticCustomError("off-leg", reason, {"length": f"{length:g}"})
 
     @field_validator("foot_radius_m")
     @classmethod
     def _foot_is_smaller_than_half_a_leg(cls, value: float, info: ValidationInfo) -> float:
         length = info.data.get("leg_length_m")
-        if length is not None and value >= length / 2:
-            raise PydanticCustomError("foot", "must be below half of leg_length_m, {half}", {"half": f"{length / 2:g}"})
-        return value
+        return arc_within(value, length and length / 2, "half of leg_length_m")
 
     @property
     def mass_to_hip_m(self) -> float:
@@ -144,22 +135,14 @@ class StraightLegs(Block):
     type: Annotated[Literal["straight-legs"], key("", "kind of walker", WISSE)] = "straight-legs"
     leg_length_m: Annotated[float, length("hip to sole, foot included", WISSE)] = 0.4
     leg_mass_kg: Annotated[float, mass("mass of one leg", WISSE)] = 1.0
-    leg_mass_below_hip_m: Annotated[
-        float, key("m", "a leg's centre of mass below the hip", WISSE, ge=-LONGEST, le=LONGEST)
-    ] = 0.1
-    leg_mass_ahead_m: Annotated[
-        float,
-        key("m", "a leg's centre of mass ahead of its line, leg upright", WISSE, ge=-LONGEST, le=LONGEST),
-    ] = 0.0
+    leg_mass_below_hip_m: Annotated[float, offset("a leg's centre of mass below the hip", WISSE)] = 0.1
+    leg_mass_ahead_m: Annotated[float, offset("a leg's centre of mass ahead of its line, leg upright", WISSE)] = 0.0
     leg_inertia_kg_m2: Annotated[float, inertia("one leg")] = 0.01
-    hip_mass_kg: Annotated[float, key("kg", "mass at the hip", WISSE, ge=0.0, le=HEAVIEST)] = 0.0
+    hip_mass_kg: Annotated[float, mass("mass at the hip", WISSE, 0.0)] = 0.0
     foot_radius_m: Annotated[
-        float,
-        key("m", "radius of the sole's arc, 0 is a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0),
+        float, key("m", "radius of the sole's arc, 0 is a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0)
     ] = 0.1
-    foot_centre_ahead_m: Annotated[
-        float, key("m", "the arc's centre ahead of the leg's line", WISSE, ge=-LONGEST, le=LONGEST)
-    ] = 0.0
+    foot_centre_ahead_m: Annotated[float, offset("the arc's centre ahead of the leg's line", WISSE)] = 0.0
     torso: Torso | None = None
 
     @field_validator("leg_inertia_kg_m2")
@@ -190,10 +173,8 @@ class Thigh(Block):
 
     length_m: Annotated[float, length("hip to knee", HSU_CHEN)] = 0.5
     mass_kg: Annotated[float, mass("mass of one thigh", HSU_CHEN)] = 0.5
-    mass_below_hip_m: Annotated[
-        float, key("m", "its centre of mass below the hip", HSU_CHEN, ge=-LONGEST, le=LONGEST)
-    ] = 0.325
-    mass_ahead_m: Annotated[float, key("m", "its centre of mass ahead", HSU_CHEN, ge=-LONGEST, le=LONGEST)] = 0.0
+    mass_below_hip_m: Annotated[float, offset("its centre of mass below the hip", HSU_CHEN)] = 0.325
+    mass_ahead_m: Annotated[float, offset("its centre of mass ahead", HSU_CHEN)] = 0.0
     inertia_kg_m2: Annotated[float, inertia("one thigh")] = 0.0
 
 
@@ -202,10 +183,8 @@ class Shank(Block):
 
     length_m: Annotated[float, length("knee to sole", HSU_CHEN)] = 0.5
     mass_kg: Annotated[float, mass("mass of one shank", HSU_CHEN)] = 0.05
-    mass_below_knee_m: Annotated[
-        float, key("m", "its centre of mass below the knee", HSU_CHEN, ge=-LONGEST, le=LONGEST)
-    ] = 0.125
-    mass_ahead_m: Annotated[float, key("m", "its centre of mass ahead", HSU_CHEN, ge=-LONGEST, le=LONGEST)] = 0.0
+    mass_below_knee_m: Annotated[float, offset("its centre of mass below the knee", HSU_CHEN)] = 0.125
+    mass_ahead_m: Annotated[float, offset("its centre of mass ahead", HSU_CHEN)] = 0.0
     inertia_kg_m2: Annotated[float, inertia("one shank")] = 0.0
 
     @field_validator("inertia_kg_m2")
@@ -229,16 +208,10 @@ class KneeJoint(Block):
     ] = "locked"
     release: Annotated[
         Literal["compression", "touch"],
-        key(
-            "", "contact model: released when the leading foot stops sinking in, or at its first touch", "this project"
-        ),
+        key("", "contact model: released when the leading foot stops sinking in, or at its first touch"),
     ] = "compression"
-    stop_stiffness: Annotated[
-        float, key("N m/rad", "stiffness of a compliant stop", "this project", ge=1.0, le=1e12)
-    ] = 1.0e5
-    stop_damping: Annotated[float, key("N m s/rad", "damping of a compliant stop", "this project", ge=0.0, le=1e9)] = (
-        90.0
-    )
+    stop_stiffness: Annotated[float, key("N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)] = 1.0e5
+    stop_damping: Annotated[float, key("N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)] = 90.0
 
 
 class Kneed(Block):
@@ -247,7 +220,7 @@ class Kneed(Block):
     type: Annotated[Literal["kneed"], key("", "kind of walker", HSU_CHEN)] = "kneed"
     thigh: Thigh = Thigh()
     shank: Shank = Shank()
-    hip_mass_kg: Annotated[float, key("kg", "mass at the hip", HSU_CHEN, ge=0.0, le=HEAVIEST)] = 0.5
+    hip_mass_kg: Annotated[float, mass("mass at the hip", HSU_CHEN, 0.0)] = 0.5
     foot_radius_m: Annotated[
         float,
         key("m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below shank.length_m", ge=0.0),
@@ -280,8 +253,8 @@ class Kneed(Block):
 class PartBody(Block):
     """A rigid body with a frame of its own, upright as the walker stands."""
 
-    name: Annotated[str, key("", "name of the body", "this project", bounds="any text")]
-    mass_kg: Annotated[float, key("kg", "its mass", "this project", ge=0.0, le=HEAVIEST)]
+    name: Annotated[str, key("", "name of the body", bounds="any text")]
+    mass_kg: Annotated[float, mass("its mass", least=0.0)]
     centre_m: Annotated[Point, point("its centre of mass")]
     inertia_kg_m2: Annotated[float, inertia("the body")] = 0.0
 
@@ -289,89 +262,73 @@ class PartBody(Block):
 class PartHinge(Block):
     """A frictionless hinge between points of two bodies."""
 
-    name: Annotated[str, key("", "name of the hinge", "this project", bounds="any text")]
-    parent: Annotated[str, key("", "one body", "this project", bounds="any text")]
+    name: Annotated[str, key("", "name of the hinge", bounds="any text")]
+    parent: Annotated[str, key("", "one body", bounds="any text")]
     parent_point_m: Annotated[Point, point("the hinge in its frame")]
-    child: Annotated[str, key("", "the other body", "this project", bounds="any text")]
+    child: Annotated[str, key("", "the other body", bounds="any text")]
     child_point_m: Annotated[Point, point("the hinge in its frame")]
     locks: Annotated[
-        bool,
-        key("", "whether it is a knee, parent the thigh and child the shank", "this project", bounds="true or false"),
+        bool, key("", "whether it is a knee, parent the thigh and child the shank", bounds="true or false")
     ] = False
 
 
 class PartParticle(Block):
     """A point mass fixed to a body."""
 
-    name: Annotated[str, key("", "name of the particle", "this project", bounds="any text")]
-    mass_kg: Annotated[float, key("kg", "its mass", "this project", ge=0.0, le=HEAVIEST)]
-    body: Annotated[str, key("", "the body it is fixed to", "this project", bounds="any text")]
+    name: Annotated[str, key("", "name of the particle", bounds="any text")]
+    mass_kg: Annotated[float, mass("its mass", least=0.0)]
+    body: Annotated[str, key("", "the body it is fixed to", bounds="any text")]
     at_m: Annotated[Point, point("where, in its frame")]
 
 
 class PartFoot(Block):
     """A foot: an arc about a point of a body."""
 
-    body: Annotated[str, key("", "the body it belongs to", "this project", bounds="any text")]
+    body: Annotated[str, key("", "the body it belongs to", bounds="any text")]
     centre_m: Annotated[Point, point("the arc's centre in its frame")]
-    radius_m: Annotated[float, key("m", "radius of the arc, 0 is a point", "this project", ge=0.0, le=LONGEST)] = 0.0
+    radius_m: Annotated[float, key("m", "radius of the arc, 0 is a point", ge=0.0, le=LONGEST)] = 0.0
 
 
 class PartCoupling(Block):
     """A body whose angle is a weighted sum of others' angles."""
 
-    body: Annotated[str, key("", "the body that follows", "this project", bounds="any text")]
-    of: Annotated[
-        tuple[str, ...], key("", "the bodies that it follows", "this project", bounds="a list of names", sequence=True)
-    ]
-    weights: Annotated[
-        tuple[float, ...], key("1", "their weights", "this project", bounds="a list of numbers", sequence=True)
-    ]
+    body: Annotated[str, key("", "the body that follows", bounds="any text")]
+    of: Annotated[tuple[str, ...], key("", "the bodies that it follows", bounds="a list of names", sequence=True)]
+    weights: Annotated[tuple[float, ...], key("1", "their weights", bounds="a list of numbers", sequence=True)]
 
 
 class PartsWalker(Block):
     """A walker described by its bodies, hinges, particles, feet and couplings."""
 
-    type: Annotated[Literal["parts"], key("", "kind of walker", "this project")]
+    type: Annotated[Literal["parts"], key("", "kind of walker")]
     bodies: Annotated[
         tuple[PartBody, ...],
-        key("", "the bodies", "this project", bounds="blocks of name, mass_kg, centre_m, inertia_kg_m2", sequence=True),
+        key("", "the bodies", bounds="blocks of name, mass_kg, centre_m, inertia_kg_m2", sequence=True),
     ]
     hinges: Annotated[
         tuple[PartHinge, ...],
         key(
             "",
             "the hinges, without closed loops",
-            "this project",
             bounds="blocks of name, parent, parent_point_m, child, child_point_m, locks",
             sequence=True,
         ),
     ]
     particles: Annotated[
-        tuple[PartParticle, ...],
-        key("", "point masses", "this project", bounds="blocks of name, mass_kg, body, at_m", sequence=True),
+        tuple[PartParticle, ...], key("", "point masses", bounds="blocks of name, mass_kg, body, at_m", sequence=True)
     ] = ()
     feet: Annotated[
         tuple[PartFoot, PartFoot],
-        key(
-            "",
-            "a foot for either leg",
-            "this project",
-            bounds="blocks of two of body, centre_m, radius_m",
-            sequence=True,
-        ),
+        key("", "a foot for either leg", bounds="blocks of two of body, centre_m, radius_m", sequence=True),
     ]
     couplings: Annotated[
-        tuple[PartCoupling, ...],
-        key("", "what follows what", "this project", bounds="blocks of body, of, weights", sequence=True),
+        tuple[PartCoupling, ...], key("", "what follows what", bounds="blocks of body, of, weights", sequence=True)
     ] = ()
     legs: Annotated[
         tuple[LegBodies, LegBodies],
-        key("", "bodies of either leg, hip down", "this project", bounds="two lists of names", sequence=True),
+        key("", "bodies of either leg, hip down", bounds="two lists of names", sequence=True),
     ]
-    leg_length_m: Annotated[
-        float, length("hip to sole as the parts have it: what lengths and falls are measured by", "this project")
-    ]
+    leg_length_m: Annotated[float, length("hip to sole as the parts have it: what lengths and falls are measured by")]
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
 
@@ -432,11 +389,8 @@ def torso_mass(torso: Torso | None) -> float:
 
 def rigid_bodies(walker: Any) -> int:
     """How many angles the rigid model's state has: swing leg, stance leg, what else swings, a torso."""
-    more = len(walker.legs[0]) - 1 if isinstance(walker, PartsWalker) else int(isinstance(walker, Kneed))
-    shared = 0
-    if isinstance(walker, PartsWalker):
-        shared = len(walker.bodies) - len(walker.legs[0]) - len(walker.legs[1])
-    return 2 + more + shared + int(walker.torso is not None)
+    bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, PartsWalker) else 2
+    return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
 def is_plain_compass(walker: Any) -> bool:
@@ -481,16 +435,14 @@ def arc_within(radius: float, longest: float | None, name: str) -> float:
     return radius
 
 
-def _type_of(data: Any) -> str:
-    return str(data.get("type", "compass") if isinstance(data, dict) else getattr(data, "type", "compass"))
-
-
 Walker = Annotated[
     Annotated[CompassWalker, Tag("compass")]
     | Annotated[StraightLegs, Tag("straight-legs")]
     | Annotated[Kneed, Tag("kneed")]
     | Annotated[PartsWalker, Tag("parts")],
-    Discriminator(_type_of),
+    Discriminator(
+        lambda data: data.get("type", "compass") if isinstance(data, dict) else getattr(data, "type", "compass")
+    ),
 ]
 WALKERS: Final[dict[str, type[Block]]] = {
     "compass": CompassWalker,

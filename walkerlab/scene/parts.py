@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
 from walkerlab.errors import ConfigError
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
@@ -22,13 +22,8 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         parts = straight_legs(leg, walker.hip_mass_kg, Arc(0.0 if rigid else walker.foot_radius_m))
     elif isinstance(walker, StraightLegs):
-        leg = Limb(
-            walker.leg_length_m,
-            walker.leg_mass_kg,
-            walker.leg_mass_below_hip_m,
-            walker.leg_mass_ahead_m,
-            walker.leg_inertia_kg_m2,
-        )
+        centre = walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
+        leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
         parts = straight_legs(leg, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
     elif isinstance(walker, Kneed):
         upper, lower = walker.thigh, walker.shank
@@ -37,38 +32,24 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
         parts = kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m))
     else:
         parts = own_parts(walker)
-    return carrying(parts, walker.torso)
-
-
-def carrying(parts: Assembly, torso: Torso | None) -> Assembly:
-    """The walker with its torso, if it has one."""
-    if torso is None:
-        return parts
-    return with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
+    torso = walker.torso
+    return parts if torso is None else with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
 
 
 def own_parts(walker: PartsWalker) -> Assembly:
     """The parts that a config lists; ConfigError, in words, if they do not fit together."""
-    knees = [hinge for hinge in walker.hinges if hinge.locks]
     try:
         return Assembly(
-            bodies=tuple(Body(body.name, body.mass_kg, body.centre_m, body.inertia_kg_m2) for body in walker.bodies),
-            joints=tuple(
-                Revolute(hinge.name, hinge.parent, hinge.parent_point_m, hinge.child, hinge.child_point_m)
-                for hinge in walker.hinges
-            ),
-            particles=tuple(Particle(each.name, each.mass_kg, each.body, each.at_m) for each in walker.particles),
-            feet=tuple(
-                BallFoot(f"foot of {foot.body}", foot.body, foot.centre_m, foot.radius_m) for foot in walker.feet
-            ),
-            knees=tuple(Knee(hinge.name, hinge.parent, hinge.child) for hinge in knees),
-            couplings=tuple(Coupling(each.body, each.of, each.weights) for each in walker.couplings),
+            bodies=tuple(Body(**dict(body)) for body in walker.bodies),
+            joints=tuple(Revolute(**hinge.model_dump(exclude={"locks"})) for hinge in walker.hinges),
+            particles=tuple(Particle(**dict(particle)) for particle in walker.particles),
+            feet=tuple(BallFoot(f"foot of {foot.body}", **dict(foot)) for foot in walker.feet),
+            knees=tuple(Knee(hinge.name, hinge.parent, hinge.child) for hinge in walker.hinges if hinge.locks),
+            couplings=tuple(Coupling(**dict(coupling)) for coupling in walker.couplings),
             legs=walker.legs,
         )
     except (KeyError, ValueError) as error:
-        raise ConfigError(
-            f"walker: {error.args[0]}", "docs/walkers.md shows a walker described by its parts."
-        ) from None
+        raise ConfigError(f"walker: {error.args[0]}", SHOWN_IN) from None
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
