@@ -12,7 +12,7 @@ import walkerlab
 from walkerlab import api
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.store.code import Sources
+from walkerlab.sources import Sources
 
 
 def test_the_examples_of_the_docstrings_say_what_happens(tmp_path):

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab import kernels
+from walkerlab.kernel_cache import KEPT_GENERATIONS
 
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
-from walkerlab.kernels import cache_folder
+from walkerlab.kernel_cache import cache_folder
 import walkerlab.orbits.trial_of_code as trial
 print(trial.twice(3.0), cache_folder().name)
 """
@@ -83,6 +83,42 @@ def test_code_that_is_as_before_is_not_compiled_again(copy):
     assert compiled(package.parent / "cache" / folder) == kept
 
 
+def test_the_package_installed_anew_or_elsewhere_uses_what_is_compiled(copy, tmp_path):
+    package, run = copy
+    _, folder = run()
+    kept = compiled(tmp_path / "cache" / folder)
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    shutil.copytree(package, moved / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))  # with times of its own
+    for path in (moved / "walkerlab").rglob("*.py"):
+        path.touch()
+    environment = {**os.environ, "PYTHONPATH": str(moved), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+    subprocess.run([sys.executable, "-c", CALL], cwd=moved, env=environment, check=True)
+    assert kept
+    assert compiled(tmp_path / "cache") == kept
+
+
+@pytest.mark.parametrize("also", [False, True], ids=["chosen", "chosen and usual"])
+def test_a_cache_folder_that_cannot_be_written_into_is_told_once_and_workers_use_the_same(copy, tmp_path, also):
+    (tmp_path / "file").write_text("")
+    usual = str(tmp_path / ("file" if also else "usual"))
+    given = {"WALKERLAB_CACHE": str(tmp_path / "file"), "XDG_CACHE_HOME": usual, "TMPDIR": str(tmp_path)}
+    environment = {**os.environ, **given, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", IN_WORKERS], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    folders = set(done.stdout.split())
+    assert len(folders) == 1
+    assert done.stderr.count("cannot be written into") == 1
+    assert folders.pop() in done.stderr
+    assert ("later processes do not find" in done.stderr) == also
+
+
+IN_WORKERS = """
+from walkerlab.kernel_cache import cache_root
+from walkerlab.workers import in_order
+print(cache_root(), *in_order([cache_root] * 4, jobs=2))
+"""
 IMPORT_ALL = """
 import walkerlab, walkerlab.kernels, walkerlab.orbits.trial_of_code
 """
@@ -118,11 +154,11 @@ def test_a_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
 def generations(copy, tmp_path):
     """Make twelve older generations of compiled code, last used so many days ago and earlier; those left of them."""
     _, run = copy
-    host = run()[1].split("-", 3)[3]  # kernels-DIGEST-pyVERSION-PROCESSOR
+    host = run()[1].split("-", 4)[4]  # kernels-DIGEST-pyVERSION-numbaVERSION-PROCESSOR
     shutil.rmtree(tmp_path / "cache")
 
     def left_after_a_new_one(days):
-        folders = [tmp_path / "cache" / f"kernels-{number:016x}-py311-{host}" for number in range(12)]
+        folders = [tmp_path / "cache" / f"kernels-{number:016x}-py311-numba0.62.0-{host}" for number in range(12)]
         for number, folder in enumerate(folders):
             folder.mkdir(parents=True)
             os.utime(folder, times=(time.time() - (days + number) * 86_400,) * 2)
@@ -137,12 +173,12 @@ def test_older_compiled_code_that_others_may_be_using_is_left(generations):
 
 
 def test_compiled_code_that_nobody_has_used_for_long_goes_but_for_the_latest(generations):
-    assert generations(days=100) == list(range(kernels.KEPT_GENERATIONS - 1))
+    assert generations(days=100) == list(range(KEPT_GENERATIONS - 1))
 
 
 FOLDER_GONE = """
 import shutil
-from walkerlab.kernels import cache_folder
+from walkerlab.kernel_cache import cache_folder
 from walkerlab.orbits.trial_of_code import twice
 twice(3.0)
 shutil.rmtree(cache_folder())
@@ -160,28 +196,36 @@ def test_a_process_whose_compiled_code_is_removed_compiles_anew(copy, tmp_path):
 
 
 @pytest.fixture
-def digest_after_an_edit(tmp_path, monkeypatch):
+def digest_after_an_edit(tmp_path):
     """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
     package = tmp_path / "walkerlab"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(kernels, "PACKAGE", package)
+    code = "from walkerlab.kernel_cache import sources_digest; print(sources_digest())"
+
+    def digest():
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        return subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, env=environment, text=True)
 
     def digests(path):
-        before = kernels.sources_digest()
+        before = digest()
         with (package / path).open("a") as file:
             file.write("\n# a remark\n")
-        return before, kernels.sources_digest()
+        return before, digest()
 
     return digests
 
 
-@pytest.mark.parametrize("path", ["errors.py", "paper/errata.py", "orbits/small_slope.py", "mechanics/parts.py"])
+@pytest.mark.parametrize(
+    "path", ["__init__.py", "errors.py", "paper/errata.py", "orbits/small_slope.py", "mechanics/parts.py"]
+)
 def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
     assert after == before
 
 
-@pytest.mark.parametrize("path", ["solvers/dop853_tableau.py", "solvers/vectors.py", "hybrid/outcome.py", "kernels.py"])
+@pytest.mark.parametrize(
+    "path", ["solvers/dop853_tableau.py", "solvers/vectors.py", "hybrid/outcome.py", "kernels.py", "compiler.py"]
+)
 def test_an_edit_of_what_kernels_are_made_of_compiles_them_anew(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
     assert after != before

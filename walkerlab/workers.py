@@ -27,6 +27,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from walkerlab.errors import WalkerlabError
+from walkerlab.kernel_cache import cache_root
+from walkerlab.stopping import raise_on
 
 PATIENCE_S = 5.0
 """How long a worker may take to end what it began, before it is killed."""
@@ -109,7 +111,8 @@ class Worker:
             stdout=output,
             stderr=output,
             cwd=folder,
-            env={**os.environ, **(environment or {})},
+            # One folder of compiled code for all, chosen and told of here.
+            env={**os.environ, "WALKERLAB_CACHE": str(cache_root()), **(environment or {})},
         )
         theirs.close()
 
@@ -272,7 +275,7 @@ def serve(number: int, modules: Sequence[str]) -> None:
     for module in modules:
         importlib.import_module(module)
     with contextlib.suppress(LeaveError):
-        signal.signal(signal.SIGTERM, leave)
+        raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
 
@@ -283,11 +286,6 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
         while True:
             calls.put(line.recv_bytes())
     os._exit(1)
-
-
-def leave(*_: object) -> None:
-    """Drop what is being done, and what it has begun."""
-    raise LeaveError
 
 
 def answer(work: bytes) -> bytes:

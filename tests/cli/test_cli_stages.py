@@ -172,11 +172,12 @@ def test_no_wait_exits_6(toy, caught):
     assert one_object(done)["error"]["exit_code"] == 6
 
 
-def test_by_default_a_second_process_says_that_it_waits_and_then_reuses(toy, caught):
-    with toy.start("drop", "--json") as second:
-        assert "waiting: another walkerlab process is working in runs/paper" in second.stderr.readline()
+@pytest.mark.parametrize(("force", "then"), [([], ", and its results will be reused"), (["--force"], "")])
+def test_a_second_process_says_that_it_waits_and_whether_it_then_reuses(toy, caught, force, then):
+    with toy.start("drop", "--json", *force) as second:
+        assert second.stderr.readline() == f"waiting: another walkerlab process is working in runs/paper{then}\n"
         caught.go_on()
-        assert json.loads(second.stdout.read())["reused"] is True
+        assert json.loads(second.stdout.read())["reused"] is not bool(force)
     assert json.loads(caught.stdout.read())["reused"] is False
 
 

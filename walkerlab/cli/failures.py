@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from walkerlab.errors import StoppedError, StorageError, WalkerlabError
+from walkerlab.stopping import raise_on
 
 if TYPE_CHECKING:
     from walkerlab.cli.request import Request
@@ -31,7 +32,9 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
     name     of the command
     request  what it is asked; advice has the options that say which run that is about
     """
-    signal.signal(signal.SIGTERM, interrupt)
+    raise_on(signal.SIGTERM, KeyboardInterrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
+        raise_on(signal.SIGINT, KeyboardInterrupt)
     try:
         yield request
         sys.stdout.flush()
@@ -55,11 +58,6 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
         nobody_listens()
         say(StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored."))
         raise typer.Exit(StorageError.exit_code) from None
-
-
-def interrupt(*_: object) -> None:
-    """Treat a request to end as Ctrl-C."""
-    raise KeyboardInterrupt
 
 
 def nobody_listens() -> None:

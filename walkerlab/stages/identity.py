@@ -8,8 +8,8 @@ from typing import Any
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config
 from walkerlab.config.schema import Config
+from walkerlab.sources import Sources
 from walkerlab.stages.graph import Stage
-from walkerlab.store.code import Sources
 from walkerlab.store.key import Identity
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import NoAnswer
+from walkerlab.kernel_cache import watched
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.plan import (
@@ -31,7 +32,7 @@ from walkerlab.stages.plan import (
 from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.runs import claim, refuse_another_config
-from walkerlab.stages.task import StageTask, kernels_told_of, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.stages.task import StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
@@ -120,7 +121,8 @@ def execute(
     steps = planner.plan(stages)
     run = Execution(planner, reporter or Silent(), options.jobs)
     if writes(steps):
-        with folder.locked(options.wait, run.reporter.note):
+        reused = "" if options.force else ", and its results will be reused"
+        with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
             # Decided anew, stage by stage: another process may have worked here until now.
             run = Execution(Planner(config, folder, graph, options.force), run.reporter, options.jobs)
@@ -238,7 +240,7 @@ class Execution:
     def _run_here(self, begun: Begun) -> None:
         self.running[None] = begun
         try:
-            with kernels_told_of(begun.reporter.compiling):
+            with watched(begun.reporter.compiling):
                 content, complete = begun.task.run(begun.reporter), True
         except NoAnswer as error:
             content, complete = unanswered(error), False

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from walkerlab import kernel_cache
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.scene.left_out import LeftOut
@@ -84,7 +84,7 @@ def run_in_worker(task: StageTask) -> Content:
     """Run a stage in a worker, telling its progress."""
     reporter = PipeReporter()
     importlib.import_module(task.module)
-    with kernels_told_of(reporter.compiling):
+    with kernel_cache.watched(reporter.compiling):
         return task.run(reporter)
 
 
@@ -113,13 +113,4 @@ def task_of(
 
 def nothing_compiled_yet() -> bool:
     """Whether what was imported has kernels, and none of them was compiled on this machine yet."""
-    kernels = sys.modules.get("walkerlab.kernels")
-    return kernels is not None and bool(kernels.nothing_compiled_yet())
-
-
-@contextlib.contextmanager
-def kernels_told_of(tell: Callable[[str], None]) -> Iterator[None]:
-    """Have `tell` told what is compiled meanwhile; a stage without kernels is not asked."""
-    kernels = sys.modules.get("walkerlab.kernels")
-    with kernels.watched(tell) if kernels is not None else contextlib.nullcontext():
-        yield
+    return "walkerlab.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()

@@ -20,7 +20,7 @@ class Identity:
     stage           name
     config_slice    the keys of the config that the stage reads, with their values
     input_keys      the stage keys of its inputs, by stage
-    code_digest     see `store.code`
+    code_digest     see `sources`
     schema_version  of the artifact's layout
     """
 

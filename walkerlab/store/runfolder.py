@@ -112,7 +112,7 @@ class RunFolder:
                 if not wait:
                     raise LockedError(f"{held}.", "Leave out --no-wait to wait for it.") from None
                 if say is not None:
-                    say(f"waiting: {held}, and its results will be reused")
+                    say(f"waiting: {held}")
                 lock.acquire()
         try:
             remove_leftovers(self.path)

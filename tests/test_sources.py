@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import walkerlab
+from walkerlab.sources import Sources, code_digest
 from walkerlab.stages.graph import STAGES
-from walkerlab.store.code import Sources, code_digest
 
 NUMBER = itertools.count()
 

@@ -1,11 +1,11 @@
-"""Digest of the code that a module runs: its source and that of all it imports from its own package."""
+"""What a module is made of: its source and that of all it imports from its own package, read without importing it."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.util
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 
@@ -40,21 +40,21 @@ class Sources:
         """
         closure = self.closure(name)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
-        digest = hashlib.sha256()
-        for module in closure:
-            digest.update(f"{module.name}\0{len(module.text)}\0".encode() + module.text)
-        for label, path in sorted(files.items()):
-            data = path.read_bytes()
-            digest.update(f"{label}\0{len(data)}\0".encode() + data)
-        return digest.hexdigest()
+        texts = [(module.name, module.text) for module in closure]
+        return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
-    def closure(self, name: str) -> list[Module]:
-        """The module and all it imports, by whatever way, from its own package and from this one; sorted by name."""
-        start = self.module(name)
-        if start is None:
-            raise ModuleNotFoundError(f"no module named {name!r}", name=name)
-        found = {name: start}
-        waiting = [start]
+    def closure(self, *names: str) -> list[Module]:
+        """The modules and all they import, by whatever way, from their own packages and from this one, by name.
+
+        Raises ModuleNotFoundError if there is no such module.
+        """
+        found: dict[str, Module] = {}
+        for name in names:
+            start = self.module(name)
+            if start is None:
+                raise ModuleNotFoundError(f"no module named {name!r}", name=name)
+            found[name] = start
+        waiting = list(found.values())
         while waiting:
             for other in waiting.pop().imports:
                 module = self.module(other)
@@ -131,6 +131,14 @@ class Module:
     def data(self) -> list[Path]:
         """Files of a package that are not Python, in its folder and in folders below that are no packages."""
         return sorted(data_files(self.path.parent)) if self.is_package else []
+
+
+def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
+    """The sha256 (hex) over parts, each with its name."""
+    digest = hashlib.sha256()
+    for name, data in parts:
+        digest.update(f"{name}\0{len(data)}\0".encode() + data)
+    return digest.hexdigest()
 
 
 def data_files(folder: Path) -> Iterator[Path]:

@@ -1,0 +1,250 @@
+"""Numba's compiler as kernels use it: parts without machine code of their own, and each kernel compiled by one process.
+
+All of this leans on numba's inner parts; if one is not there, `absent` says so and numba's usual ways do.
+"""
+
+import functools
+import gc
+import hashlib
+import importlib
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from walkerlab.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
+
+# thresholds of the garbage collector while compiling, which makes objects by the million and leaves few behind: at the
+# usual ones a quarter of the time goes into looking them through
+SELDOM = (100_000, 50, 100)
+
+compiling: list[tuple["KernelCache", str]] = []
+"""The kernels that this process is compiling, with their signatures; each is called by the one before it."""
+absent: list[str] = []
+"""What of numba's inner parts is not as it is here: without it everything is compiled as numba itself does it."""
+
+
+def inner_part(name: str, *members: str) -> Any:
+    """A class from within numba, which any version may change; noted in `absent` if it or a member is not there."""
+    module, _, kind = name.rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module), kind)
+    except (ImportError, AttributeError):
+        absent.append(name)
+        return object
+    absent.extend(f"{name}.{member}" for member in members if not hasattr(found, member))
+    return found
+
+
+CompileResultCacheImpl = inner_part("numba.core.caching.CompileResultCacheImpl", "_locator_classes", "locator")
+FunctionCache = inner_part("numba.core.caching.FunctionCache", "_impl_class", "load_overload", "save_overload")
+IndexDataCacheFile = inner_part("numba.core.caching.IndexDataCacheFile", "_load_index")
+IPythonCacheLocator = inner_part("numba.core.caching.IPythonCacheLocator", "from_function")
+UserProvidedCacheLocator = inner_part(
+    "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
+)
+JITCodeLibrary = inner_part(
+    "numba.core.codegen.JITCodeLibrary",
+    "codegen",
+    "get_pointer_to_function",
+    "_ensure_finalized",
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+)
+Compiler = inner_part("numba.core.compiler.Compiler", "compile_extra")
+CompilerBase = inner_part("numba.core.compiler.CompilerBase", "define_pipelines")
+DefaultPassBuilder = inner_part("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+
+if absent:
+    warnings.warn(
+        f"numba {numba.__version__} is without {', '.join(absent)}: compiling takes longer than it could, and is not "
+        "told of. Results are the same; a version of numba that pyproject.toml allows compiles faster.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
+    """Numba's locator for `cache_folder`, for kernels alone, by what their files say and not when or where they lie."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        """The folder of a function's file: for those of the package the same wherever that is installed."""
+        super().__init__(py_func, py_file)
+        file = Path(py_file)
+        own = file.is_relative_to(PACKAGE)
+        below = file.relative_to(PACKAGE).parent if own else self.get_suitable_cache_subpath(py_file)
+        self._cache_path = str(cache_folder() / below)
+
+    def get_source_stamp(self) -> str:
+        """What the stored code was compiled from."""
+        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """A locator for a function in a file, whether or not a folder was chosen for all of Numba."""
+        return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
+
+
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
+    """Results of compiling in `cache_folder`; those of a notebook's cells, which have no file, where IPython says."""
+
+    _locator_classes = (KernelLocator, IPythonCacheLocator)
+
+
+class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
+    """A kernel's stored code, begun anew where it was stored for types that this process cannot import.
+
+    Numba reads the types of all that is stored with a kernel; those of another program's own systems may be unknown.
+    """
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+
+
+class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
+    """A kernel's machine code on disk."""
+
+    _impl_class = KernelCacheImpl
+
+    def __init__(self, py_func: Any) -> None:
+        """Of a Python function; makes the folder that it is in."""
+        super().__init__(py_func)
+        locator = self._impl.locator
+        self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+
+
+class KernelCache:
+    """What numba asks for a kernel's stored code: of several processes that call it at once, one compiles it."""
+
+    def __init__(self, py_func: Any) -> None:
+        """Of a Python function; nothing is opened before its first call."""
+        self._function = py_func
+        self.kernel = py_func.__name__
+        self._held: dict[str, Any] = {}
+
+    @functools.cached_property
+    def stored(self) -> StoredKernel:
+        """The code on disk."""
+        return StoredKernel(self._function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The stored code; None if this process is to compile it, once no other does."""
+        found = self.stored.load_overload(signature, context)
+        if found is not None or str(signature) in self._held:
+            return found
+        for tell in watchers:
+            tell(self.kernel)
+        lock = lock_of(f"{self.kernel} {signature}")
+        lock.acquire()
+        found = self.stored.load_overload(signature, context)
+        if found is None:
+            self._held[str(signature)] = lock
+            compiling.append((self, str(signature)))
+        else:
+            _finished(lock)
+        return found
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Store what was compiled."""
+        try:
+            with lock_of(self.kernel):  # one index for all signatures
+                self.stored.save_overload(signature, data)
+        finally:
+            self.finish(str(signature))
+
+    def finish(self, signature: str) -> None:
+        """The kernel is compiled, or cannot be."""
+        lock = self._held.pop(signature, None)
+        if lock is not None:
+            compiling.remove((self, signature))
+        _finished(lock)
+
+
+def _finished(lock: Any) -> None:
+    """Give a kernel's lock back, if it was held, and say which one is compiled on: the one that called it, or none."""
+    if lock is not None:
+        lock.release()
+    for tell in watchers:
+        tell(compiling[-1][0].kernel if compiling else "")
+
+
+class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
+    """Numba's own compiler, with garbage collected seldom meanwhile."""
+
+    def compile_extra(self, func: Any) -> Any:
+        """The compiled function."""
+        usual = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
+        try:
+            return super().compile_extra(func)
+        except BaseException:  # whatever stops it goes on to the caller; the kernel's lock and name do not stay behind
+            if compiling and compiling[-1][0].kernel == func.__name__:
+                cache, signature = compiling[-1]
+                cache.finish(signature)
+            raise
+        finally:
+            gc.set_threshold(*usual)
+
+
+class _WithoutEnvironment:
+    """A code generator that has no place for the environment of a function whose machine code nobody asks for."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing."""
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
+    """The code of a part: linked into kernels, which are optimised as wholes, and no machine code of its own.
+
+    To optimise and emit every part for itself too, as numba does, takes a third of the time that compiling takes.
+    """
+
+    @property
+    def codegen(self) -> Any:
+        return _WithoutEnvironment(self._codegen)
+
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
+    """Numba's own passes, into a library of parts."""
+
+    def define_pipelines(self) -> list[Any]:
+        """The passes."""
+        state = self.state
+        if state.library is None:
+            state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
+    """The function compiled and kept by numba's own means, in the folder of this state of the sources too."""
+    compiled = numba.njit(**flags)(function)
+    usual = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder())
+    try:
+        compiled.enable_caching()
+    finally:
+        numba.config.CACHE_DIR = usual
+    return compiled
