@@ -36,6 +36,11 @@ def row(lines, head):
     return found.removeprefix(head).split()
 
 
+def said(lines):
+    """The lines as one, with ordinary spaces."""
+    return " ".join(" ".join(lines).split())
+
+
 def cells(lines):
     """The words of each line."""
     return [line.split() for line in lines]
@@ -90,6 +95,42 @@ def test_a_long_walk_is_a_few_short_lines(stage):
     assert max(map(len, lines)) <= 120
     assert len(lines) < 12
     assert row(lines, "period (s)") == [*["0.7000"] * 6, "…", *["0.7000"] * 2]
+
+
+def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves():
+    changed = {"step_period_s": 4e-6, "step_length_m": 3e-3, "end_time_s": 1e-5}
+    numbers = {"step_periods_s": [0.8061234], "step_lengths_m": [0.3712345], "steps": 1}
+    lines = answer("contact-sim", WALK | numbers | {"numerical_error": changed})
+    assert lines[0].endswith("the last takes 0.80612 s and is 0.37 m long.")
+    assert row(lines, "period (s)") == ["0.80612"]
+    assert "numerical error: 4 × 10⁻⁶ s in a period, 0.003 m in a length and 10⁻⁵ s at the end, by" in said(lines)
+    exact = dict.fromkeys(changed, 0.0)
+    assert "takes 0.806123 s" in answer("simulate", WALK | numbers | {"numerical_error": exact})[0]
+    other = {**changed, "by": "another method, radau5"}
+    assert "another method, radau5." in said(answer("simulate", WALK | numbers | {"numerical_error": other}))
+
+
+def test_an_unknown_numerical_error_is_told_with_its_reason():
+    unknown = {"reason": "with a hundred times tighter tolerances the walk ends otherwise: fell after 1 step"}
+    lines = answer("contact-sim", WALK | {"numerical_error": unknown})
+    assert lines[0].endswith("takes 0.7000 s and is 0.3700 m long.")
+    assert "numerical error: unknown: with a hundred times tighter tolerances the walk ends otherwise" in " ".join(
+        lines
+    )
+
+
+def test_compared_walks_have_their_digits_and_errors():
+    step = {"period_s": 0.8061234, "length_m": 0.3712345}
+    errors = {"contact": {"step_period_s": 4e-3, "step_length_m": 4e-6, "end_time_s": 1e-3}}
+    summary = {
+        "steps": {"rigid": step, "contact": step, "gait": step},
+        "outcomes": {"rigid": "walked", "contact": "walked"},
+        "numerical_error": errors,
+    }
+    lines = answer("compare", summary)
+    assert row(lines, "rigid") == ["0.80612", "0.37123", "walked"]
+    assert row(lines, "contact") == ["0.81", "0.37123", "walked"]
+    assert "numerical error of the contact walk: 0.004 s in a period" in said(lines)
 
 
 def test_a_fall_is_told_with_its_advice():

@@ -294,8 +294,18 @@ def test_assumptions_are_judged():
 
 def test_steps_of_both_models_stand_side_by_side_with_dashes_behind_the_shorter():
     found = rows(sections(**{"contact-sim": contact_sim("fell", 2)})["steps"])
-    assert found["2"] == ["0.70000", "0.70000", "0.37000", "0.37000", "0.930"]
-    assert found["4"] == ["0.70000", "–", "0.37000", "–", "–"]
+    assert found["2"] == ["0.7000", "0.7000", "0.3700", "0.3700", "0.930"]
+    assert found["4"] == ["0.7000", "–", "0.3700", "–", "–"]
+
+
+def test_steps_have_the_digits_that_the_numerical_error_leaves_and_a_sentence_says_it():
+    error = {"step_period_s": 4e-6, "step_length_m": 4e-4, "end_time_s": 1e-5}
+    section = sections(simulate=simulate(numerical_error=error), **{"contact-sim": contact_sim()})["steps"]
+    assert rows(section)["2"][:4] == ["0.70000", "0.7000", "0.370", "0.3700"]
+    said = " ".join(block.text for block in section.blocks if isinstance(block, Paragraph))
+    assert said.startswith("Numerical error: 4")
+    assert said.endswith("by a second walk with a hundred times tighter tolerances (rigid model).")
+    assert not [block for block in sections()["steps"].blocks if isinstance(block, Paragraph)]
 
 
 def test_of_a_very_long_walk_the_first_and_last_steps_are_listed():

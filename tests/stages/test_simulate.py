@@ -189,5 +189,5 @@ def test_a_long_walk_needs_memory_for_its_steps_only():
         tracemalloc.stop()
     assert result.summary["steps"] == 4000
     table = sum(variable.values.nbytes for variable in result["steps"].variables.values())
-    # the table, its frozen copy, and the summary's lists; before that the table and its pieces
-    assert peak < 4 * table
+    # the table, its frozen copy, and the summary's lists; beside it, of the second walk, its table and lists
+    assert peak < 5 * table

@@ -23,6 +23,7 @@ from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
 from walkerlab.sweeps.chunk import FOLDER, row_of, without_outputs
+from walkerlab.sweeps.drawing import said_of
 from walkerlab.sweeps.flat import said_in
 from walkerlab.sweeps.result import as_csv, last_of_lists
 
@@ -71,6 +72,43 @@ def test_points_without_an_answer_are_rows_that_say_why(toy):
         assert np.isfinite(dataset.slips_m).sum("slips_m_index").values.tolist() == [2, 4, 0]
     needing = toy.run("roll", "slope_rad=[0.1, 1.2]")
     assert needing.content[""]["said"].tolist() == ["", "it needs drop: too steep: 1.2"]
+
+
+WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those of other tests need
+
+
+def plain(sentences):
+    """Sentences with ordinary spaces."""
+    return [" ".join(sentence.split()) for sentence in sentences]
+
+
+def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
+    swept = toy.run("roll", "strides=1:40:40", sets=WALKED_AGAIN)
+    again = np.isfinite(swept.content[""]["numerical_error.end_time_s"])
+    assert again.sum() == sweeps.SAMPLE
+    assert again[[0, -1]].all()
+    assert np.diff(np.flatnonzero(again)).max() <= 3  # of forty points sixteen: one of two or three
+    told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}
+    assert swept.summary["numerical_error"] == pytest.approx(told)
+    assert plain(said_of(swept.summary)) == [
+        "Largest numerical error: 0.04 s in a period and 10⁻⁹ s at the end, by a second walk with a hundred times "
+        "tighter tolerances; 16 of 40 points were walked again."
+    ]
+
+
+def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted(toy):
+    swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
+    error = swept.summary["numerical_error"]
+    assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
+    assert said_of(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
+    unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
+    assert said_of(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
+
+
+def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):
+    summary = toy.run("drop", GRAVITIES).summary
+    assert "numerical_error" not in summary
+    assert said_of(summary) == []
 
 
 def test_nothing_is_computed_twice(toy, marks):

@@ -9,9 +9,10 @@ from typing import Any
 
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
-from walkerlab.report.numbers import count, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import MODELS, WALKED, ends, walks
-from walkerlab.report.sections import adjustment, families, gaits, stability
+from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
+from walkerlab.report.outcomes import MODELS, WALKED, ends
+from walkerlab.report.outcomes import walks as comes
+from walkerlab.report.sections import adjustment, families, gaits, stability, walks
 from walkerlab.report.sections.families import parameter
 from walkerlab.report.sections.models import CHANNELS
 from walkerlab.report.sections.paper import numbers_table
@@ -83,11 +84,7 @@ def energy_lost(summary: Summary) -> str | None:
     return listed(f"{quantity(value, 'J', 3)} {CHANNELS.get(name, name)}" for name, value in lost if value) or None
 
 
-OF_EACH_STEP = (
-    measured("period", "step_periods_s", partial(fixed, decimals=4)),
-    measured("length", "step_lengths_m", partial(fixed, decimals=4)),
-    measured("slip", "slips_m", partial(fixed, decimals=2), prefix="m"),
-)
+OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
@@ -104,21 +101,25 @@ OF_THE_WALK = (
 def walk(model: str, summary: Summary) -> list[str | Table]:
     """How a model's walk went, step by step."""
     steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
-    head = f"The {model} {walks(steps, summary['outcome'])}"
+    head = f"The {model} {comes(steps, summary['outcome'])}"
     if periods:
-        head += f"; the last takes {fixed(periods[-1], 4)} s and is {fixed(lengths[-1], 4)} m long"
-    taken = side_by_side("", OF_EACH_STEP, each_step(summary), head="step")
+        period = walks.of_step(periods[-1], "step_periods_s", summary)
+        head += f"; the last takes {period} s and is {walks.of_step(lengths[-1], 'step_lengths_m', summary)} m long"
+    columns = [Column(title, key, numeric=True) for key, title in OF_EACH_STEP.items()]
+    taken = side_by_side("", columns, each_step(summary), head="step")
     advised = summary.get("advice") and summary["outcome"] != WALKED
     whole = side_by_side("", OF_THE_WALK, {"": summary}, head="")
-    return [f"{head}.", taken, whole, f"advice: {summary['advice']}" if advised else ""]
+    error = summary.get("numerical_error")
+    told = f"numerical error: {walks.error_in_words(error)}." if error else ""
+    return [f"{head}.", taken, whole, told, f"advice: {summary['advice']}" if advised else ""]
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
     """What is known of each step that is shown, by its number; an ellipsis stands for the others."""
-    every = {str(column.of): found for column in OF_EACH_STEP if (found := summary.get(str(column.of)))}
+    every = {key: found for key in OF_EACH_STEP if (found := summary.get(key))}
     return {
         str(place): {
-            key: Cell("…") if place == "…" else values[place - 1]
+            key: "…" if place == "…" else walks.of_step(values[place - 1], key, summary)
             for key, values in every.items()
             if place == "…" or place <= len(values)
         }
@@ -162,7 +163,13 @@ def compare(summary: Summary) -> list[str | Table]:
     head = f"Of {total} numbers that the paper prints, " + listed(
         f"{number} {'is' if number == 1 else 'are'} {name}" for name, number in verdicts.items()
     )
-    return [f"{head}.", numbers_table(summary["paper_numbers"])]
+    return [f"{head}.", numbers_table(summary["paper_numbers"]), *errors_of_models(summary)]
+
+
+def errors_of_models(summary: Summary) -> list[str]:
+    """The numerical error of each model's walk."""
+    errors = summary.get("numerical_error", {})
+    return [f"numerical error of the {model} walk: {walks.error_in_words(error)}." for model, error in errors.items()]
 
 
 LAST_STEP = (
@@ -175,12 +182,21 @@ LAST_STEP = (
 
 def models_compared(summary: Summary) -> list[str | Table]:
     """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
-    outcomes = summary["outcomes"]
-    steps = [{"name": name, "outcome": outcomes.get(name), **step} for name, step in summary["steps"].items()]
+    outcomes, errors = summary["outcomes"], summary.get("numerical_error", {})
+    steps = [
+        {"name": name, "outcome": outcomes.get(name), **(with_digits(step, errors[name]) if name in errors else step)}
+        for name, step in summary["steps"].items()
+    ]
     steps += [{"name": f"knee released at {name}", **walk} for name, walk in summary.get("releases", {}).items()]
     rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
     rest = "and so does the contact model" if contact == rigid else f"the contact model {contact}"
-    return [f"The rigid model {rigid}, {rest}.", table("", LAST_STEP, steps)]
+    return [f"The rigid model {rigid}, {rest}.", table("", LAST_STEP, steps), *errors_of_models(summary)]
+
+
+def with_digits(step: Summary, error: Summary) -> Summary:
+    """A step whose period and length are written with the decimals that the numerical error of its walk leaves."""
+    errors = {"period_s": error.get("step_period_s"), "length_m": error.get("step_length_m")}
+    return {**step, **{key: Cell(fixed(step[key], decimals_left(off))) for key, off in errors.items()}}
 
 
 def accuracy(summary: Summary) -> list[str | Table]:
@@ -259,7 +275,7 @@ ANSWERS: dict[str, Answer] = {
 def verdict(results: Mapping[str, Summary]) -> list[str]:
     """What a whole run has found, in three paragraphs at most: the gait, both walks, and what of the paper holds."""
     walked = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
-    said = "; the ".join(f"{model} {walks(one['steps'], one['outcome'])}" for model, one in walked)
+    said = "; the ".join(f"{model} {comes(one['steps'], one['outcome'])}" for model, one in walked)
     of_the_paper = "verdicts" in results.get("compare", {})
     judged = [*(["compare"] if of_the_paper else []), *(["stability"] if "stability" in results else [])]
     gait = headline("fixedpoint", results) if "fixedpoint" in results else ""

@@ -13,11 +13,14 @@ import typer
 
 from walkerlab.cli.failures import described, exit_on_failure, print_json, say
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.cli.text import paragraph
 from walkerlab.stages.graph import PIPELINE, Graph
 
 if TYPE_CHECKING:
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
+TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "numerical_error")
+"""Keys of a sweep's summary that `--json` has."""
 SHOWN = 20
 """Points that a dry run lists."""
 
@@ -203,7 +206,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
-        **{name: summary[name] for name in ("of", "parameters", "points", "done", "failed", "outcomes")},
+        **{name: summary[name] for name in TOLD if name in summary},
         "figures": [str(path) for path in drawn.figures],
         "html": str(drawn.page),
     }
@@ -226,12 +229,15 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
 
 def printed(swept: Swept, page: Path) -> list[str]:
     """The result for people."""
+    from walkerlab.sweeps.drawing import said_of
+
     summary = swept.summary
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
         *([f"  {swept.reused} of them were there already"] if swept.reused else []),
+        *(line for said in said_of(summary) for line in paragraph(said)),
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]

@@ -74,6 +74,7 @@ class RecordedWalk:
     max_scuff_depth: float  # m, of the swing foot below the slope
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean, from the stance foot
+    end_time: float  # s
     samples: Samples | None
     work: WalkWork
 
@@ -216,6 +217,7 @@ class Recorder:
 
     def finished(self, outcome: Outcome) -> RecordedWalk:
         """All that was seen."""
+        end_time = self.time if outcome == Outcome.WALKED else self.duration
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
             outcome = Outcome.LIFTED_OFF
         no_states = np.zeros((0, self.numbers))
@@ -235,6 +237,7 @@ class Recorder:
             max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
+            end_time=end_time,
             samples=joined(self.pieces) if self.pieces else None,
             work=WalkWork(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
         )

@@ -72,6 +72,7 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
             **motion.summary,
             "errata": [vars(erratum) for erratum in found],
             "departures": list(measured.departures.contact),
+            **errors_of(inputs),
             "left_out": left_out(inputs, measured, motion),
         },
     )
@@ -95,6 +96,7 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
             },
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
+        **errors_of(inputs),
         "dissipated_J": contact["dissipated_J"],
         "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
@@ -102,6 +104,13 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
     left_out = [NOT_THE_PAPERS, *motion.left_out, *(() if releases is None else LEFT_OUT)]
     progress.advance()
     return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": left_out})
+
+
+def errors_of(inputs: Mapping[str, Content]) -> dict[str, Any]:
+    """The numerical errors of the walks that are compared, by model, of those that have one."""
+    walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}
+    found = {model: walk["numerical_error"] for model, walk in walks.items() if "numerical_error" in walk}
+    return {"numerical_error": found} if found else {}
 
 
 NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}

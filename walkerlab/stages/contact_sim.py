@@ -33,6 +33,7 @@ from walkerlab.scene.contact import (
 )
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
 from walkerlab.stages.walk_columns import TIME, legs, numbers_of_steps, of_body, of_steps, over_time
@@ -45,29 +46,38 @@ HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be c
 Floats = NDArray[np.float64]
 
 
-def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Walk `config.strides` strides on compliant ground; raises NoAnswer if the solver gives none."""
+def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Walk `config.strides` strides, and again for the numerical error; raises NoAnswer if the solver gives none.
+
+    again  whether the second walk, which takes about as long as two or three, is wanted
+    """
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = contact_scene(config, rigid_step, own_pitch(config, rigid_step, rigid_state))
     settings = config.solver.contact
-    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, 2 * config.strides * BUDGET_PER_STEP)
-    sampled = bool(config.outputs)
-    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+    start, steps = start_state(scene, rigid_state), 2 * config.strides
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
+    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     tell_unresolved_slip(settings.atol, scene, progress)
     progress.start("contact-sim", 1)
-    result = scene.walk(start_state(scene, rigid_state), 2 * config.strides, tolerances, interval)
+    result = scene.walk(start, steps, tolerances, interval)
     progress.advance()
     if result.samples is not None:
-        stored = thinned(result.samples, result.samples.time_s, result.touch_time_s, progress)
-        result = replace(result, samples=stored)
-    content = Content(groups(config, scene, result), summary(config, scene, result))
+        samples = thinned(result.samples, result.samples.time_s, result.touch_time_s, progress)
+        result = replace(result, samples=samples)
+    stored, said = groups(config, scene, result), summary(config, scene, result)
     if not result.outcome.answered:
         raise NoAnswer(
             f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
             result.advice,
-            partial=content,
+            partial=Content(stored, said),
         )
-    return content
+    if again:
+        progress.start("contact-sim: numerical error", 1)
+        said["numerical_error"] = numerical_error(
+            said, tolerances, lambda tighter: summary(config, scene, scene.walk(start, steps, tighter))
+        )
+        progress.advance()
+    return Content(stored, said)
 
 
 def compile_kernels(config: ContactSimConfig) -> None:

@@ -83,6 +83,7 @@ class Stage:
     needs_contact  whether it is left out when the config has no contact block
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it
+    walks_again    whether it walks a second time for the numerical error, which its `run` can leave out: `again`
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
@@ -103,6 +104,7 @@ class Stage:
     needs_contact: bool = False
     draws: bool = False
     walks: bool = False
+    walks_again: bool = False
     has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
@@ -181,6 +183,7 @@ PIPELINE = Graph(
         takes=SimulateConfig,
         inputs=gait_unless_start_is_given,
         walks=True,
+        walks_again=True,
         does_without=of_rigid_walk,
     ),
     Stage(
@@ -191,6 +194,7 @@ PIPELINE = Graph(
         inputs=gait_for_start_or_pads,
         needs_contact=True,
         walks=True,
+        walks_again=True,
         compiles_long=True,
         does_without=of_contact_walk,
     ),

@@ -85,19 +85,28 @@ class InMemory:
         """Nothing is computed yet."""
         self.graph = graph
         self.remembered = remembered
-        self._inputs: OrderedDict[str, Answer] = OrderedDict()
+        self._inputs: OrderedDict[tuple[str, bool], Answer] = OrderedDict()
 
-    def answer(self, config: Config, target: str, keys: dict[str, str], progress: Progress | None = None) -> Answer:
+    def answer(
+        self,
+        config: Config,
+        target: str,
+        keys: dict[str, str],
+        progress: Progress | None = None,
+        *,
+        again: bool = True,
+    ) -> Answer:
         """The answer of a stage under a config, as the stage gives it when it is run.
 
-        keys  of the stage and what it needs, from `Keys.of`
+        keys   of the stage and what it needs, from `Keys.of`
+        again  whether walks are taken a second time for their numerical error
         """
         progress = progress or Silent()
         results: dict[str, Content] = {}
         for stage in self.graph.needed_for(target, config):
             if stage.name == target:
-                return self._computed(stage, config, results, progress)
-            found = self._remembered(stage, config, results, progress, keys[stage.name])
+                return self._computed(stage, config, results, progress, again)
+            found = self._remembered(stage, config, results, progress, (keys[stage.name], again and stage.walks_again))
             if found.no_answer is not None:
                 said = NoAnswer(f"it needs {stage.name}: {found.no_answer.message}", found.no_answer.advice)
                 return Answer(Content(), said)
@@ -105,21 +114,23 @@ class InMemory:
         raise AssertionError("a stage needs itself")
 
     def _remembered(
-        self, stage: Stage, config: Config, results: dict[str, Content], progress: Progress, key: str
+        self, stage: Stage, config: Config, results: dict[str, Content], progress: Progress, key: tuple[str, bool]
     ) -> Answer:
         if key in self._inputs:
             self._inputs.move_to_end(key)
             return self._inputs[key]
-        answer = self._inputs[key] = self._computed(stage, config, results, progress)
+        answer = self._inputs[key] = self._computed(stage, config, results, progress, key[1])
         if len(self._inputs) > self.remembered:
             self._inputs.popitem(last=False)
         return answer
 
     @staticmethod
-    def _computed(stage: Stage, config: Config, results: dict[str, Content], progress: Progress) -> Answer:
+    def _computed(stage: Stage, config: Config, results: dict[str, Content], progress: Progress, again: bool) -> Answer:
         run = importlib.import_module(stage.module).run
         inputs = {name: results[name] for name in stage.inputs(config)}
         extra: dict[str, Any] = {"jobs": 1} if stage.has_cells else {}
+        if stage.walks_again:
+            extra["again"] = again
         if stage.keeps_parts:
             extra["parts"] = PartsInMemory()
         try:

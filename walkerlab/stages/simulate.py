@@ -16,24 +16,37 @@ from walkerlab.mechanics.standing import STANCE
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.system import State
+from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.thinning import thinned
 from walkerlab.stages.walk_columns import COORDINATE, STEP, TIME, legs, numbers_of_steps, of_body, of_steps, over_time
 from walkerlab.store.content import Content, Group, Variable
 
 
-def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Walk `config.strides` strides; raises NoAnswer if the integrator gives none."""
+def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Walk `config.strides` strides, and again for the numerical error; raises NoAnswer if the integrator gives none.
+
+    again  whether the second walk, which takes about as long as two, is wanted
+    """
     scene = rigid_scene(config)
-    steps = 2 * config.strides
+    start, steps = start_state(config, inputs), 2 * config.strides
     progress.start("simulate", steps)
-    walk = scene.walk(start_state(config, inputs), steps, scene.tolerances, progress.advance)
+    walk = scene.walk(start, steps, scene.tolerances, progress.advance)
     if walk.samples is not None:
         walk = replace(walk, samples=thinned(walk.samples, walk.samples.time, walk.heel_strikes, progress))
-    content = Content(groups(scene, walk), summary(config, walk))
+    stored, said = groups(scene, walk), summary(config, walk)
     if not walk.outcome.answered:
-        raise NoAnswer(f"simulate: {walk.outcome.label} after {walk.steps} steps", walk.outcome.advice, content)
-    return content
+        why = f"simulate: {walk.outcome.label} after {walk.steps} steps"
+        raise NoAnswer(why, walk.outcome.advice, Content(stored, said))
+    if again:
+        progress.start("simulate: numerical error", steps)
+        unsampled = replace(scene, states=False, energies=False, forces=False)
+        said["numerical_error"] = numerical_error(
+            said,
+            scene.tolerances,
+            lambda tighter: summary(config, unsampled.walk(start, steps, tighter, progress.advance)),
+        )
+    return Content(stored, said)
 
 
 def start_state(config: StartConfig, inputs: Mapping[str, Content]) -> State:
@@ -48,6 +61,7 @@ def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
         "outcome": walk.outcome.label,
         "advice": walk.outcome.advice,
         **numbers_of_steps(walk.heel_strikes, walk.periods, walk.lengths, walk.knee_strikes),
+        "end_time_s": walk.end_time,
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -36,9 +37,10 @@ from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
+from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary
-from walkerlab.stages.tune_results import groups, summary
+from walkerlab.stages.tune_results import groups, summary, walk_summary
 from walkerlab.store.content import Content
 from walkerlab.workers import in_order
 
@@ -83,6 +85,7 @@ class TuneFindings:
     paper: AdamsWalk | None  # None for another walker than the paper's compass
     steps: int  # asked for
     names: tuple[str, ...]  # of the rigid start's numbers
+    errors: Mapping[str, dict[str, Any]]  # what is told of the procedure's walks beside themselves, by name
     adjusted_state: State | None
     gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
@@ -157,16 +160,15 @@ class TuneRun:
         found = margins(self.starts, around, search) if adjustment is not None else []
         state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
         adjusted = None if state is None else self.walk(state)
+        errors = {"released": self.error(released, self.rigid_state)}
+        if hinged is not None:
+            errors["hinged"] = self.error(hinged, self.rigid_state, hinge)
+        if state is not None and adjusted is not None:
+            errors["adjusted"] = self.error(adjusted, state)
         return TuneFindings(
             self.scene,
             self.gait,
-            Procedure(
-                self.rigid_state,
-                self.rigid_walk(),
-                hinged,
-                released,
-                adjusted,
-            ),
+            Procedure(self.rigid_state, self.rigid_walk(), hinged, released, adjusted),
             as_it_stands,
             adjustment,
             found,
@@ -175,6 +177,7 @@ class TuneRun:
             adams_walk(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
             self.steps,
             coordinates(self.config),
+            errors,
             state,
             None if adjusted is None else self.factors_at_the_end(adjusted),
         )
@@ -196,7 +199,7 @@ class TuneRun:
 
     def scaled(self) -> ScaledStarts:
         """The scaled starts, walked at the config's tolerances."""
-        settings, found = self.config.solver.contact, self.gait.gait
+        found = self.gait.gait
         own = None if found is None else (found.step.period_s, found.step.length_m)
         starts = scaled_starts(
             self.scene.walker,
@@ -205,8 +208,7 @@ class TuneRun:
             self.steps,
             own,
         )
-        budget = self.steps * BUDGET_PER_STEP
-        return replace(starts, tolerances=replace(TOLERANCES, rtol=settings.rtol, atol=settings.atol, budget=budget))
+        return replace(starts, tolerances=replace(self.tolerances, method=TOLERANCES.method))
 
     def scaled_state(self, swing: float, stance: float) -> State:
         """The rigid start with its velocities scaled."""
@@ -229,13 +231,28 @@ class TuneRun:
         rates = motion_of_legs(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
-    def walk(self, state: State, pinned: Pinned | None = None) -> ContactWalkResult:
-        """Walk the contact model from a rigid state, as contact-sim does, with samples."""
+    @property
+    def tolerances(self) -> Tolerances:
+        """The config's."""
         settings = self.config.solver.contact
-        tolerances = Tolerances(settings.method, settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP)
+        return Tolerances(settings.method, settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP)
+
+    def walk(
+        self, state: State, pinned: Pinned | None = None, tolerances: Tolerances | None = None
+    ) -> ContactWalkResult:
+        """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
-        return scene.walk(start_state(scene, state), self.steps, tolerances, interval)
+        return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
+
+    def error(self, walk: ContactWalkResult, state: State, pinned: Pinned | None = None) -> dict[str, Any]:
+        """The numerical error of such a walk, under its key; nothing for one without an answer."""
+        if not walk.outcome.answered:
+            return {}
+        error = numerical_error(
+            walk_summary(walk), self.tolerances, lambda tighter: walk_summary(self.walk(state, pinned, tighter))
+        )
+        return {"numerical_error": error}
 
     def rigid_walk(self) -> RecordedWalk:
         """The rigid model from its start, with samples."""

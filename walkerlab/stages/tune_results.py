@@ -40,9 +40,9 @@ def summary(found: TuneFindings) -> dict[str, Any]:
         "adjustment": adjustment_summary(found),
         **({} if found.paper is None else {"paper_start": papers_start(found.paper)}),
         "procedure": {
-            **({} if procedure.hinged is None else {"hinged": walk_summary(procedure.hinged)}),
-            "released": walk_summary(procedure.released),
-            "adjusted": None if procedure.adjusted is None else walk_summary(procedure.adjusted),
+            **({} if procedure.hinged is None else {"hinged": walk_summary(procedure.hinged) | found.errors["hinged"]}),
+            "released": walk_summary(procedure.released) | found.errors["released"],
+            "adjusted": procedure.adjusted and walk_summary(procedure.adjusted) | found.errors["adjusted"],
         },
         "map": map_summary(found),
         "slope_rad": found.scene.walker.slope,

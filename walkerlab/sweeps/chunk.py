@@ -61,6 +61,7 @@ class ChunkTask:
     target   the stage
     configs  of the points
     keys     of each point's result and of the results it needs, by stage
+    again    whether each point's walk is taken a second time for its numerical error
     host     the machine that sends it
     """
 
@@ -68,6 +69,7 @@ class ChunkTask:
     target: str
     configs: tuple[Config, ...]
     keys: tuple[dict[str, str], ...]
+    again: tuple[bool, ...]
     host: str = ""
 
     def split(self) -> tuple[ChunkTask, ChunkTask]:
@@ -75,8 +77,8 @@ class ChunkTask:
         middle = len(self.configs) // 2
         first, second = slice(None, middle), slice(middle, None)
         return (
-            replace(self, configs=self.configs[first], keys=self.keys[first]),
-            replace(self, configs=self.configs[second], keys=self.keys[second]),
+            replace(self, configs=self.configs[first], keys=self.keys[first], again=self.again[first]),
+            replace(self, configs=self.configs[second], keys=self.keys[second], again=self.again[second]),
         )
 
 
@@ -95,9 +97,9 @@ def compute(task: ChunkTask) -> Chunk:
     worker = worker_for(task.graph, graph)
     labels: dict[str, tuple[str, str]] = {}
     rows = []
-    for config, keys in zip(task.configs, task.keys, strict=True):
+    for config, keys, again in zip(task.configs, task.keys, task.again, strict=True):
         started = time.perf_counter()
-        row, content = row_of(worker, config, task.target, keys)
+        row, content = row_of(worker, config, task.target, keys, again)
         rows.append(replace(row, wall_s=time.perf_counter() - started))
         labels.update(labels_in(content, labels))
     return Chunk(tuple(rows), labels)
@@ -129,11 +131,13 @@ def worker_for(where: str, graph: Graph) -> Any:
     return _WORKERS.setdefault(where, InMemory(graph))
 
 
-def row_of(worker: Any, config: Config, target: str, keys: dict[str, str]) -> tuple[PointResult, Content]:
-    """One point's row, and the content it is from."""
+def row_of(
+    worker: Any, config: Config, target: str, keys: dict[str, str], again: bool = True
+) -> tuple[PointResult, Content]:
+    """One point's row, and the content it is from; `again` as in `ChunkTask`."""
     key = keys[target]
     try:
-        answer = worker.answer(without_outputs(config, target, worker.graph), target, keys)
+        answer = worker.answer(without_outputs(config, target, worker.graph), target, keys, again=again)
     except WalkerlabError as error:
         return PointResult(key, "failed", error.message), Content()
     except Exception as error:

@@ -101,6 +101,10 @@ class Columns:
         """Of the variables."""
         return self._columns.keys()
 
+    def of(self, name: str) -> NDArray[Any] | None:
+        """What the results have under a name, nan or an empty text for a gap; None if none of them has it."""
+        return self._columns[name].values if name in self._columns else None
+
     @property
     def size_bytes(self) -> int:
         """About what all take in a file."""

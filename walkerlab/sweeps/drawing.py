@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from walkerlab.errors import ConfigError
 from walkerlab.figures.sweep import SweepFigure, choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
+from walkerlab.report.sections.walks import OF_ERROR, error_in_words
 from walkerlab.report.sweep_page import SweepPage, render
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
@@ -67,7 +69,7 @@ def page_of(swept: Swept, group: Group, figure: SweepFigure | None, shown: Seque
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     return SweepPage(
         title=f"{question.stage} over {', '.join(question.names)}",
-        finding=f"{summary['points']} points: {outcomes}.",
+        finding=" ".join([f"{summary['points']} points: {outcomes}.", *said_of(summary)]),
         figure=None if figure is None else figure.svg.decode(),
         caption="" if figure is None else figure.caption,
         head=(*question.names, *shown, "outcome", "said"),
@@ -79,6 +81,17 @@ def page_of(swept: Swept, group: Group, figure: SweepFigure | None, shown: Seque
             for name, axis in zip(question.names, question.axes, strict=True)
         ),
     )
+
+
+def said_of(summary: Mapping[str, Any]) -> list[str]:
+    """What a sweep says beside its numbers, in sentences."""
+    error = summary.get("numerical_error")
+    if error is None:
+        return []
+    ends = {key: error[key] for key in error if key in OF_ERROR}
+    largest = f"Largest numerical error: {error_in_words(ends)}" if ends else "Numerical errors are unknown"
+    otherwise = f", of which {error['ended_otherwise']} ended otherwise" if error["ended_otherwise"] else ""
+    return [f"{largest}; {error['walked_again']} of {error['of']} points were walked again{otherwise}."]
 
 
 def spoken(values: Sequence[object]) -> str:

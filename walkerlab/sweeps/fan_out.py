@@ -41,12 +41,17 @@ class FanOut:
     """One sweep's work on an engine."""
 
     def __init__(
-        self, engine: SweepEngine, order: Order, chunk_s: float, todo: Iterator[tuple[Any, dict[str, str]]], count: int
+        self,
+        engine: SweepEngine,
+        order: Order,
+        chunk_s: float,
+        todo: Iterator[tuple[Any, dict[str, str], bool]],
+        count: int,
     ) -> None:
         """Begin nothing yet.
 
         chunk_s  how long a chunk is to take, s
-        todo     config and keys of each point, of `count`
+        todo     of each point, of `count`: its config, its keys, and whether its walk is taken again (`ChunkTask`)
         """
         self.engine, self.order, self.chunk_s = engine, order, chunk_s
         self.todo, self.left = todo, count
@@ -78,8 +83,8 @@ class FanOut:
         size = min(self.left, self._chunk_size(workers))
         self.left -= size
         points = [next(self.todo) for _ in range(size)]
-        configs, keys = zip(*points, strict=True)
-        return ChunkTask(self.graph, self.target, configs, keys, platform.node())
+        configs, keys, again = zip(*points, strict=True)
+        return ChunkTask(self.graph, self.target, configs, keys, again, platform.node())
 
     def _chunk_size(self, workers: int) -> int:
         if self.point_s is None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.canonical import canonical_json
 from walkerlab.report.headlines import LAST_OF, headlines
+from walkerlab.stages.numerical_error import OF_EACH_STEP
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.store.runfolder import RunFolder
@@ -71,6 +72,7 @@ class Merge:
             "done": int(np.sum(statuses != "failed")),
             "failed": int(np.sum(statuses == "failed")),
             "outcomes": counted(self.own["outcome"][inverse]),
+            **numerical_error(self.columns, inverse),
         }
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
@@ -89,6 +91,24 @@ class Merge:
                 yield name, Variable(self.own[name][inverse].reshape(shape), dims, "", MEANINGS[name])
             else:
                 yield name, self.columns.variable(name, inverse, shape, dims)
+
+
+def numerical_error(columns: Columns, inverse: NDArray[np.int64]) -> dict[str, Any]:
+    """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
+
+    `ended_otherwise` counts those that came to another end, whose error is unknown. Nothing for a stage that walks not.
+
+    inverse  which result each point has
+    """
+    found = {key: columns.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
+    reasons, ends = columns.of("numerical_error.reason"), found["end_time_s"]
+    otherwise = 0 if reasons is None else int(np.sum(reasons[inverse] != ""))
+    known = 0 if ends is None else int(np.sum(np.isfinite(ends[inverse])))
+    if otherwise + known == 0:
+        return {}
+    largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
+    told = {"walked_again": known + otherwise, "of": len(inverse), "ended_otherwise": otherwise, **largest}
+    return {"numerical_error": told}
 
 
 def coordinates(question: Question, config: Any) -> Iterable[tuple[str, Variable]]:

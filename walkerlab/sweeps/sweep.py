@@ -39,6 +39,8 @@ from walkerlab.sweeps.question import Question
 from walkerlab.sweeps.result import Merge, question_slice, result_name, result_path
 
 PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
+SAMPLE = 16
+"""Points, evenly spread over a sweep, whose walks are taken a second time for their numerical error."""
 
 
 @dataclass(frozen=True)
@@ -244,10 +246,13 @@ class SweepRun:
         FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
         return tuple(bugs.values())
 
-    def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str]]]:
+    def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str], bool]]:
+        """Of each point its config, its keys, and whether it is of the sample whose walks are taken again."""
+        every = np.sort(self.first)
+        sample = set(every[np.linspace(0, every.size - 1, min(SAMPLE, every.size)).round().astype(int)].tolist())
         for index in indices:
             config = self.points.config(index)
-            yield config, self.points.keys(config)
+            yield config, self.points.keys(config), index in sample
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

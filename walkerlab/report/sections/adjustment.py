@@ -232,6 +232,12 @@ WALK_COLUMNS = (
     Column("walk", "walk"),
     Column("outcome", "outcome", lambda outcome: Cell(outcome, tone(outcome))),
     Column("steps", "steps", numeric=True),
+    Column(
+        "numerical error of a period (s)",
+        lambda walk: walk.get("numerical_error", {}).get("step_period_s"),
+        partial(number, digits=1),
+        numeric=True,
+    ),
 )
 
 

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from walkerlab.report.blocks import Paragraph, Section
+from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.numbers import (
     NONE,
     count,
+    decimals_left,
     fixed,
     length,
     listed,
@@ -136,22 +137,24 @@ FIRST, LAST = 20, 4
 
 
 SERIES = {
-    (RIGID, "step_periods_s"): ("rigid T (s)", 1.0, 5),
-    (CONTACT, "step_periods_s"): ("contact T (s)", 1.0, 5),
-    (RIGID, "step_lengths_m"): ("rigid S (m)", 1.0, 5),
-    (CONTACT, "step_lengths_m"): ("contact S (m)", 1.0, 5),
-    (CONTACT, "slips_m"): ("slip of the stance foot (mm)", 1e3, 3),
+    (RIGID, "step_periods_s"): "rigid T (s)",
+    (CONTACT, "step_periods_s"): "contact T (s)",
+    (RIGID, "step_lengths_m"): "rigid S (m)",
+    (CONTACT, "step_lengths_m"): "contact S (m)",
+    (CONTACT, "slips_m"): "slip of the stance foot (mm)",
 }
-"""Numbers of each step: stage and key under which they are; title, factor and decimals of their column."""
+"""Numbers of each step: stage and key under which they are, and title of their column."""
 
 
 def steps(results: Results) -> Section | None:
     """The steps that were taken; None if there are none."""
-    series = {shown: found for (stage, key), shown in SERIES.items() if (found := numbers_of(results, stage, key))}
+    series = {shown: found for shown in SERIES if (found := numbers_of(results, *shown))}
     if not series:
         return None
-    columns = [Column("step", numeric=True), *(Column(title, numeric=True) for title, *_ in series)]
-    written = [[fixed(factor * value, decimals) for value in found] for (_, factor, decimals), found in series.items()]
+    columns = [Column("step", numeric=True), *(Column(SERIES[shown], numeric=True) for shown in series)]
+    written = [
+        [of_step(value, key, results.summary(stage) or {}) for value in found] for (stage, key), found in series.items()
+    ]
     taken = list(zip_longest(*written, fillvalue=NONE))
     numbered = [(number, *step) for number, step in enumerate(taken, 1)]
     shown = numbered if len(taken) <= FIRST + LAST else [*numbered[:FIRST], *numbered[-LAST:]]
@@ -160,7 +163,41 @@ def steps(results: Results) -> Section | None:
     steps_table = table("Periods and lengths of the steps", columns, shown, note=note)
     periods = {stage: numbers_of(results, stage, "step_periods_s") for stage in (RIGID, CONTACT)}
     told = [f"{span(found, 's')} in the {MODELS[stage].lower()}" for stage, found in periods.items() if found]
-    return Section("steps", "Step by step", (steps_table,), f"Steps take {listed(told)}.")
+    error = errors(results)
+    blocks: tuple[PageBlock, ...] = (steps_table, *((Paragraph(error),) if error else ()))
+    return Section("steps", "Step by step", blocks, f"Steps take {listed(told)}.")
+
+
+NUMBERS_OF_STEPS = {"step_periods_s": "step_period_s", "step_lengths_m": "step_length_m"}
+"""Numbers of each step, and under which key of `numerical_error` their error is."""
+OF_ERROR = {
+    "step_period_s": ("in a period", "s"),
+    "step_length_m": ("in a length", "m"),
+    "end_time_s": ("at the end", "s"),
+}
+"""What `numerical_error` is of, in words, and its unit."""
+
+
+def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
+    """A number of a step with the decimals that its numerical error leaves; a slip in mm."""
+    if key not in NUMBERS_OF_STEPS:
+        return fixed(None if value is None else 1e3 * value, 3)
+    return fixed(value, decimals_left((summary.get("numerical_error") or {}).get(NUMBERS_OF_STEPS[key])))
+
+
+def error_in_words(error: Mapping[str, Any]) -> str:
+    """How far the numbers of a walk are off, and how that is known."""
+    if "reason" in error:
+        return f"unknown: {error['reason']}"
+    off = listed(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in OF_ERROR.items() if key in error)
+    return f"{off}, by a second walk with {error.get('by', 'a hundred times tighter tolerances')}"
+
+
+def errors(results: Results) -> str:
+    """A sentence on the numerical error of each walk that has one."""
+    found = {stage: (results.summary(stage) or {}).get("numerical_error") for stage in (RIGID, CONTACT)}
+    told = [f"{error_in_words(error)} ({MODELS[stage].lower()})" for stage, error in found.items() if error]
+    return f"Numerical error: {'; '.join(told)}." if told else ""
 
 
 def numbers_of(results: Results, stage: str, key: str) -> Sequence[float]:

@@ -1,0 +1,87 @@
+"""Is the numerical error that an answer carries of the size of its true error, and what does it cost?
+
+    python scripts/numerical_error.py                 # 60 walks of the contact campaign, seeds 0 to 59
+    python scripts/numerical_error.py --walks 6 --seed 3 --steps 10
+
+Walks are drawn as in scripts/contact_campaign.py, on compliant ground, and walked at the config's tolerances, a hundred
+times tighter, which gives the numerical error, and ten thousand times tighter, which gives the true error. Prints a
+table in Markdown: for each walk both errors of a step's period, of its length and of the end, and the work of the
+second walk over that of the first; below it how often the numerical error is within a factor of the true one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from contact_campaign import PLANE_MEASURE_M, TIGHTER, WALKERS, Drawn, ours_at
+
+from walkerlab.config.loader import load
+from walkerlab.scene.contact import contact_scene
+from walkerlab.stages.numerical_error import OF_EACH_STEP, change
+from walkerlab.stages.tune_results import walk_summary
+
+ERRORS = (*OF_EACH_STEP, "end_time_s")
+FACTORS = (1.5, 10.0)
+LEAST = 1e-11  # s or m: below it both are rounding, or the last digits of an event's time
+
+
+def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
+    """Summaries of the walk from the default to the tightest tolerance, and their right-hand sides."""
+    config = load(Path(drawn.base), drawn.sets).config
+    contact = config.contact
+    assert contact is not None, "drawn with one"
+    scene = contact_scene(config, PLANE_MEASURE_M if isinstance(contact.pad_pitch, str) else contact.pad_pitch)
+    walks = [ours_at(scene, config, drawn.start, steps, tighter) for tighter in TIGHTER]
+    return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]
+
+
+def told(error: dict[str, Any], key: str) -> str:
+    """An error in a table."""
+    return f"{error[key]:.1e}" if key in error else "-"
+
+
+def main() -> None:
+    """Walk them all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--walker", choices=tuple(WALKERS), default="both")
+    parser.add_argument("--walks", type=int, default=60)
+    parser.add_argument("--steps", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=0)
+    chosen = parser.parse_args()
+    ratios: dict[str, list[float]] = {key: [] for key in ERRORS}
+    numerical: list[float] = []
+    costs, unknown, missed = [], 0, 0
+    print("| seed | walk | ends | steps | " + " | ".join(f"{key}: numerical, true" for key in ERRORS) + " | cost |")
+    print("|---" * (5 + len(ERRORS)) + "|")
+    for seed in range(chosen.seed, chosen.seed + chosen.walks):
+        drawn = WALKERS[chosen.walker](seed)
+        (first, second, third), work = walked(drawn, chosen.steps)
+        reported, true = change(first, second), change(first, third)
+        unknown += "reason" in reported
+        missed += "reason" in true and "reason" not in reported
+        costs.append(work[1] / work[0])
+        for key in ERRORS:
+            if key in reported and key in true:
+                ratios[key].append((reported[key] + LEAST) / (true[key] + LEAST))
+        numerical += [reported["end_time_s"]] if "end_time_s" in reported else []
+        numbers = (f"{told(reported, key)}, {told(true, key)}" for key in ERRORS)
+        row = (seed, drawn.ground, first["outcome"], first["steps"], *numbers, f"{costs[-1]:.1f}")
+        print("| " + " | ".join(str(cell) for cell in row) + " |", flush=True)
+    print(f"\n{chosen.walks} walks; {unknown} end otherwise in the second walk, {missed} more in the third")
+    for key, found in ratios.items():
+        near = ", ".join(f"{sum(1 / f <= r <= f for r in found)} within a factor of {f:g}" for f in FACTORS)
+        print(f"{key}: of {len(found)} {near}; least ratio {min(found):.2g}, largest {max(found):.2g}")
+    for name, numbers_of in (("numerical error of the end (s)", numerical), ("cost of the second walk", costs)):
+        median, most, largest = np.quantile(numbers_of, (0.5, 0.9, 1.0))
+        print(f"{name}: {median:.2g} (median), {most:.2g} (90 %), {largest:.2g} (largest)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""The numerical error of a walk: how much its numbers change when it is walked again at tighter tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.solvers.registry import Tolerances
+
+LEAST_RTOL: Final = 1e-14  # that the schema allows
+TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
+USUAL: Final = TIGHTER[100.0]
+ROUNDING: Final = 1e-6  # of a tolerance that was divided
+OF_EACH_STEP: Final = {"step_period_s": "step_periods_s", "step_length_m": "step_lengths_m"}
+"""Largest change of a number of the steps: its key, and the key of that number in a walk's summary."""
+
+Summary = Mapping[str, Any]
+
+
+def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
+    """How much a walk's numbers change when it is walked again, at a hundred times tighter tolerances if there are any.
+
+    walked      summary of the walk: its `outcome`, `steps`, `step_periods_s`, `step_lengths_m` and `end_time_s`
+    tolerances  that it was walked with
+    walk        the same walk with others, as its summary
+
+    Returns the largest changes `step_period_s` (s) and `step_length_m` (m) if it took a step, and `end_time_s` (s);
+    `by` tells what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
+    """
+    tighter, by = tightened(tolerances)
+    return change(walked, walk(tighter), by)
+
+
+def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
+    """Tolerances that err less and what sets them apart, in words: at the tightest that there are, another method."""
+    for factor, by in TIGHTER.items():
+        rtol = tolerances.rtol / factor
+        if rtol >= (1.0 - ROUNDING) * LEAST_RTOL:
+            return replace(tolerances, rtol=rtol, atol=tolerances.atol / factor), by
+    other = "dop853" if tolerances.method == "radau5" else "radau5"
+    return replace(tolerances, method=other), f"another method, {other}"
+
+
+def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
+    """The largest changes from one summary of a walk to another one, as `numerical_error` returns them."""
+    if (walked["outcome"], walked["steps"]) != (again["outcome"], again["steps"]):
+        steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
+        return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
+    changes = {
+        name: float(np.max(np.abs(np.subtract(walked[key], again[key]))))
+        for name, key in OF_EACH_STEP.items()
+        if walked["steps"]
+    }
+    changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
+    return changes if by == USUAL else {**changes, "by": by}
