@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, impact
-from walkerlab.paper.arithmetic import percent_of, resting_foot, speed_difference
+from walkerlab.paper.arithmetic import percent_of, speed_difference
 from walkerlab.paper.errata import errata
 from walkerlab.paper.misprints import (
     MISPRINTED,
@@ -150,12 +150,6 @@ def test_percentages_of_table_2_are_exact_arithmetic():
 
 def test_speeds_that_differ_by_less_than_a_percent_take_a_cycle_that_is_not_the_sum_of_its_steps():
     assert speed_difference(1.39, 1.38) < 1.0 < speed_difference(0.60 + 0.79, 0.59 + 0.77)
-
-
-def test_a_resting_foot_carries_its_weight():
-    foot = resting_foot(weight=196.2, mass=20.0, stiffness=3e7, exponent=1.5, damping=500.0)
-    assert 3e7 * foot.depth**1.5 == pytest.approx(196.2)
-    assert foot.damping_ratio == pytest.approx(500.0 / (2 * np.sqrt(1.5 * 196.2 / foot.depth * 20.0)))
 
 
 @pytest.mark.parametrize(

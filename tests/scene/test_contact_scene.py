@@ -12,7 +12,7 @@ from walkerlab.config.loader import load
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.terrain import after_mid_swing, checkerboard
 from walkerlab.hybrid.contact_events import feet_motion, hip_height
-from walkerlab.scene.contact import contact_scene, damping_ratio, start_state, static_penetration
+from walkerlab.scene.contact import contact_scene, resting, start_state
 from walkerlab.scene.left_out import of_contact_walk
 
 STEP = 0.3714
@@ -63,11 +63,12 @@ def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foo
     """0.059 mm and over-damped, against the same two numbers worked out in N and mm."""
     scene = scene_of()
     depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
-    assert static_penetration(scene) == pytest.approx(depth_mm / 1000.0)
+    foot = resting(scene)
+    assert foot.depth == pytest.approx(depth_mm / 1000.0)
     assert depth_mm == pytest.approx(0.059, abs=5e-4)
     stiffness_N_per_m = 2.2 * 1e5 * depth_mm**1.2 * 1000.0
-    assert damping_ratio(scene) == pytest.approx(90e3 / (2 * math.sqrt(stiffness_N_per_m * 20.0)))
-    assert damping_ratio(scene) > 1.0
+    assert foot.damping_ratio == pytest.approx(90e3 / (2 * math.sqrt(stiffness_N_per_m * 20.0)))
+    assert foot.damping_ratio > 1.0
 
 
 def test_a_scene_without_friction_has_another_law_not_a_zero():

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
+from walkerlab.ground.resting import resting_foot
 from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1, StartRow
 
 MM: Final = 1000.0  # mm in a m
@@ -39,21 +39,6 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     """Difference of the two speeds (%) that follow from cycles of these times (s)."""
     matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
-
-
-@dataclass(frozen=True)
-class RestingFoot:
-    """A walker that stands on one foot."""
-
-    depth: float  # m
-    damping_ratio: float
-
-
-def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
-    """Depth, and damping ratio c / (2 sqrt(dF/dd m)) there, of a foot on ground with F = k d^e + c d' (SI units)."""
-    depth = (weight / stiffness) ** (1.0 / exponent)
-    slope = stiffness * exponent * depth ** (exponent - 1.0)
-    return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))
 
 
 def readings_of_fig_4b() -> str:

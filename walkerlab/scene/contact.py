@@ -20,6 +20,7 @@ from walkerlab.ground.compliant import (
 from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.pinned import Pinned, floating_state
+from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import Frame
@@ -217,26 +218,19 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
 
 
-def static_penetration(scene: ContactScene) -> float:
-    """Penetration (m) under the walker's whole weight on one foot."""
-    law, walker = scene.walker.normal, scene.walker
+def resting(scene: ContactScene) -> RestingFoot:
+    """How the walker stands on one foot."""
+    walker, law = scene.walker, scene.walker.normal
     weight = walker.tree.mass * math.hypot(walker.gravity_along, walker.gravity_down)
-    return float((weight / law.stiffness) ** (1.0 / law.exponent))
-
-
-def damping_ratio(scene: ContactScene) -> float:
-    """Damping ratio c / (2 sqrt(dF/dd m)) at the static penetration, damping fully developed, with the total mass."""
-    law = scene.walker.normal
-    depth = static_penetration(scene)
-    slope = law.stiffness * law.exponent * depth ** (law.exponent - 1.0)
-    return float(law.damping / (2.0 * math.sqrt(slope * scene.walker.tree.mass)))
+    return resting_foot(weight, walker.tree.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:
     """What the scene derives from the config, SI, for summaries."""
+    foot = resting(scene)
     return {
-        "static_penetration_m": static_penetration(scene),
-        "damping_ratio": damping_ratio(scene),
+        "static_penetration_m": foot.depth,
+        "damping_ratio": foot.damping_ratio,
         "pitch_m": scene.pitch_m,
         "friction": scene.walker.friction.in_words(),
     }

@@ -13,6 +13,7 @@ import numpy as np
 
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.resting import resting_foot
 from walkerlab.labels import Label
 from walkerlab.verification import references
 from walkerlab.verification.particle_scene import (
@@ -119,9 +120,10 @@ def restitution(law: NormalLaw, speed: float) -> float:
 
 def block_speed(slope: float, start_speed: float) -> float:
     """Speed (m/s) of a block on a slope a second after it had `start_speed`."""
-    depth = (BLOCK_MASS * GRAVITY * math.cos(slope) / PAPER_LAW.stiffness) ** (1.0 / PAPER_LAW.exponent)
-    block = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), PAPER_LAW, PAPER_FRICTION, GRAVITY, slope)
-    return float(run_until(block, state((0.0, -depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
+    law = PAPER_LAW
+    foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
+    block = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), law, PAPER_FRICTION, GRAVITY, slope)
+    return float(run_until(block, state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
 
 SPOKES, WHEEL_SLOPE, HUB_INERTIA = 8, 0.08, 1e-3

@@ -28,6 +28,7 @@ from walkerlab.benchmarks.engines.runs import (
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.held import held_flags, no_stops
+from walkerlab.ground.resting import resting_foot
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.assembly import Anchor, tree_about
@@ -234,12 +235,10 @@ def target_of(scene: EngineScene) -> EngineContact | None:
     if friction.largest == 0.0:
         return None
     mass, g = walker.tree.mass, walker.gravity_down
-    depth = (mass * g / law.stiffness) ** (1.0 / law.exponent)
-    stiffness = law.exponent * mass * g / depth
+    foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
     creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
-    ratio = law.damping / (2.0 * math.sqrt(stiffness * mass))
-    return EngineContact(mass, g, depth, law.exponent, ratio, sliding, CREEP_LOAD, creep)
+    return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
 
 
 def tuned(

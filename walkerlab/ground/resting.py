@@ -1,0 +1,25 @@
+"""How a walker stands on one foot on compliant ground."""
+
+import math
+from typing import NamedTuple
+
+
+class RestingFoot(NamedTuple):
+    """A foot that carries a walker's whole weight."""
+
+    depth: float  # m, the static penetration
+    damping_ratio: float  # c / (2 sqrt(dF/dd m)) there, with damping fully developed and the total mass m
+
+
+def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
+    """A foot at rest on ground with the normal force F = k d^e + c d'.
+
+    weight     normal to the ground, N
+    mass       kg
+    stiffness  k, N/m^e
+    exponent   e
+    damping    c, N s/m
+    """
+    depth = (weight / stiffness) ** (1.0 / exponent)
+    slope = stiffness * exponent * depth ** (exponent - 1.0)
+    return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))
