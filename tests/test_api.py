@@ -1,5 +1,6 @@
 """The package from Python."""
 
+import ast
 import doctest
 import subprocess
 import sys
@@ -27,6 +28,12 @@ def test_everything_that_is_offered_is_there_and_described():
     assert set(walkerlab.__all__) <= set(dir(walkerlab))
     with pytest.raises(AttributeError, match="no attribute 'sprint'"):
         _ = walkerlab.sprint
+
+
+def test_type_checkers_are_told_of_the_same_names():
+    stub = ast.parse((Path(walkerlab.__file__).parent / "__init__.pyi").read_text())
+    imported = [one.name for node in stub.body if isinstance(node, ast.ImportFrom) for one in node.names]
+    assert sorted(imported) == sorted(walkerlab.__all__)
 
 
 def test_importing_the_package_loads_nothing():
@@ -158,3 +165,44 @@ def test_where_a_guard_is_needed_this_is_said_at_once(tmp_path, from_standard_in
     done = run_unguarded(tmp_path, "dask", from_standard_input)
     assert done.returncode == 1
     assert "ConfigError: --engine dask: its processes did not start" in done.stderr
+
+
+def test_what_is_printed_of_a_result_and_of_a_run_fits_on_a_screen(tmp_path):
+    stored = walkerlab.run("simulate", runs=tmp_path, strides=1)
+    run = walkerlab.open_run(stored.artifact.parent)
+    for shown in (walkerlab.find_gait(), stored, run, run.result("fixedpoint"), run.config, walkerlab.contact()):
+        assert len(repr(shown)) < 24 * 80
+    assert "last_step_period_s" in repr(stored)
+    assert repr(run).endswith(": fixedpoint, simulate")
+
+
+def test_multipliers_are_complex_numbers():
+    gait = walkerlab.find_gait()
+    assert isinstance(gait, walkerlab.Gait)
+    assert [[one.real, one.imag] for one in gait.multipliers] == gait.summary["multipliers"]
+    assert walkerlab.find_gait(slope_deg=-1).multipliers == ()
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: walkerlab.run("fixedpoint", runs=5), r"^runs: 5 is not a folder"),
+        (lambda: walkerlab.open_run("paper", 5), r"^runs: 5 is not a folder"),
+        (
+            lambda: walkerlab.sweep("fixedpoint", {"slope_deg": "[10]"}),
+            r"^over slope_deg: '\[10\]' is not a list of values",
+        ),
+        (lambda: walkerlab.sweep("fixedpoint", {"slope_deg": 10}), r"^over slope_deg: 10 is not a list of values"),
+        (lambda: walkerlab.compass(hip_mass=20), r"^walker\.hip_mass: unknown key \(20\)"),
+        (
+            lambda: walkerlab.find_gait(slope_deg=1, slope_rad=1),
+            r"^slope_\w+: the slope is given already, as slope_\w+;",
+        ),
+    ],
+)
+def test_what_is_wrong_with_an_argument_is_told_in_words_and_without_a_place_in_a_text(
+    call, said, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=said):
+        call()

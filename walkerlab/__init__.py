@@ -1,6 +1,7 @@
 """Passive-dynamic walking as a reproducible experiment; see README.md, and docs/python.md for use from Python.
 
-What is listed in `__all__` is loaded when it is first asked for: importing the package takes no time.
+What is listed in `__all__` is loaded when it is first asked for: importing the package takes no time. For type
+checkers `__init__.pyi` lists the same.
 """
 
 from typing import Any
@@ -8,6 +9,11 @@ from typing import Any
 __version__ = "0.2.0"
 
 __all__ = [
+    "Config",
+    "ConfigError",
+    "Gait",
+    "Result",
+    "Run",
     "basin",
     "compass",
     "contact",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
-from typing import Any
+from typing import Any, cast
 
+from walkerlab.cli.text import in_words
 from walkerlab.config.fields import Block
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
@@ -16,8 +18,8 @@ from walkerlab.config.overlay import tree_of
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.schema import Config, Contact
 from walkerlab.config.sweep import Sweep as SweepBlock
+from walkerlab.config.tree import NOWHERE
 from walkerlab.config.tree import Mapping as Tree
-from walkerlab.config.tree import Position
 from walkerlab.config.validation import typed
 from walkerlab.config.walkers import WALKERS
 from walkerlab.errors import ConfigError, StaleError
@@ -25,7 +27,7 @@ from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.resolve import resolve
 from walkerlab.stages.runner import Options, execute
-from walkerlab.stages.runs import config_of, result_in, run_named
+from walkerlab.stages.runs import config_of, headline_values, result_in, run_named
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, Stored
 from walkerlab.store.content import Content, Group
@@ -39,9 +41,9 @@ MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
 """Arguments that are blocks of a config: what they may be, and what makes them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
-    """What a stage found.
+    """What a stage found; printed, its headline numbers.
 
     stage      its name
     summary    the keys that `--json` prints, SI units
@@ -55,6 +57,14 @@ class Result:
     content: Content
     no_answer: str | None = None
     artifact: Path | None = None
+
+    def __repr__(self) -> str:
+        """The headline numbers, and where the rest is."""
+        found = headline_values(self.stage, self.summary)
+        said = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
+        said += [f"  {name:<{max(map(len, found))}}  {in_words(value)}" for name, value in found.items()]
+        said += [f"groups: {', '.join(self.groups)}"] if self.groups else []
+        return "\n".join([f"{type(self).__name__} of {self.stage}", *said])
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -71,11 +81,35 @@ class Result:
         return dataset(self.content[group])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class Gait(Result):
+    """What `fixedpoint` found."""
+
+    @property
+    def multipliers(self) -> tuple[complex, ...]:
+        """Of the chosen gait, the largest first; none if there is no gait.
+
+        >>> gait = find_gait()
+        >>> max(abs(one) for one in gait.multipliers) == gait.summary["spectral_radius"]
+        True
+        """
+        return tuple(complex(*pair) for pair in self.summary.get("multipliers", ()))
+
+
+RESULTS: dict[str, type[Result]] = {"fixedpoint": Gait}
+"""The stages whose results have more than a `Result`."""
+
+
+@dataclass(frozen=True, repr=False)
 class Run:
     """A folder of stored results."""
 
     folder: RunFolder
+
+    def __repr__(self) -> str:
+        """The folder, and what is in it."""
+        there = [*self.stages, *self.sweeps]
+        return f"Run in {self.folder.path}: {', '.join(there) or 'no results'}"
 
     @property
     def config(self) -> Config:
@@ -120,6 +154,7 @@ def run(
     set: Mapping[str, Any] | None = None,
     runs: str | Path = RUNS,
     *,
+    name: str | None = None,
     strides: int | None = None,
     force: bool = False,
     jobs: int = 1,
@@ -129,6 +164,7 @@ def run(
     config   a file, the name of a built-in config, or a run: its name or its folder
     set      keys of the config with other values, as {"slope_deg": 3}
     runs     the folder of all runs
+    name     of the run's folder; None names it after the config and its changes
     strides  to walk, for stages that walk
 
     Raises ConfigError for a config that is not usable. A question without an answer is told in `Result.no_answer`.
@@ -142,11 +178,11 @@ def run(
     from walkerlab.cli.stage import as_json
 
     refuse_unknown_stage(stage)
-    asked = resolve(str(config), settings(set), strides, Path(runs))
+    asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
     report = execute(asked.template.base.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
-    return Result(stage, as_json(report), content, said, report.artifact)
+    return result_of(stage, as_json(report), content, said, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
@@ -158,7 +194,7 @@ def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
     >>> open_run("paper", folder).result("fixedpoint").summary["stable"]
     True
     """
-    return Run(run_named(str(name), Path(runs)))
+    return Run(run_named(str(name), folder_of(runs)))
 
 
 def sweep(
@@ -168,6 +204,7 @@ def sweep(
     set: Mapping[str, Any] | None = None,
     runs: str | Path = RUNS,
     *,
+    name: str | None = None,
     zip: bool = False,
     sample: str = "",
     seed: int | None = None,
@@ -177,6 +214,7 @@ def sweep(
     """Do what `walkerlab sweep` does, and give its file as one xarray Dataset.
 
     over    for each key of a config its values, or "FROM:TO:N"
+    name    of the run's folder; None names it after the config and its changes
     seed    of a drawing; None is the config's
     jobs    chunks computed at once; 0 leaves it to the engine
 
@@ -191,10 +229,10 @@ def sweep(
     from walkerlab.sweeps.question import asked
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-    found = resolve(str(config), settings(set), runs=Path(runs))
+    found = resolve(str(config), settings(set), runs=folder_of(runs), name=name)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
-    listed = [(key, value if isinstance(value, str) else list(value), f"over {key}") for key, value in over.items()]
+    listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
     block = found.template.base.config.sweep or SweepBlock()
     question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
     chosen, address = engine_named(engine)
@@ -242,7 +280,7 @@ def contact(**keys: Any) -> Contact:
     return made
 
 
-def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Result:
+def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
     """The periodic gaits of a walker on a slope, in memory: the chosen one in `summary`, all of them in `dataset`.
 
     What is left out here and below is as the built-in paper config has it.
@@ -257,7 +295,7 @@ def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -
     >>> gait.summary["stable"], round(gait.summary["period_s"], 4)
     (True, 0.7343)
     """
-    return in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys))
+    return cast(Gait, in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys)))
 
 
 def simulate(
@@ -339,7 +377,7 @@ def in_memory(stage: str, config: Config) -> Result:
     refuse_unknown_stage(stage)
     answer = InMemory().answer(config, stage, Keys().of(config, stage))
     said = None if answer.no_answer is None else answer.no_answer.message
-    return Result(stage, answer.content.summary, answer.content, said)
+    return result_of(stage, answer.content.summary, answer.content, said)
 
 
 def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
@@ -358,7 +396,7 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
             raise ConfigError(f"{name}: {named[name]!r} is not a {name} block.", makers)
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
-    upper = tree_of(lines, Position("walkerlab", 1, 1))
+    upper = tree_of(lines, NOWHERE)
     assert isinstance(upper, Tree)
     tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
     return on_the_slope(typed(tree), tree)[0]
@@ -380,7 +418,7 @@ def two_numbers(name: str, values: Any) -> Sequence[Any]:
 
 def typed_lines(lines: Mapping[str, Any]) -> tuple[Config, Tree]:
     """Keys of a config, nested, as plain values, as a config; ConfigError for what is wrong with them."""
-    tree = tree_of(dict(lines), Position("walkerlab", 1, 1))
+    tree = tree_of(dict(lines), NOWHERE)
     assert isinstance(tree, Tree)
     return typed(tree), tree
 
@@ -390,6 +428,25 @@ def settings(values: Mapping[str, Any] | None) -> list[str]:
     if not isinstance(values, Mapping | NoneType):
         raise ConfigError(f"set: {values!r} is not a mapping of keys to values.", 'For example set={"slope_deg": 3}.')
     return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
+
+
+def folder_of(runs: Any) -> Path:
+    """The folder of all runs; ConfigError for what is no path."""
+    if not isinstance(runs, str | os.PathLike):
+        raise ConfigError(f"runs: {runs!r} is not a folder.", 'For example runs="runs".')
+    return Path(runs)
+
+
+def values_of(key: str, given: Any) -> str | list[Any]:
+    """The values of a parameter of a sweep, or the text of a range; ConfigError for what is neither."""
+    if isinstance(given, str) and not given.lstrip().startswith("["):
+        return given
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise ConfigError(
+            f"over {key}: {given!r} is not a list of values, nor a range FROM:TO:N.",
+            f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
+        )
+    return list(given)
 
 
 def refuse_unknown_stage(stage: str) -> None:
@@ -402,4 +459,11 @@ def refuse_unknown_stage(stage: str) -> None:
 def as_result(stage: str, found: Stored, path: Path) -> Result:
     """A stored artifact as a result."""
     said = found.summary.get("no_answer")
-    return Result(stage, found.summary, found, None if said is None else str(said["message"]), path)
+    return result_of(stage, found.summary, found, None if said is None else str(said["message"]), path)
+
+
+def result_of(
+    stage: str, summary: Mapping[str, Any], content: Content, no_answer: str | None, path: Path | None = None
+) -> Result:
+    """A result, of the type that the stage has."""
+    return RESULTS.get(stage, Result)(stage, summary, content, no_answer, path)

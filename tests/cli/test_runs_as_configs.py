@@ -75,9 +75,9 @@ def test_results_of_another_file_are_not_overwritten(toy, command):
     assert done.returncode == 3, done.stderr
     assert "runs/stone has results of another config, made from ../here/stone.yaml" in done.stderr
     assert "gravity_m_s2 2.0 -> 8.0" in done.stderr
-    assert "--set name=NAME" in done.stderr
+    assert "--name NAME" in done.stderr
     assert {path: path.read_bytes() for path in (toy.folder / "runs").rglob("*") if path.is_file()} == before
-    assert toy(*command, "-c", "there/stone.yaml", "--set", "name=other").returncode == 0
+    assert toy(*command, "-c", "there/stone.yaml", "--name", "other").returncode == 0
 
 
 def test_a_file_does_not_overwrite_the_run_of_the_built_in_config_of_its_name(toy):
@@ -225,3 +225,37 @@ def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
     page = (toy.folder / "runs/paper/report.html").read_text()
     assert "<p>census: its result is damaged: it does not end" in page
     assert "`walkerlab survey --full` makes it anew</p>" in page
+
+
+def test_a_run_has_the_name_that_it_is_given_and_goes_by_it_wherever_a_run_is_meant(toy):
+    heavy = ("--set", "gravity_m_s2=2")
+    assert run_dir(toy("drop", *heavy, "--name", "moon", "--json")) == "runs/moon"
+    assert run_dir(toy("roll", "-c", "moon", "--json")) == "runs/moon"
+    shown = json.loads(toy("show", "moon", "drop", "--json").stdout)
+    assert shown["artifact"] == "runs/moon/drop.h5"
+    assert 2.0 / shown["summary"]["period_s"] ** 2 == pytest.approx(2.0)
+    assert json.loads(toy("status", *heavy, "--name", "moon", "--json").stdout)["run_dir"] == "runs/moon"
+    swept = toy("sweep", "--stage", "drop", "--over", "strides=[1]", "--jobs", "1", "--name", "moons", "--json")
+    assert run_dir(swept) == "runs/moons"
+
+
+def test_a_name_does_not_overwrite_results_of_another_change(toy):
+    toy("drop", "--set", "gravity_m_s2=2", "--name", "moon")
+    done = toy("drop", "--set", "gravity_m_s2=3", "--name", "moon")
+    assert done.returncode == 3
+    assert "runs/moon has results of another config, made from built-in paper.yaml with gravity_m_s2=2" in done.stderr
+    assert toy("drop", "--set", "gravity_m_s2=2", "--name", "moon").returncode == 0
+
+
+@pytest.mark.parametrize("name", ["../out", "a/b", "", "a b"])
+def test_a_name_that_is_no_name_of_a_folder_is_refused(toy, name):
+    done = toy("drop", "--name", name)
+    assert done.returncode == 3
+    assert "--set" not in done.stderr.splitlines()[0], "it is not what was typed"
+
+
+def test_a_run_is_shown_under_one_name_only(toy):
+    toy("drop")
+    assert toy("show", "paper", "drop", "-c", "paper").returncode == 2
+    assert toy("show", "paper", "paper", "drop").returncode == 2
+    assert toy("show", "nowhere", "drop").returncode == 3

@@ -1,5 +1,6 @@
 """The commands around the pipeline: status, show, schema, clean."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -31,15 +32,27 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, *OF_A_RUN, *OF_TALK)
     def show(
         request: Request,
-        stage: Annotated[str, typer.Argument(metavar="STAGE", help=f"One of {', '.join(names)}.")],
+        words: Annotated[
+            list[str],
+            typer.Argument(
+                metavar="[RUN] STAGE",
+                help=f"Name or folder of a run, then one of {', '.join(names)}.",
+                show_default=False,
+            ),
+        ],
     ) -> None:
         """Print what is stored of a stage: summary, arrays, and where it comes from."""
+        *runs, stage = words
         if stage not in names:
-            raise typer.BadParameter(f"{stage!r} is no stage; there are {', '.join(names)}.", param_hint="STAGE")
+            raise typer.BadParameter(f"there is no stage {stage!r}; there are {', '.join(names)}", param_hint="STAGE")
+        if len(runs) > 1 or (runs and request.config is not None):
+            raise typer.BadParameter("one run at a time", param_hint="RUN")
         with exit_on_failure(stage, request):
             from walkerlab.cli.show import print_stored
+            from walkerlab.stages.runs import run_named
 
-            print_stored(request, graph, stage)
+            of_run = replace(request, config=run_named(runs[0], request.runs).given) if runs else request
+            print_stored(of_run, graph, stage)
 
     @command(app, "as_json")
     def schema(

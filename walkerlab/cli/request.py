@@ -77,6 +77,10 @@ class Request:
     strides: Annotated[
         int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
     ] = None
+    name: Annotated[
+        str | None,
+        typer.Option("--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."),
+    ] = None
     runs: Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all runs.")] = RUNS
     jobs: Annotated[
         int | None,
@@ -109,6 +113,7 @@ class Request:
         for setting in self.sets or ():
             words += ["--set", setting]
         words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
+        words += [] if self.name is None else ["--name", self.name]
         words += [] if self.runs == RUNS else ["--runs", str(self.runs)]
         return "".join(f" {shlex.quote(word)}" for word in words)
 
@@ -124,7 +129,7 @@ class Request:
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
         from walkerlab.stages.resolve import resolve
 
-        found = resolve(self.config, self.sets or (), self.strides, self.runs)
+        found = resolve(self.config, self.sets or (), self.strides, self.runs, self.name)
         loaded = found.template.base
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
@@ -157,7 +162,7 @@ class Request:
 
 
 SHARED = inspect.signature(Request).parameters
-OF_A_RUN = ("config", "sets", "strides", "runs")
+OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """The options that say which run is meant."""
 OF_TALK = ("as_json", "quiet", "verbose")
 """The options that say how much is printed, and how."""

@@ -58,7 +58,8 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
     slopes = [(name, place) for name, place in given.items() if name in SLOPE_KEYS]
     if len(slopes) == len(SLOPE_KEYS):
         (first, there), (second, here) = slopes
-        raise refusal([Problem(here, f"{second}: the slope is given already, as {first} at {there}", "one of both")])
+        where = f" at {there}" if there else ""
+        raise refusal([Problem(here, f"{second}: the slope is given already, as {first}{where}", "one of both")])
 
 
 def parse_settings(texts: Sequence[str]) -> list[ConfigSetting]:
@@ -83,10 +84,10 @@ def _setting(text: str) -> ConfigSetting:
     return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
 
 
-def strides_setting(strides: int) -> ConfigSetting:
-    """The `--strides` option."""
-    position = Position(f"--strides {strides}", 1, 1)
-    return ConfigSetting(("strides",), Scalar(position, strides, str(strides)), position)
+def option_setting(key: str, value: int | str) -> ConfigSetting:
+    """An option that is a key of its own, as `--strides`."""
+    position = Position(f"--{key} {shown(str(value))}", 1, 1)
+    return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
 def with_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import ConfigSetting, parse_settings, stacked, strides_setting, with_settings
+from walkerlab.config.layers import ConfigSetting, option_setting, parse_settings, stacked, with_settings
 from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
@@ -82,17 +82,24 @@ def load(
 
 
 def template(
-    path: Path | None = None, sets: Sequence[str] = (), strides: int | None = None, run: EarlierRun | None = None
+    path: Path | None = None,
+    sets: Sequence[str] = (),
+    strides: int | None = None,
+    run: EarlierRun | None = None,
+    name: str | None = None,
 ) -> Template:
-    """The same config as `load` gives, ready to be varied; raises ConfigError as that."""
+    """The same config as `load` gives, ready to be varied; raises ConfigError as that.
+
+    name  `--name`, over the config's own; None leaves that
+    """
     if run is not None:
         file = ConfigFile(Path(run.name), run.label, run.text)
     else:
         file = builtin(DEFAULT) if path is None else find(path)
     tree = _named(stacked(read_layers(file)), file)
     settings = parse_settings(sets)
-    if strides is not None:
-        settings.append(strides_setting(strides))
+    options = {"strides": strides, "name": name}
+    settings += [option_setting(key, value) for key, value in options.items() if value is not None]
     changed_tree = with_cases(with_settings(tree, settings), Path())
     changed = typed(changed_tree)
     base = typed(tree) if settings else changed
@@ -100,9 +107,9 @@ def template(
     config, warnings = on_the_slope(changed, changed_tree)
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
-    name = run_name(base, changed, degrees, None if run is None else run.name)
+    folder = name or run_name(base, changed, degrees, None if run is None else run.name)
     warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
-    return Template(LoadedConfig(config, name, warnings, file.label), changed_tree)
+    return Template(LoadedConfig(config, folder, warnings, file.label), changed_tree)
 
 
 def safe_name(text: str) -> str:

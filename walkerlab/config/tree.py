@@ -8,16 +8,24 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A place in a config text: its file or option, line and column, counted from 1."""
+    """A place in a config text: its file or option, line and column, counted from 1; line 0 for the whole source."""
 
     source: str
     line: int
     column: int
 
+    def __bool__(self) -> bool:
+        """Whether it says anything: an argument of a function has no place in a text."""
+        return bool(self.source)
+
     def __str__(self) -> str:
         """As editors and terminals understand it: source:line:column; an option is itself where it begins."""
-        whole_option = self.source.startswith("--") and (self.line, self.column) == (1, 1)
-        return self.source if whole_option else f"{self.source}:{self.line}:{self.column}"
+        whole = not self.line or (self.source.startswith("--") and (self.line, self.column) == (1, 1))
+        return self.source if whole else f"{self.source}:{self.line}:{self.column}"
+
+
+NOWHERE = Position("", 0, 0)
+"""The place of what is in no text: an argument of a function."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,7 +137,7 @@ def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
         return Problem(position, "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
     beside = nearest(name, siblings) if "." not in name else ""
-    meant = ".".join((*path[:-1], beside)) if beside else _elsewhere(name)
+    meant = ".".join((*path[:-1], beside)) if beside else _elsewhere(name, exactly=len(path) > 1)
     value = f" ({shown_value(node)})" if node else ""
     text = f"{shown('.'.join(path))}: unknown key{value}"
     return Problem(position, text, ", ".join(siblings), meant)
@@ -175,14 +175,14 @@ def builtin_of_type(block: str, kind: str) -> str:
     raise AssertionError("each type has a built-in config")
 
 
-def _elsewhere(name: str) -> str:
-    """A key of another block that is like `name`, with its path."""
+def _elsewhere(name: str, exactly: bool) -> str:
+    """A key of another block that is like `name`, with its path; of the very same name, if `exactly`."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
-    found = nearest(name, paths)
-    return paths[found] if found else ""
+    found = name if exactly else nearest(name, paths)
+    return paths.get(found, "")
 
 
 def _field_at(model: type[Block], location: tuple[int | str, ...], tree: Mapping) -> tuple[list[str], FieldInfo]:

@@ -26,24 +26,34 @@ class Asked:
     folder: RunFolder
 
 
-def resolve(text: str | None, sets: Sequence[str] = (), strides: int | None = None, runs: Path = Path("runs")) -> Asked:
+def resolve(
+    text: str | None,
+    sets: Sequence[str] = (),
+    strides: int | None = None,
+    runs: Path = Path("runs"),
+    name: str | None = None,
+) -> Asked:
     """What `--config` names: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
 
     text     looked for in that order; None is the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, over everything else
     runs     the folder of all runs; a run that is given by a path stays in its own
+    name     of the run's folder, whatever the settings; None names it after them
 
     Raises ConfigError if nothing has that name, and for a config that is not usable.
     """
     run = None if text is None or is_config(text) else artifact_at(Path(text)) or run_at(text, runs)
     if run is not None:
         folder, earlier = run
-        read = template(None, sets, strides, earlier)
-        return Asked(read, RunFolder(folder.runs_dir, read.base.run_name, folder.source))
-    path = None if text is None else Path(text)
-    read = template(path, sets, strides)
-    return Asked(read, RunFolder(runs, read.base.run_name, source_of(path, runs)))
+        read, runs, source = template(None, sets, strides, earlier, name), folder.runs_dir, folder.source
+    else:
+        path = None if text is None else Path(text)
+        read, source = template(path, sets, strides, name=name), source_of(path, runs)
+    changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
+    if name is not None and changes:
+        source += f" with {', '.join(changes)}"
+    return Asked(read, RunFolder(runs, read.base.run_name, source))
 
 
 def is_config(text: str) -> bool:

@@ -190,7 +190,7 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
         raise ConfigError(
             f"{folder.path} has results of another config{origin}; they are not overwritten "
             f"({', '.join(changes[:SHOWN_CHANGES])}{more}).",
-            "`--set name=NAME` gives this one a folder of its own; "
+            "`--name NAME` gives this one a folder of its own; "
             f"`walkerlab clean -c {folder.typed}` removes what is there.",
         )
 

@@ -58,10 +58,15 @@ class RunFolder:
         return self.runs_dir / self.name
 
     @property
-    def typed(self) -> str:
-        """The folder as it is typed, so that it is not taken for a name."""
+    def given(self) -> str:
+        """The folder as a path that is not taken for a name."""
         text = str(self.path)
-        return shlex.quote(text if os.sep in text else f".{os.sep}{text}")
+        return text if os.sep in text else f".{os.sep}{text}"
+
+    @property
+    def typed(self) -> str:
+        """The same as it is typed in a shell."""
+        return shlex.quote(self.given)
 
     @property
     def figures(self) -> Path:

@@ -44,7 +44,7 @@ class Axis:
     def setting(self, index: int) -> ConfigSetting:
         """The `--set` of one value."""
         value = self.values[index]
-        place = Position(f"{self.source}, {value}", 1, 1)
+        place = Position(f"{self.source}, {value}", 0, 0)
         return ConfigSetting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
 
 
@@ -135,7 +135,7 @@ def asked(
         return Question(stage, sampled(axes, sample, seed), "list")
     for one in axes:
         if not one.values:
-            raise refusal([Problem(Position(one.source, 1, 1), f"{one.key}: how many values?", FORMS)])
+            raise refusal([Problem(Position(one.source, 0, 0), f"{one.key}: how many values?", FORMS)])
     if zipped and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
@@ -151,7 +151,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     source = f"--over {text}"
     key = key.strip()
     if not equals or not all(key.split(".")):
-        raise refusal([Problem(Position(source, 1, 1), "is not of the form KEY=VALUES", FORMS)])
+        raise refusal([Problem(Position(source, 0, 0), "is not of the form KEY=VALUES", FORMS)])
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
         assert isinstance(node, Listed)
@@ -165,7 +165,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
     if isinstance(values, list | tuple):
         bad = next((value for value in values if not isinstance(value, Value)), None)
         if bad is not None or not values:
-            raise refusal([Problem(Position(source, 1, 1), f"{key}: {bad if values else 'an empty list'}", FORMS)])
+            raise refusal([Problem(Position(source, 0, 0), f"{key}: {bad if values else 'an empty list'}", FORMS)])
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
     try:
@@ -175,10 +175,10 @@ def axis(key: str, values: Any, source: str) -> Axis:
         count = -1
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise refusal([Problem(Position(source, 1, 1), f"{key}: {values} is no range of values", FORMS)])
+        raise refusal([Problem(Position(source, 0, 0), f"{key}: {values} is no range of values", FORMS)])
     if logarithmic and min(low, high) <= 0.0:
         raise refusal(
-            [Problem(Position(source, 1, 1), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
+            [Problem(Position(source, 0, 0), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
         )
     return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
 
@@ -205,11 +205,11 @@ def refuse_unknown(key: str, source: str) -> None:
     if key == "slope_deg" or key in known or any(key.startswith(f"{one}.") for one in known):
         return
     if any(one.startswith(f"{key}.") for one in known):
-        raise refusal([Problem(Position(source, 1, 1), f"{key}: is a block of keys, not a value")])
+        raise refusal([Problem(Position(source, 0, 0), f"{key}: is a block of keys, not a value")])
     # A walker of another type has keys of its own, which its schema checks point by point.
     if key.startswith("walker."):
         return
-    raise refusal([Problem(Position(source, 1, 1), f"{key}: unknown key", "", nearest(key, [*known, "slope_deg"]))])
+    raise refusal([Problem(Position(source, 0, 0), f"{key}: unknown key", "", nearest(key, [*known, "slope_deg"]))])
 
 
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:

@@ -1,0 +1,43 @@
+"""What the package offers, for type checkers."""
+
+from walkerlab.api import (
+    Gait,
+    Result,
+    Run,
+    basin,
+    compass,
+    contact,
+    continue_gait,
+    dataset,
+    find_gait,
+    kneed,
+    open_run,
+    run,
+    simulate,
+    sweep,
+    walker,
+)
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+
+__version__: str
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "Gait",
+    "Result",
+    "Run",
+    "basin",
+    "compass",
+    "contact",
+    "continue_gait",
+    "dataset",
+    "find_gait",
+    "kneed",
+    "open_run",
+    "run",
+    "simulate",
+    "sweep",
+    "walker",
+]
