@@ -27,8 +27,7 @@ from synthetic_results import (
 
 from walkerlab.config.loader import load
 from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
-from walkerlab.report.lead import lead
-from walkerlab.report.registry import SECTIONS, sections_of
+from walkerlab.report.registry import SECTIONS, lead, sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
 from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
@@ -92,7 +91,7 @@ def test_without_contact_nothing_is_said_of_contact():
     assert not {"contact", "paper-numbers", "errata"} & found.keys()
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
     assert "contact" not in spoken
-    assert "contact" not in " ".join(lead(Results(config("contact=null")), "rigid-only")).lower()
+    assert "contact" not in lead(config("contact=null"), "rigid-only").lower()
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():
@@ -409,7 +408,7 @@ def test_the_report_loads_no_plotting_and_no_compiler():
 
 
 def test_the_paragraph_under_the_title_names_config_change_slope_and_equations():
-    said = plain(" ".join(lead(Results(config("slope_deg=3", "equations=as-printed")), "paper@slope_deg=3")))
+    said = plain(lead(config("slope_deg=3", "equations=as-printed"), "paper@slope_deg=3"))
     for part in ("Config paper", "changed by slope_deg=3", "0.05236 rad (3°)", "as the paper prints them", "2 strides"):
         assert part in said
 
@@ -417,11 +416,11 @@ def test_the_paragraph_under_the_title_names_config_change_slope_and_equations()
 def test_the_paragraph_under_the_title_lists_what_a_walker_has():
     torso = {"mass_kg": 0.5, "above_hip_m": 0.2}
     kneed, compass = (load(Path(name)).config for name in ("kneed", "torso"))
-    said = plain(" ".join(lead(Results(load(Path("kneed"), [f"walker.torso={torso}"]).config), "kneed")))
+    said = plain(lead(load(Path("kneed"), [f"walker.torso={torso}"]).config, "kneed"))
     assert "a walker with kneed legs of 1 m, point feet and a torso of 0.5 kg, 2.1 kg in all, on a slope of" in said
-    said = plain(" ".join(lead(Results(compass), "torso")))
+    said = plain(lead(compass, "torso"))
     assert "legs of 1 m and 5 kg each, a hip of 5 kg and a torso of 5 kg, on a slope of 0.0174 rad (0.997°). It" in said
-    assert "torso" not in " ".join(lead(Results(kneed), "kneed"))
+    assert "torso" not in lead(kneed, "kneed")
 
 
 def test_gaits_have_no_heading_where_there_is_one_set_of_equations():

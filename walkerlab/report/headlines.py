@@ -33,10 +33,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 """By stage; a name that ends in a point stands for all numbers below it."""
 MOST: Final = 10
-LAST_OF: Final[Mapping[str, str]] = {
-    "last_step_period_s": "step_periods_s",
-    "last_step_length_m": "step_lengths_m",
-}
+LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "last_step_length_m": "step_lengths_m"}
 """Headlines that are the last of a list, with the name of the list."""
 
 

@@ -1,4 +1,4 @@
-"""A page: sections set in the template, style and script included, so that the file needs nothing but itself."""
+"""Pages: sections set in the template, style and script included, so that the file needs nothing but itself."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ def render(page: Page) -> str:
 
     Raises ValueError if two sections have one anchor.
     """
-    refuse_twins(page.sections)
+    anchors = [section.anchor for section in page.sections]
+    if len(set(anchors)) != len(anchors):
+        raise ValueError(f"two sections of the report have one anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     return (
         environment()
@@ -62,11 +64,29 @@ def render(page: Page) -> str:
     )
 
 
-def refuse_twins(sections: Sequence[Section]) -> None:
-    """Raise ValueError if two sections have one anchor."""
-    anchors = [section.anchor for section in sections]
-    if len(set(anchors)) != len(anchors):
-        raise ValueError(f"two sections of the report have one anchor: {anchors}")
+@dataclass(frozen=True)
+class SweepPage:
+    """The page of a sweep; all texts are plain but the figure, which is an SVG of this program.
+
+    parameters  for each its name, key, unit, meaning and values
+    rows        of the table, with `head`; `left_out` more are in the file
+    """
+
+    title: str
+    finding: str
+    figure: str | None
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left_out: int
+    file: str
+    parameters: Sequence[tuple[str, str, str, str, str]]
+
+
+def render_sweep(page: SweepPage) -> str:
+    """The HTML of a sweep's page."""
+    figure = None if page.figure is None else Markup(page.figure[page.figure.index("<svg") :])
+    return environment().get_template("sweep.html.j2").render(page=page, figure=figure)
 
 
 def environment() -> Environment:

@@ -39,9 +39,13 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
 
 
 def picture(figure: Figure, svg: Path, file: Path, numbered: bool) -> Picture:
-    """A figure, drawn into the page unless its drawing is too large."""
+    """A figure, drawn into the page unless its drawing is too large.
+
+    numbered  whether the reader has the paper before them
+    """
     width, height = pixels(svg)
-    title = title_of(figure, numbered)
+    number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
+    title = f"{number}{figure['title']}."
     alt = f"{title} {figure.get('alt', '')}".strip()
     vector = file == svg
     return Picture(
@@ -62,12 +66,6 @@ def links(figure: Figure) -> tuple[tuple[str, str], ...]:
     """The files of the drawing, and of the results that it was drawn from."""
     kinds = [(kind.upper(), str(figure[kind])) for kind in ("svg", "png") if kind in figure]
     return (*kinds, *((f"{stage}.h5", f"{stage}.h5") for stage in figure.get("results", ())))
-
-
-def title_of(figure: Figure, numbered: bool) -> str:
-    """A figure's title, with its number if it is one of the paper's and the reader has the paper before them."""
-    number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
-    return f"{number}{figure['title']}."
 
 
 MAX_BYTES = 1_400_000

@@ -6,10 +6,12 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import is_plain_compass
 from walkerlab.report.blocks import MAIN, Section
-from walkerlab.report.lead import lead, title
 from walkerlab.report.page import Page
 from walkerlab.report.results import Results
 from walkerlab.report.sections import (
@@ -27,6 +29,7 @@ from walkerlab.report.sections import (
     verdict,
     walks,
 )
+from walkerlab.report.words import words
 
 SectionMaker = Callable[[Results], Section | None]
 
@@ -62,18 +65,28 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     """
     sections = sections_of(results)
     main = list(closing.on(MAIN, sections))
-    links = closing.further(results, closing.elsewhere(sections))
+    links = closing.further(results, sections)
     if links is not None:
         place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
         main.insert(place, links)
     redone = "After" if results.departures else "Redoes"
-    report = Page(title(run), tuple(main), lead(results, run), MAIN, results.config.source, redone, results.pending)
+    title = f"Passive walking: {run}"
+    report = Page(
+        title, tuple(main), (lead(results.config, run),), MAIN, results.config.source, redone, results.pending
+    )
     beside = (
         Page(f"{name} · {run}", found, file=file)
         for file, name in closing.TITLES.items()
         if (found := closing.on(file, sections))
     )
     return (report, *beside)
+
+
+def lead(config: Config, run: str) -> str:
+    """What was run: the walker, its slope and what it was to do."""
+    equations = config.equations if is_plain_compass(config.walker) else ""
+    change = run.partition("@")[2].replace(",", ", ")
+    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

@@ -78,12 +78,7 @@ class Column:
 
 
 def measured(
-    words: str,
-    key: str,
-    written: Callable[[Any], str | Cell] = number,
-    *,
-    labels: type | None = None,
-    prefix: str = "",
+    words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
     """A column of numbers in a multiple of their unit: that of the key's label in a class of rows, or of its ending."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit

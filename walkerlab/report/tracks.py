@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,24 +85,16 @@ def track_in(trajectory: Group) -> Track | None:
     """The motion in a stored trajectory; None if it does not tell where the joints are."""
     if "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
-    channels = singles(trajectory, OF_THE_WALKER) | pairs(trajectory, OF_A_LEG)
-    if {"penetration_m", "slip_velocity_m_s"} <= trajectory.variables.keys():
+    there = trajectory.variables.keys()
+    channels = {channel: trajectory[name] for name, channel in OF_THE_WALKER.items() if name in there}
+    of_legs = {name: channel for name, channel in OF_A_LEG.items() if name in there}
+    channels |= {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in of_legs.items() for leg in LEGS}
+    if {"penetration_m", "slip_velocity_m_s"} <= there:
         for leg in LEGS:
             touching = trajectory["penetration_m"][:, leg] > 0.0
             velocity = trajectory["slip_velocity_m_s"][:, leg]
             channels[f"q{leg}"] = slip_since_touch(trajectory["time"], velocity, touching)
     return Track({name: np.asarray(values, dtype=np.float64) for name, values in channels.items()})
-
-
-def singles(trajectory: Group, names: Mapping[str, str]) -> Channels:
-    """Variables with one value an instant, under the names of their channels; those that there are."""
-    return {channel: trajectory[name] for name, channel in names.items() if name in trajectory.variables}
-
-
-def pairs(trajectory: Group, names: Mapping[str, str]) -> Channels:
-    """Variables with a value for each leg, a channel a leg; those that there are."""
-    there = {name: channel for name, channel in names.items() if name in trajectory.variables}
-    return {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in there.items() for leg in LEGS}
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:

@@ -10,8 +10,8 @@ from typing import Any
 from walkerlab.errors import ConfigError
 from walkerlab.figures.sweep import SweepFigure, choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
+from walkerlab.report.page import SweepPage, render_sweep
 from walkerlab.report.sections.walks import OF_ERROR, error_in_words
-from walkerlab.report.sweep_page import SweepPage, render
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -51,7 +51,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
             paths.append(folder.figures / f"{stem}.{kind}")
             write_atomically(paths[-1], data)
     page = folder.path / PAGE
-    write_atomically(page, render(page_of(swept, group, figure, shown)).encode())
+    write_atomically(page, render_sweep(page_of(swept, group, figure, shown)).encode())
     return Files(page, tuple(paths))
 
 

@@ -23,7 +23,8 @@ def section(results: Results) -> Section | None:
     if summary is None or not summary.get("reference"):
         return None
     scenes = list(summary["reference"])
-    concluded = tuple(Statement(scene, spoken(summary["conclusions"][scene], scene)) for scene in scenes)
+    told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in scenes}
+    concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
     blocks: tuple[PageBlock, ...] = (
         Paragraph(words("accuracy.introduction", summary)),
         Statements(concluded),
@@ -44,12 +45,6 @@ def fastest(summary: Row) -> str:
     return f"Fastest: {said}." if said else ""
 
 
-def spoken(conclusion: str, scene: str) -> str:
-    """A conclusion without the scene's name, which stands before it."""
-    text = conclusion.removeprefix(f"{scene}: ")
-    return text[:1].upper() + text[1:]
-
-
 def costs(summary: Row) -> Table:
     """What each method costs for each error, by scene."""
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
@@ -58,7 +53,7 @@ def costs(summary: Row) -> Table:
         for level in levels
     )
     columns = (
-        Column("method", method_of),
+        Column("method", lambda method: Cell(method["method"], "good" if method["best"] else None)),
         *least,
         Column("smallest error", smallest_error, numeric=True),
         Column("its right-hand sides", lambda method: most_exact(method).get("rhs_evaluations"), whole, True),
@@ -74,11 +69,6 @@ def methods_of(summary: Row, scene: str) -> list[Row]:
     best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
     runs = grouped((row for row in summary["rows"] if row["scene"] == scene), "method")
     return [{"method": name, "best": name in best, "runs": mine, "known": known} for name, mine in runs.items()]
-
-
-def method_of(method: Row) -> Cell:
-    """A method's name, marked if it is fastest somewhere."""
-    return Cell(method["method"], "good" if method["best"] else None)
 
 
 def reached(method: Row) -> list[Row]:

@@ -25,12 +25,13 @@ CAUSES = {
 }
 """Parts of the difference in period, and what they are called in a sentence."""
 CHANNELS = {
-    "damping": ("damping at touch-down", 4),
-    "friction": ("friction", 3),
-    "knee_strikes": ("the knee's strike", 3),
-    "knee_stop": ("the knees' stops", 3),
+    "damping": ("damping at touch-down", 4, "to damping", "in the impact, all"),
+    "friction": ("friction", 3, "to friction", "none"),
+    "knee_strikes": ("the knee's strike", 3, "in the knee's strike", "in the strike"),
+    "knee_stop": ("the knees' stops", 3, "in the knees' stops", "none"),
 }
-"""Where a step dissipates energy, by the names under which it is stored: what that is called, and digits to show."""
+"""Where a step dissipates energy, by the names under which it is stored: what that is called in a sentence, with digits
+to show, what in a table, and what the rigid model has instead."""
 POINT_FEET = "all, point foot"
 """The series of a walker whose feet are points in the rigid model and balls in the contact model."""
 NOTHING = 1e-9
@@ -62,9 +63,15 @@ def limit(results: Results) -> Section | None:
     if summary is None or not (summary.get("reaches") or summary.get("orders")):
         return None
     reaches = summary.get("reaches") or {}
-    blocks: list[PageBlock] = [limit_table(name, found) for name, found in reaches.items() if found["settings"]]
-    if summary.get("orders"):
-        blocks.append(orders_table(summary["orders"]))
+    note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
+    blocks: list[PageBlock] = [
+        table(f"Towards the rigid limit: {name}", LIMIT_COLUMNS, found["settings"], note=note)
+        for name, found in reaches.items()
+        if found["settings"]
+    ]
+    if orders := summary.get("orders"):
+        rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
+        blocks.append(table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows))
     return Section("limit", "Towards the rigid limit", tuple(blocks), reached(summary), COSTS)
 
 
@@ -95,7 +102,7 @@ def explained(summary: Summary) -> str:
         return f"The contact model has no gait of its own: {gait['reason']}."
     goes = [
         f"{quantity(gait['lost_J'][key], 'J', digits)} into {name}"
-        for key, (name, digits) in CHANNELS.items()
+        for key, (name, digits, *_) in CHANNELS.items()
         if gait["lost_J"].get(key)
     ]
     return words("adjustment.explained", gait, listed(goes).replace(" into ", " go into ", 1))
@@ -186,29 +193,17 @@ GAIT_LINES = (
     Column("slip a step", "slip_m", length),
     *(
         Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
-        for channel, said in {
-            "damping": "to damping",
-            "friction": "to friction",
-            "knee_strikes": "in the knee's strike",
-            "knee_stop": "in the knees' stops",
-        }.items()
+        for channel, (_, _, said, _) in CHANNELS.items()
     ),
     Column("height lost", "height_lost_J", partial(quantity, unit="J")),
 )
-OF_RIGID = {
-    "damping": "in the impact, all",
-    "friction": "none",
-    "knee_strikes": "in the strike",
-    "knee_stop": "none",
-}
-"""What the rigid model has instead of a contact gait's losses."""
 
 
 def gait_table(summary: Summary, rigid: Summary | None) -> Table:
     """The contact gait beside the rigid one."""
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {channel: Cell(said) for channel, said in OF_RIGID.items() if lost(channel, gait) is not None}
+    losses = {channel: Cell(said) for channel, (*_, said) in CHANNELS.items() if lost(channel, gait) is not None}
     beside = {**(rigid or {}), "slip_m": Cell("none"), "lost_J": losses, "height_lost_J": Cell("the same as lost")}
     gaits = {"contact model": gait, "rigid model": beside}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
@@ -270,14 +265,4 @@ LIMIT_COLUMNS = tuple(
 )
 
 
-def limit_table(name: str, found: Summary) -> Table:
-    """One way towards the rigid limit."""
-    note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
-    return table(f"Towards the rigid limit: {name}", LIMIT_COLUMNS, found["settings"], note=note)
-
-
-def orders_table(orders: Mapping[str, Any]) -> Table:
-    """Observed orders of convergence, knob by knob."""
-    rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
-    columns = [Column("knob"), Column("observed orders, towards the limit", wide=True)]
-    return table("How fast the period converges when one knob is turned", columns, rows)
+ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
-from walkerlab.report.blocks import CASES, COSTS, MAIN, PAPER, Cards, PageBlock, Paragraph, Section, Terms, Waiting
+from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms, Waiting
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
+from walkerlab.report.words import words
 from walkerlab.scene.left_out import LeftOut
 
 TITLES = {
@@ -17,37 +18,19 @@ TITLES = {
 }
 """The pages beside the report, in their order."""
 
-WAITED_FOR = {
-    "contact-sim": "the walk of the contact model",
-    "compare": "both models compared, with each other and with the paper",
-    "tune": "the parameter adjustment",
-    "accuracy": "error against run time",
-    "stability": "extreme cases and known problems",
-    "continuation": "the family of gaits",
-    "basin": "which starts walk",
-    "plot": "the figures",
-    "simulate": "the walk of the rigid model",
-    "fixedpoint": "the periodic gait",
-}
-"""What a stage brings into the report."""
 
-
-def further(results: Results, elsewhere: Sequence[Section]) -> Section | None:
-    """Links to the other pages, each with what it comes to, and what will be there."""
-    items = tuple(
-        (file, title, "" if file == PAPER and not results.of_the_paper else brief(on(file, elsewhere)))
-        for file, title in TITLES.items()
-        if any(one.page == file for one in elsewhere)
-    )
-    blocks: list[PageBlock] = [Cards(items)] if items else []
-    blocks += [Waiting(f"Still being computed: {WAITED_FOR.get(name, name)}.") for name in results.pending]
+def further(results: Results, sections: Sequence[Section]) -> Section | None:
+    """Links to the other pages, each with what it comes to in a sentence for each section, and what will be there."""
+    items = []
+    for file, title in TITLES.items():
+        found = on(file, sections)
+        silent = file == PAPER and not results.of_the_paper
+        brief = "" if silent else " ".join(section.finding for section in found if section.finding)
+        items += [(file, title, brief)] if found else []
+    blocks: list[PageBlock] = [Cards(tuple(items))] if items else []
+    blocks += [Waiting(words("closing.pending", name)) for name in results.pending]
     title = "Further pages" if items else "Still to come"
     return Section("further", title, tuple(blocks)) if blocks else None
-
-
-def brief(sections: Iterable[Section]) -> str:
-    """What a page comes to, in a sentence for each of its sections."""
-    return " ".join(section.finding for section in sections if section.finding)
 
 
 def on(page: str, sections: Sequence[Section]) -> tuple[Section, ...]:
@@ -55,41 +38,17 @@ def on(page: str, sections: Sequence[Section]) -> tuple[Section, ...]:
     return tuple(section for section in sections if section.page == page)
 
 
-def elsewhere(sections: Sequence[Section]) -> tuple[Section, ...]:
-    """The sections of all other pages."""
-    return tuple(section for section in sections if section.page != MAIN)
-
-
-WORDS = (
-    ("Step", "From one heel strike to the next; a stride is two of them, one with each leg."),
-    ("Heel strike", "The instant in which the swing foot comes down ahead and the legs change roles."),
-    ("Gait", "A walk in which every step is like the last: a fixed point of the step map."),
-    ("Step map", "What takes the state just after one heel strike to the state just after the next."),
-    (
-        "Multiplier",
-        "Eigenvalue of the step map’s derivative at a gait: the factor on a small disturbance in a step. "
-        "A gait is stable if all are smaller than 1 in magnitude; the largest magnitude is the spectral radius.",
-    ),
-    ("Scuffing", "A straight swing leg passes below the ground near mid-swing. The rigid model ignores it."),
-)
-OF_CONTACT = (
-    ("Rigid model", "A foot stands still on the ground until the other one comes down in a plastic impact."),
-    ("Contact model", "Feet that sink into the ground and slip on it, by ADAMS’s laws of normal force and friction."),
-    ("Penetration", "How deep a foot is in the ground; static, with the whole weight on one foot."),
-    ("Slip", "How far a standing foot moves along the slope, rolling not counted."),
-    ("Phase", "The part of a step that has gone by. At the same phase, a slower clock makes no difference."),
-)
-
-
 def glossary(results: Results) -> Section:
     """What the words mean."""
-    words = WORDS if results.config.contact is None else (*WORDS, *OF_CONTACT)
-    return Section("glossary", "Glossary", (Terms(words),), "The words of this report, in a line each.")
+    told = words("closing.glossary", results.config.contact is not None).split(" | ")
+    terms = Terms(tuple((word, meaning) for word, _, meaning in (one.partition(": ") for one in told)))
+    return Section("glossary", "Glossary", (terms,), "The words of this report, in a line each.")
 
 
 def left_out(results: Results) -> Section:
     """Results that were not computed, and parts of results that were left out."""
-    rows = rows_of(everything_absent(results))
+    parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
+    rows = rows_of(list(dict.fromkeys((*results.absent, *parts))))
     if not rows:
         said = Paragraph("Nothing is left out: every result of the pipeline is there.")
         return Section("left-out", "Left out", (said,), "Nothing.")
@@ -113,11 +72,3 @@ def rows_of(missing: Sequence[LeftOut]) -> list[list[str]]:
 def cause(why: str, missing: Sequence[LeftOut]) -> str:
     """The reason at the bottom of a reason, such as 'it needs simulate: it needs fixedpoint: no gait'."""
     return min((absent.why for absent in missing if why.endswith(absent.why)), key=len)
-
-
-def everything_absent(results: Results) -> list[LeftOut]:
-    """What is missing as a whole, then what results say that they left out."""
-    found = list(results.absent)
-    for result in results.stored.values():
-        found += [LeftOut(**one) for one in result.summary.get("left_out", [])]
-    return list(dict.fromkeys(found))

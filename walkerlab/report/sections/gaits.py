@@ -94,7 +94,8 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
     return side_by_side(
         f"Fixed point of the step map and its multipliers{beside}",
         lines,
-        dict(zip(heads_of(list(sets)), sets.values(), strict=True)),
+        # the corrected set is labelled only beside the printed one
+        {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()},
         note=note if len(sets) > 1 else "",
     )
 
@@ -102,11 +103,6 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
 def state_at(place: int, gait: Mapping[str, Any]) -> float:
     """A coordinate of a gait's fixed point."""
     return float(gait["state"][place])
-
-
-def heads_of(sets: Sequence[str]) -> list[str]:
-    """The heads of columns of gaits: the corrected set is labelled only beside the printed one."""
-    return ["value"] if sets == ["corrected"] else [SETS[name] for name in sets]
 
 
 def coordinate(name: str) -> str:
@@ -155,8 +151,7 @@ def found_gaits(results: Results, sets: Iterable[str], names: Sequence[str]) -> 
         Column("stable", "stable", lambda stable: plainly(bool(stable))),
         Column("remark", "remark"),
     )
-    titles = [""] if list(groups) == ["corrected"] else [SETS[name] for name in groups]
-    gaits = dict(zip(titles, groups.values(), strict=True))
+    gaits = {"" if list(groups) == ["corrected"] else SETS[name]: found for name, found in groups.items()}
     return table("Every gait of one step that was found", columns, gaits)
 
 
@@ -164,11 +159,9 @@ def gaits_in(group: Group) -> list[dict[str, Any]]:
     """The gaits of one set of equations, numbered, each with why it is chosen or cannot be walked."""
     count = group["period_s"].size
     objections = group["objections"].tolist() if "objections" in group.variables else [""] * count
-    stored = {
-        name: group[name].tolist() for name in ("period_s", "step_length_m", "state", "spectral_radius", "stable")
-    }
+    stored = ("period_s", "step_length_m", "state", "spectral_radius", "stable")
     return [
-        {name: values[place] for name, values in stored.items()}
+        {name: group[name][place].tolist() for name in stored}
         | {"gait": place + 1, "remark": "chosen" if place == group.attrs.get("chosen") else objections[place]}
         for place in range(count)
     ]

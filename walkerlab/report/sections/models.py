@@ -9,7 +9,7 @@ from typing import Any
 from walkerlab.report.blocks import PageBlock, Section
 from walkerlab.report.numbers import number, quantity
 from walkerlab.report.results import Results
-from walkerlab.report.tables import Column, Table, measured, table
+from walkerlab.report.tables import Column, measured, table
 from walkerlab.report.words import words
 
 MEASURES = {
@@ -45,7 +45,10 @@ def section(results: Results) -> Section | None:
         found += f", and by {number(angle['aligned'], 3)} rad at the same phase of each step"
     blocks: tuple[PageBlock, ...] = (differences,)
     if summary.get("releases"):
-        blocks += (releases_table(summary),)
+        walks = [{**walk, "released": RELEASED[name]} for name, walk in summary["releases"].items()]
+        rows_of_steps = [{**summary["steps"]["gait"], "released": "rigid gait"}, *walks]
+        note = words("models.releases")
+        blocks += (table("What the instant of release decides", RELEASE_COLUMNS, rows_of_steps, note=note),)
     return Section("models", "The models compared", blocks, f"{found}.")
 
 
@@ -80,13 +83,6 @@ RELEASE_COLUMNS = (
     ),
     Column("rigid period (s)", lambda walk: (walk.get("rigid") or {}).get("period_s"), number, numeric=True),
 )
-
-
-def releases_table(summary: Mapping[str, Any]) -> Table:
-    """Walks from the rigid gait with either instant of release, beside that gait."""
-    walks = [{**walk, "released": RELEASED[name]} for name, walk in summary["releases"].items()]
-    rows = [{**summary["steps"]["gait"], "released": "rigid gait"}, *walks]
-    return table("What the instant of release decides", RELEASE_COLUMNS, rows, note=words("models.releases"))
 
 
 def departure(results: Results) -> str:

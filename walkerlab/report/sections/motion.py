@@ -34,10 +34,11 @@ def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
     config, gap = results.config, sampling_gap(results.config)
     length = config.walker.leg_length_m
     torso = config.walker.torso
+    steps = {MODELS[stage].lower(): len(results.stored[stage].summary["step_periods_s"]) for stage in tracks}
     return Player(
         title="The walk.",
-        caption=caption(results, tuple(tracks)),
-        alt=alt(results, tuple(tracks)),
+        caption=words("motion.caption", max(steps.values()), MAX_STEPS),
+        alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
         walkers=tuple(walker(results, stage, track, gap) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,
         leg_m=length,
@@ -123,29 +124,6 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
     left, top = right.min() - margin, down.min() - margin
     width, height = right.max() + margin - left, down.max() + margin - top
     return math.floor(1000 * left), math.floor(1000 * top), math.ceil(1000 * width), math.ceil(1000 * height)
-
-
-def caption(results: Results, stages: tuple[str, ...]) -> str:
-    """What one looks at."""
-    steps = max(len(results.stored[stage].summary["step_periods_s"]) for stage in stages)
-    shown = f"The first {MAX_STEPS} steps" if steps > MAX_STEPS else "The whole walk"
-    return (
-        f"{shown}, to scale, downhill to the right. The leg that swings first is drawn full, the other hollow; arrows "
-        "are the ground's forces. In the close-up the slope is drawn level, and a foot slips from the mark where it "
-        "came down."
-    )
-
-
-def alt(results: Results, stages: tuple[str, ...]) -> str:
-    """What is seen, for those who do not see it."""
-    walked = [
-        f"the {MODELS[stage].lower()} takes {len(results.stored[stage].summary['step_periods_s'])} steps"
-        for stage in stages
-    ]
-    return (
-        f"Stick figures of two legs walk down a slope of {math.degrees(results.config.slope_rad):.2f}°: "
-        + "; ".join(walked)
-    )
 
 
 def figures(results: Results) -> Section | None:

@@ -39,7 +39,11 @@ def numbers(results: Results) -> Section | None:
     counts = listed(f"{verdicts[name]} {name}" for name in TONES if verdicts[name])
     finding = f"Of {count(len(rows), 'number')} that the paper prints: {counts}."
     told = [Statement(f"{name.capitalize()}:", MEANINGS[name], tone=TONES[name]) for name in MEANINGS]
-    blocks: tuple[PageBlock, ...] = (*departures(results), Statements(tuple(told), "lines"), numbers_table(rows))
+    blocks: tuple[PageBlock, ...] = (Statements(tuple(told), "lines"), numbers_table(rows))
+    if results.departures:
+        differs = in_signs("; ".join(results.departures))
+        said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
+        blocks = (Paragraph(said, "fair"), *blocks)
     return Section("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
@@ -55,15 +59,6 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
-
-
-def departures(results: Results) -> tuple[Paragraph, ...]:
-    """How the scene differs from the paper's; nothing if it does not."""
-    if not results.departures:
-        return ()
-    differs = in_signs("; ".join(str(departure) for departure in results.departures))
-    said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
-    return (Paragraph(said, "fair"),)
 
 
 def paper_numbers(results: Results) -> Sequence[Row]:
@@ -89,7 +84,7 @@ CAPTIONS = {
 
 NOTES = {
     "table3": "Ours are of the last completed stride, whose first step is the left one; the energy is the time mean "
-    "over the rigid gaits' ten steps and over the contact model's last five.",
+    "over the rigid gaits' ten steps and over the contact model's last five."
 }
 """What to know when reading them: whose periods these are, and over which time a mean is."""
 
@@ -155,13 +150,7 @@ def value_of(value: Any, digits: int) -> str:
     return in_signs(value) if isinstance(value, str) else number(float(value), digits)
 
 
-PARTS = {
-    "where": "where",
-    "printed": "printed",
-    "right": "right",
-    "evidence": "evidence",
-    "measured": "measured here",
-}
+PARTS = {"where": "where", "printed": "printed", "right": "right", "evidence": "evidence", "measured": "measured here"}
 """Variables of the stored errata, and their heads."""
 ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in PARTS.items()]
 

@@ -20,7 +20,8 @@ def section(results: Results) -> Section:
         note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
         digests = table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note)
         blocks += [table("When each result was made", RESULT_COLUMNS, made), software_table(results), digests]
-        blocks.append(Code("Command lines", "\n".join(command_lines(results))))
+        commands = dict.fromkeys(result.provenance.command_line for result in made)
+        blocks.append(Code("Command lines", "\n".join(commands)))
     return Section("provenance", "Where this comes from", tuple(blocks), finding(results))
 
 
@@ -75,8 +76,3 @@ def software(result: Stored) -> tuple[tuple[str, str], ...]:
     libraries = sorted(made.library_versions.items())
     commit = made.git_commit or "unknown"
     return (("walkerlab", made.package_version), ("commit", commit), *libraries, ("platform", made.platform))
-
-
-def command_lines(results: Results) -> list[str]:
-    """The commands that made the results, each once."""
-    return list(dict.fromkeys(result.provenance.command_line for result in results.stored.values()))

@@ -30,7 +30,7 @@ def section(results: Results) -> Section | None:
         *failures(cases, known),
         Paragraph(words("stability.judgement")),
         case_table(cases),
-        known_table(known),
+        table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
     ]
     if summary["ordinary"]:
         blocks.append(ordinary_table(summary))
@@ -105,11 +105,6 @@ KNOWN_COLUMNS = (
     Column("relative error", lambda row: Cell(number(row["error"], 2), "good" if row["ok"] else "bad"), numeric=True),
     Column("the reference’s route", "source", wide=True),
 )
-
-
-def known_table(known: Rows) -> Table:
-    """Every known problem."""
-    return table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True)
 
 
 def ordinary_table(summary: Row) -> Table:

@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
-from walkerlab.report.numbers import count, listed
+from walkerlab.report.numbers import count
 from walkerlab.report.outcomes import CONTACT, MODELS, WALKED, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper import TONES, errata, paper_numbers
 from walkerlab.report.symbols import in_signs
+from walkerlab.report.tables import Tone
 from walkerlab.report.words import words
-from walkerlab.scene.left_out import LeftOut
 
 HEADLINES = {
     "A.5 row 2": "The equations of motion have a sign error",
@@ -67,16 +67,14 @@ def opening(results: Results) -> list[PageBlock]:
 
 def failures(results: Results) -> list[str]:
     """What has no answer, and what is missing for that reason; then results that are there and say that they fail."""
-    told = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
-    missing = [failure(results, absent) for absent in results.absent if absent.what in results.failed]
-    return [*missing, *(f"{name}: {said['message'].rstrip('.')}." for name, said in told.items() if said is not None)]
-
-
-def failure(results: Results, absent: LeftOut) -> str:
-    """Why a stage has no answer, and which others have none for that reason."""
-    lost = [other.what for other in results.absent if other.what not in results.failed and absent.why in other.why]
-    without = f" What needs it is left out: {listed(lost)}." if lost else ""
-    return f"{absent.what} has no answer: {absent.why.rstrip('.')}.{without}"
+    failed = [absent for absent in results.absent if absent.what in results.failed]
+    others = [absent for absent in results.absent if absent.what not in results.failed]
+    told = [
+        words("verdict.failure", absent, [other.what for other in others if absent.why in other.why])
+        for absent in failed
+    ]
+    said = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
+    return [*told, *(f"{name}: {why['message'].rstrip('.')}." for name, why in said.items() if why is not None)]
 
 
 def walk(results: Results, stage: str) -> Statement | None:
@@ -104,10 +102,8 @@ def gait(results: Results) -> Statement | None:
     summary = results.summary("fixedpoint")
     if summary is None:
         return None
-    text = words("verdict.gait", summary)
-    if summary["stable"]:
-        return Statement("Periodic gait", text, "stable", "good")
-    return Statement("Periodic gait", text, "unstable", "fair")
+    badge: tuple[str, Tone] = ("stable", "good") if summary["stable"] else ("unstable", "fair")
+    return Statement("Periodic gait", words("verdict.gait", summary), *badge)
 
 
 def adjustment(results: Results) -> Statement | None:
@@ -115,24 +111,15 @@ def adjustment(results: Results) -> Statement | None:
     found = (results.summary("tune") or {}).get("adjustment")
     if found is None or found["found"]:
         return None
-    return Statement(
-        "Parameter adjustment", f"{found['reason'].capitalize()}. {found['advice']}", "no start helps", "bad"
-    )
+    text = f"{found['reason'].capitalize()}. {found['advice']}"
+    return Statement("Parameter adjustment", text, "no start helps", "bad")
 
 
 def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:
     """How the paper's numbers fared, and its gravest errors."""
     blocks: list[PageBlock] = [shares(rows), Statements(by_verdict(rows), "lines")]
     gravest = headlines(results)
-    if gravest:
-        blocks += [
-            Paragraph(
-                "The reasons; printed, corrected and measured values stand side by side on the page of the paper’s "
-                "numbers."
-            ),
-            Statements(gravest, "columns"),
-        ]
-    return blocks
+    return [*blocks, Paragraph(words("verdict.reasons")), Statements(gravest, "columns")] if gravest else blocks
 
 
 def shares(rows: Rows) -> Shares:
@@ -165,15 +152,10 @@ def share(where: str, some: int, every: int) -> str:
 def headlines(results: Results) -> tuple[Statement, ...]:
     """The gravest errata that were found, with what was measured for them."""
     found = errata(results)
+    gravest = [(said, one) for start, said in HEADLINES.items() for one in found if one["where"].startswith(start)]
     return tuple(
-        headline(said, erratum)
-        for start, said in HEADLINES.items()
-        for erratum in found
-        if erratum["where"].startswith(start)
+        Statement(
+            in_signs(f"{said} ({one['where']}):"), f"{in_signs(one['measured'].partition('; ')[0])}.", tone="fair"
+        )
+        for said, one in gravest
     )
-
-
-def headline(said: str, erratum: Mapping[str, str]) -> Statement:
-    """An erratum in a line: what it comes to, and what was measured."""
-    first, _, _ = erratum["measured"].partition("; ")
-    return Statement(in_signs(f"{said} ({erratum['where']}):"), f"{in_signs(first)}.", tone="fair")
