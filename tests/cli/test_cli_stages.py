@@ -105,6 +105,14 @@ def test_no_answer_exits_4_and_keeps_what_was_found(toy):
     assert (toy.folder / value["artifact"]).exists()
 
 
+@pytest.mark.parametrize("stage", ["drop", "roll"])
+def test_why_there_is_no_answer_and_what_to_try_is_told_once(toy, stage):
+    toy("drop", "--set", "slope_rad=1.2")
+    done = toy(stage, "--set", "slope_rad=1.2")
+    for said in ("the slope is too steep", "Try one below 1 rad."):
+        assert (done.stdout + done.stderr).count(said) == 1
+
+
 def test_what_needs_a_contact_block_exits_3_without_one(toy):
     done = toy("bounce", "--config", "rigid-only", "--json")
     assert done.returncode == 3

@@ -1,6 +1,7 @@
 """Families of gaits: flips by another route, cascades, folds, and what is said where a branch ends."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from walkerlab.orbits.attractors import (
     may_part,
     period_of,
     settled,
+    swept,
 )
 from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
@@ -390,3 +392,29 @@ def test_what_still_settles_has_the_period_that_it_comes_to():
     assert period_of(settling) == 2
     drifting = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 1e-4 * 1.05 ** np.arange(96)[:, None]
     assert period_of(drifting) == 0
+
+
+class LostBeyond:
+    """A step map that settles on nothing, up to a value beyond which the walker falls."""
+
+    def __init__(self, most):
+        self.most = most
+
+    def iterate(self, z, value, steps, _tangent):
+        rows = np.arange(steps, dtype=float)
+        outcome = Outcome.WALKED if value <= self.most else Outcome.FELL
+        return SimpleNamespace(outcome=outcome, points=rows[:, None] + z, periods_s=rows, angles=rows)
+
+
+@pytest.mark.parametrize("values", [11, 14])
+def test_where_an_attractor_is_lost_does_not_hang_on_the_values_that_are_looked_at(values):
+    found = swept(LostBeyond(7.13), np.zeros(1), np.linspace(2.0, 8.0, values), 4, 8)
+    spacing = 6.0 / (values - 1)
+    assert 0.0 < found.lost_at - 7.13 <= spacing / 2**6
+    assert 0.0 <= 7.13 - found.found[-1].value <= spacing / 2**6
+    assert found.reason == "fell"
+
+
+def test_an_attractor_that_is_not_there_at_the_first_value_is_lost_there():
+    found = swept(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
+    assert (found.found, found.lost_at) == ((), 2.0)

@@ -23,6 +23,21 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     assert [cell.text for cell in table.bodies[0].rows[0]][:4] == ["flip", "rigid", "1", "4"]
 
 
+def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
+    summary = dict(families()["continuation"].summary)
+    told = {"model": "contact", "value": 3.2, "outcome": "off-pad"}
+    summary["endings"] = [
+        {**told, "period": 1, "said": "Above 3.2 deg it trips."},
+        {**told, "period": 2, "said": "Above 3.3 deg it trips."},
+    ]
+    said = section.findings(summary)
+    assert "Above 3.2 deg it trips." in said
+    assert "Above 3.3 deg it trips." not in said
+    ended = [{"said": "3 of 9 walks slid away.", "ground": True}, {"said": "2 of 9 walks fell.", "ground": False}]
+    assert section.grounds({"endings": ended}) == ["3 of 9 walks slid away."]
+    assert section.grounds({}) == []
+
+
 def test_the_diagram_marks_gaits_whose_motion_is_stored():
     walk = with_motion(simulate())
     made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))

@@ -13,7 +13,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
-from walkerlab.stages.continuation_results import first_doubling
+from walkerlab.stages.continuation_results import attractor_summary, first_doubling
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -77,6 +77,20 @@ def test_a_flip_of_a_gait_that_is_unstable_on_both_sides_is_no_first_doubling():
 
 def flip_at(value):
     return SimpleNamespace(kind="flip", value=value)
+
+
+def test_where_a_cascade_still_doubles_what_has_not_settled_is_not_called_aperiodic():
+    # flips of the contact model; walks just beyond a flip take long to settle
+    flips, ranges = (4.097, 4.632, 4.734), ((0.2, 4.097), (4.097, 4.632), (4.632, 4.734))
+    branches = [
+        SimpleNamespace(period=2**k, stable_ranges=(ranges[k],), bifurcations=(flip_at(flips[k]),), ends=(born,))
+        for k, born in enumerate(SimpleNamespace(value=value) for value in (0.2, *flips[:2]))
+    ]
+    seen = [SimpleNamespace(value=value, period=0) for value in (4.647, 4.74, 4.755, 4.76, 4.9)]
+    attractors = SimpleNamespace(found=seen, lost_at=None, reason="")
+    followed = SimpleNamespace(model="contact", branches=branches, attractors=attractors, exponents=())
+    # the flips accumulate at 4.734 + 0.102 / (0.535 / 0.102 - 1) = 4.758
+    assert attractor_summary(followed)["aperiodic_from"] == 4.76
 
 
 def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_degrees):

@@ -22,10 +22,11 @@ from walkerlab.store.content import Variable, untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER, row_of, without_outputs
+from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, row_of, without_outputs
 from walkerlab.sweeps.drawing import said_of
 from walkerlab.sweeps.flat import said_in
-from walkerlab.sweeps.result import as_csv, last_of_lists
+from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.result import Merge, as_csv, last_of_lists
 
 GRAVITIES = "gravity_m_s2=1:9:5"
 
@@ -103,6 +104,23 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
     assert said_of(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
     unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
     assert said_of(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
+
+
+def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_steps():
+    question = asked("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
+    merge = Merge(3)
+    rows = {
+        "0": {"outcome": "off-pad", "pitch_m": 0.37, "step_lengths_m": [0.36, 0.35]},
+        "1": {"outcome": "off-pad", "pitch_m": 0.3, "step_lengths_m": [0.4]},
+        "2": {"outcome": "walked", "pitch_m": 0.5, "step_lengths_m": [0.5, 0.5, 0.5]},
+    }
+    found = [PointResult(key, "answered", "", json.dumps(row)) for key, row in rows.items()]
+    merge.put(Chunk(tuple(found), {}), {key: int(key) for key in rows})
+    (ended,) = merge.endings(question, load().config, np.arange(3))
+    assert (ended["outcome"], ended["walks"], ended["of"]) == ("off-pad", 2, 3)
+    assert "pitch is 0.3 to 0.37 m, the rigid gait's step length; their last steps were 0.35 to 0.4 m" in ended["said"]
+    over_pitch = asked("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
+    assert "the rigid gait's" not in merge.endings(over_pitch, load().config, np.arange(3))[0]["said"]
 
 
 def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):

@@ -231,7 +231,7 @@ def continuation(summary: Summary) -> list[str | Table]:
 
 def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
-    return [in_signs(families.shares(summary).text), families.attractors(summary)]
+    return [in_signs(families.shares(summary).text), *families.grounds(summary), families.attractors(summary)]
 
 
 def engines(summary: Summary) -> list[str | Table]:

@@ -14,7 +14,7 @@ from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.runner import Options, StageReport, execute, preview
+from walkerlab.stages.runner import Options, StageReport, execute, preview, told_once
 
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
@@ -63,7 +63,9 @@ def printed(request: Request, report: StageReport) -> str:
     """The result for people: what was found, where it is, and what to do next."""
     if report.artifact is None:
         return "\n".join([f"{report.stage}: no result", *left_out_lines(request, report)])
-    own = {key: value for key, value in report.summary.items() if key != "no_answer"}
+    # why there is no answer, and what to try, is told once: as the error
+    told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
+    own = {key: value for key, value in report.summary.items() if key not in told_apart}
     if "html" in own:
         lines = [*verdict(report.results), *answer(report.stage, own), *pages(request, report)]
     else:
@@ -104,6 +106,6 @@ def left_out_lines(request: Request, report: StageReport) -> list[str]:
 def each_left_out(report: StageReport) -> list[str]:
     """What was left out, why, and what that saves."""
     return [
-        f"left out: {entry.what} ({entry.why})" + (f"; saves {entry.saves}" if entry.saves else "")
+        f"left out: {entry.what} ({told_once(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
         for entry in report.left_out
     ]

@@ -19,7 +19,7 @@ from walkerlab.stages.graph import PIPELINE, Graph
 if TYPE_CHECKING:
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
-TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "numerical_error")
+TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
 """Keys of a sweep's summary that `--json` has."""
 SHOWN = 20
 """Points that a dry run lists."""

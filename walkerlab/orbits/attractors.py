@@ -27,6 +27,7 @@ NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how
 ASIDE = 1e-2  # of a start from the unstable gait that it is to leave, as a share of the largest coordinate
 BLOCKS = 10
 SMALLER_STEPS = 8
+LOSS_HALVINGS = 6
 CANDIDATES = 4  # near returns that are tried, of one number of steps
 
 
@@ -104,7 +105,8 @@ def swept(
 ) -> AttractorBranch:
     """The attractor that contains z at the first value, followed from value to value.
 
-    Where a walk from one value's attractor does not settle at the next, it is led there in smaller steps.
+    Where a walk from one value's attractor does not settle at the next, it is led there in smaller steps; where it is
+    lost on the way, that is narrowed down by halving, so that it does not hang on the values.
     """
     found: list[Attractor] = []
     for value in values:
@@ -113,10 +115,25 @@ def swept(
             here = led(step_map, found[-1], float(value), transient, kept)
         advance()
         if isinstance(here, Outcome):
-            return AttractorBranch(tuple(found), float(value), here.label)
+            return lost_after(step_map, found, float(value), here, transient, kept)
         found.append(here)
         z = here.last
     return AttractorBranch(tuple(found), None, "")
+
+
+def lost_after(
+    step_map: StepMap, found: list[Attractor], value: float, outcome: Outcome, transient: int, kept: int
+) -> AttractorBranch:
+    """An attractor up to where it is lost, between the last value at which it was found and one at which it was not."""
+    kept_on = list(found)
+    for _ in range(LOSS_HALVINGS if found else 0):
+        middle = 0.5 * (kept_on[-1].value + value)
+        here = settled(step_map, kept_on[-1].last, middle, transient, kept)
+        if isinstance(here, Outcome):
+            value, outcome = middle, here
+        else:
+            kept_on.append(here)
+    return AttractorBranch(tuple(kept_on), value, outcome.label)
 
 
 def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) -> Attractor | Outcome:

@@ -23,6 +23,7 @@ from walkerlab.orbits.scaled_starts import TOLERANCES, scaled_starts
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import contact_gait, start_state
+from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.basin_pieces import (
     ContactQuestion,
@@ -83,6 +84,7 @@ def run(
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
     said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
+    said["endings"] = endings(said["outcomes"], config, config.basin.model == "contact", pads_of(question, config))
     said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
     return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
 
@@ -164,6 +166,14 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     starts = replace(starts, tolerances=replace(TOLERANCES, rtol=settings.rtol, atol=settings.atol))
     usual = starts.walk(1.0, 1.0).evaluations
     return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
+
+
+def pads_of(question: Question, config: BasinConfig) -> Pads | None:
+    """The pads of the contact model's walks."""
+    if config.contact is None or not isinstance(question, ContactQuestion):
+        return None
+    pitch = question.scene.pitch_m
+    return Pads((pitch, pitch), laid=str(config.contact.pad_pitch))
 
 
 def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:

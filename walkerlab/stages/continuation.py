@@ -127,7 +127,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     for model in models_of(block, config, asked):
         followed = FOLLOW[model](asked, progress)
         found.append(over_plane(followed, asked, progress))
-    said = summary(found, parameter, block) | {"left_out": left_out(found, asked)}
+    said = summary(found, parameter, block, config) | {"left_out": left_out(found, asked)}
     moving = {
         f"{RIGID}/{path}": group
         for one in found

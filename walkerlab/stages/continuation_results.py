@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
+from walkerlab.config.reads import ContactConfig
 from walkerlab.labels import Label
 from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcation_curves import BifurcationCurve
 from walkerlab.orbits.bifurcations import Bifurcation
-from walkerlab.orbits.families import GaitBranch, ends_at, strike_to_strike
+from walkerlab.orbits.families import Crossing, GaitBranch, ends_at, steps_word, strike_to_strike
 from walkerlab.orbits.regions import Regions
-from walkerlab.orbits.step_maps import IteratedMap, Monitor
+from walkerlab.orbits.step_maps import IteratedMap, Monitor, StepMap
+from walkerlab.scene.endings import WHAT, causes
 from walkerlab.scene.parameter import Parameter
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
@@ -45,7 +47,9 @@ ATTRACTORS = {
 }
 
 
-def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation) -> dict[str, Any]:
+def summary(
+    found: Sequence[Followed], parameter: Parameter, asked: Continuation, config: ContactConfig
+) -> dict[str, Any]:
     """What the command prints; values are in the unit of the key that was asked for."""
     return {
         "over": parameter.key,
@@ -58,6 +62,7 @@ def summary(found: Sequence[Followed], parameter: Parameter, asked: Continuation
         "lyapunov": [{"model": one.model, **asdict(exponent)} for one in found for exponent in one.exponents],
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
+        "endings": [row for one in found for row in ending_rows(one, parameter, config)],
         "attractors": [attractor_summary(one) for one in found if one.attractors.found],
         "curves": [row for one in found for row in curve_rows(one)],
         "regions": [row for one in found for row in region_rows(one)],
@@ -122,6 +127,38 @@ def limit_rows(followed: Followed) -> Iterator[dict[str, Any]]:
             }
 
 
+def ending_rows(followed: Followed, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
+    """What ends walks along the branches, and what the ground has to do with it, in words: `said`."""
+    for branch in followed.branches:
+        gait = f"the {followed.model} model's gait of {branch.period} {steps_word(branch.period)}"
+        for end in branch.ends:
+            outcome = end.reason.partition(":")[0]
+            if outcome in WHAT:
+                why = causes(outcome, config, followed.model == "contact")
+                said = f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason})."
+                yield ending_row(followed.model, branch.period, end.value, outcome, " ".join([said, *why]))
+        for crossing in branch.crossings:
+            if crossing.monitor.name == "tripped":
+                side = side_beyond(branch, crossing, followed.step_map)
+                said = f"{side} {crossing.value:.5g} {parameter.unit} {gait} trips over pads of its own step length."
+                said = " ".join([said, *causes("off-pad", config, contact=True)])
+                yield ending_row(followed.model, branch.period, crossing.value, "off-pad", said)
+
+
+def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
+    """On which side of a crossing what is watched is beyond its limit, as its neighbour there has it."""
+    assert step_map is not None, "a branch is followed with one"
+    place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
+    nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
+    beyond = limit is not None and nearest.monitors[place] > limit
+    return "Above" if beyond == (nearest.value > crossing.value) else "Below"
+
+
+def ending_row(model: str, period: int, value: float, outcome: str, said: str) -> dict[str, Any]:
+    """What ends walks at one value."""
+    return {"model": model, "period": period, "value": value, "outcome": outcome, "said": said}
+
+
 def cascade_rows(followed: Followed) -> Iterator[dict[str, Any]]:
     """Chains of branches, each born in a flip of the one before, with the ratios of their flips' distances."""
     for first in followed.branches:
@@ -155,10 +192,18 @@ def attractor_summary(followed: Followed) -> dict[str, Any]:
     """Over which values the attractor was followed, and what became of it.
 
     Just beyond a flip walks leave the gait slowly: what has not repeated itself by then counts as aperiodic only where
-    neighbours may part.
+    neighbours may part, and neither a gait that was followed is stable nor a cascade still doubles.
     """
     attractors, exponents = followed.attractors, followed.exponents
-    aperiodic = [one.value for one in attractors.found if one.period == 0 and may_part(exponents, one.value)]
+    periodic = [pair for branch in followed.branches for pair in branch.stable_ranges]
+    periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(followed) if "accumulates_at" in row]
+    aperiodic = [
+        one.value
+        for one in attractors.found
+        if one.period == 0
+        and may_part(exponents, one.value)
+        and not any(min(pair) <= one.value <= max(pair) for pair in periodic)
+    ]
     return {
         "model": followed.model,
         "from": attractors.found[0].value,

@@ -444,9 +444,14 @@ def unanswered(error: NoAnswer) -> Content:
     return replace(partial, summary={**partial.summary, "no_answer": said})
 
 
+def told_once(why: str) -> str:
+    """A reason without that of another stage or of the error, which are told themselves."""
+    return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
+
+
 def said_of(done: StageDone) -> str:
-    """One line about what was done with a stage; why there is no answer is told once, in the end."""
-    why = "no answer" if done.reason.startswith("no answer: ") else done.reason.partition(": no answer: ")[0]
+    """One line about what was done with a stage."""
+    why = told_once(done.reason)
     match done.action:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s"

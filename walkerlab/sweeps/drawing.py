@@ -84,14 +84,15 @@ def page_of(swept: Swept, group: Group, figure: SweepFigure | None, shown: Seque
 
 
 def said_of(summary: Mapping[str, Any]) -> list[str]:
-    """What a sweep says beside its numbers, in sentences."""
+    """What a sweep says beside its numbers: what ended its walks, and how far their numbers are off."""
+    ended = [str(one["said"]) for one in summary.get("endings", ())]
     error = summary.get("numerical_error")
     if error is None:
-        return []
+        return ended
     ends = {key: error[key] for key in error if key in OF_ERROR}
     largest = f"Largest numerical error: {error_in_words(ends)}" if ends else "Numerical errors are unknown"
     otherwise = f", of which {error['ended_otherwise']} ended otherwise" if error["ended_otherwise"] else ""
-    return [f"{largest}; {error['walked_again']} of {error['of']} points were walked again{otherwise}."]
+    return [*ended, f"{largest}; {error['walked_again']} of {error['of']} points were walked again{otherwise}."]
 
 
 def spoken(values: Sequence[object]) -> str:

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.canonical import canonical_json
+from walkerlab.config.schema import Config
 from walkerlab.report.headlines import LAST_OF, headlines
+from walkerlab.scene.endings import Pads, endings
 from walkerlab.stages.numerical_error import OF_EACH_STEP
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
@@ -23,6 +25,7 @@ from walkerlab.sweeps.chunk import Chunk
 from walkerlab.sweeps.columns import OWN, TEXT_BYTES, Columns
 from walkerlab.sweeps.question import Question, described
 
+CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 OUTCOMES = {"answered": "answered", "no-answer": "no-answer", "failed": "failed"}
 MEANINGS = {
     "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
@@ -74,10 +77,23 @@ class Merge:
             "outcomes": counted(self.own["outcome"][inverse]),
             **numerical_error(self.columns, inverse),
         }
+        ended = self.endings(question, points.template.base.config, inverse)
+        summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
         size = self.columns.size_bytes + 8 * TEXT_BYTES * len(OWN) * len(question)
         return InTurn(summary, attrs, scales, self._variables(question, parameters, inverse), size)
+
+    def endings(self, question: Question, config: Config, inverse: NDArray[np.int64]) -> list[dict[str, Any]]:
+        """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
+        outcomes = self.own["outcome"][inverse]
+        pads, pitch = None, self.columns.of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.columns.of("step_lengths_m")
+        if pitch is not None and off.any():
+            steps = np.zeros(0) if lengths is None else last_of_each(lengths[inverse][off])
+            laid = "" if config.contact is None or PAD_PITCH in parameters_of(question) else config.contact.pad_pitch
+            pads = Pads(ends_of(pitch[inverse][off]), ends_of(steps) if steps.size else None, str(laid))
+        return endings(counted(outcomes), config, question.stage == CONTACT, pads)
 
     def _variables(
         self, question: Question, parameters: Mapping[str, Variable], inverse: NDArray[np.int64]
@@ -91,6 +107,22 @@ class Merge:
                 yield name, Variable(self.own[name][inverse].reshape(shape), dims, "", MEANINGS[name])
             else:
                 yield name, self.columns.variable(name, inverse, shape, dims)
+
+
+def parameters_of(question: Question) -> set[str]:
+    """The keys that a question goes over."""
+    return {axis.key for axis in question.axes}
+
+
+def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
+    """The last number of each row (rows, numbers), gaps at its end; nothing of rows without any."""
+    known = np.isfinite(rows).sum(axis=1)
+    return np.asarray(rows[known > 0, known[known > 0] - 1])
+
+
+def ends_of(values: NDArray[Any]) -> tuple[float, float]:
+    """The least and the largest."""
+    return float(values.min()), float(values.max())
 
 
 def numerical_error(columns: Columns, inverse: NDArray[np.int64]) -> dict[str, Any]:

@@ -57,6 +57,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
             said.append(words("families.aperiodic", one["aperiodic_from"], unit))
         if one["lost_at"] is not None:
             said.append(words("families.lost", one, unit))
+    said += [one["said"] for one in summary.get("endings", ()) if one["period"] == 1]
     wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
     if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
         said.append(words("families.chaos", wild, unit))
@@ -205,7 +206,7 @@ def basin(results: Results) -> Section | None:
     summary = results.summary("basin")
     if summary is None:
         return None
-    blocks: list[PageBlock] = [shares(summary)]
+    blocks: list[PageBlock] = [shares(summary), *(Paragraph(said) for said in grounds(summary))]
     if summary["attractors"]:
         blocks.append(attractors(summary))
     return Section("basin", "Basins of attraction", tuple(blocks))
@@ -216,6 +217,11 @@ def shares(summary: Mapping[str, Any]) -> Paragraph:
     window = [f"{name} from {number(low, 4)} to {number(high, 4)}" for name, (low, high) in summary["window"].items()]
     ends = [f"{many:,} {name}" for name, many in summary["outcomes"].items()]
     return Paragraph(words("basin.shares", summary, window, ends))
+
+
+def grounds(summary: Mapping[str, Any]) -> list[str]:
+    """What of the ground ended walks."""
+    return [str(one["said"]) for one in summary.get("endings", ()) if one["ground"]]
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

@@ -1,0 +1,42 @@
+"""What ended walks, in words: pads are told from the walker's own limits."""
+
+from pathlib import Path
+
+from walkerlab.config.loader import load
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.scene.endings import WALKED, WHAT, Pads, causes, endings
+
+PAPER = load().config
+COUNTS = {"walked": 150, "off-pad": 178, "fell": 32, "no-answer": 7}
+
+
+def test_every_outcome_of_a_walk_has_its_words():
+    assert {outcome.label for outcome in Outcome} == {*WHAT, WALKED}
+
+
+def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
+    pads = Pads((0.15, 0.15), (0.31, 0.36), "rigid")
+    first, second = endings(COUNTS, PAPER, contact=True, pads=pads)
+    assert (first["outcome"], first["walks"], first["of"], first["ground"]) == ("off-pad", 178, 360, True)
+    assert first["said"] == (
+        "178 of 360 walks met the flank of a pad or tripped over the pad they had left (off-pad). The pads end them, "
+        "not the walker. The pads' pitch is 0.15 m, the rigid gait's step length; their last steps were 0.31 to 0.36 m "
+        "long. Try contact.terrain=after-mid-swing or contact.pad_pitch=own."
+    )
+    assert (second["said"], second["ground"]) == ("32 of 360 walks fell.", False)
+
+
+def test_what_did_not_walk_does_not_count_and_what_walked_did_not_end():
+    assert endings({"answered": 3, "no-answer": 1}, PAPER, contact=False) == []
+    assert endings({"walked": 3}, PAPER, contact=True) == []
+
+
+def test_legs_with_knees_are_sent_to_a_plane_and_pads_at_their_own_pitch_are_not_advised_again():
+    kneed = load(Path("kneed"), ("contact.terrain=checkerboard", "contact.pad_pitch=own")).config
+    assert causes("off-pad", kneed, contact=True)[-1] == "Try contact.terrain=plane."
+
+
+def test_the_rigid_model_has_no_ground_that_ends_a_walk():
+    assert causes("lifted-off", PAPER, contact=False) == []
+    assert "contact.stiffness" in causes("lifted-off", PAPER, contact=True)[0]
+    assert "contact.static_friction" in causes("slid", PAPER, contact=True)[0]

@@ -1,0 +1,100 @@
+"""What ended walks and what that has to do with the ground, in words: pads that end them are no limit of a walker's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from walkerlab.config.walkers import Kneed
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import ContactConfig
+
+WALKED: Final = "walked"
+WHAT: Final = {
+    "fell": "fell",
+    "off-pad": "met the flank of a pad or tripped over the pad they had left (off-pad)",
+    "lifted-off": "left the ground (lifted-off)",
+    "slid": "slid away (slid)",
+    "no-heel-strike": "never came to a heel strike (no-heel-strike)",
+    "bent-knee": "came down on a bent knee (bent-knee)",
+    "budget-exhausted": "exhausted their budget of right-hand sides (budget-exhausted)",
+    "solver-failed": "made the solver fail (solver-failed)",
+    "rejected": "began in a state that is not allowed (rejected)",
+}
+"""What walks did in the end, by outcome."""
+GROUNDS: Final = {
+    "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
+    "contact.stiction_velocity.",
+    "lifted-off": "The ground throws them off, or they start too fast: contact.stiffness, contact.damping.",
+}
+"""What of the contact model's ground has to do with an outcome, beside pads."""
+LAID: Final = {
+    "rigid": ", the rigid gait's step length",
+    "own": ", the contact gait's step length",
+}
+"""What `contact.pad_pitch` lays the pads for."""
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Pads:
+    """Pads on which walks ended.
+
+    pitch_m  least and largest of the walks, m
+    step_m   least and largest length of the last steps that they took, m; None if unknown
+    laid     the config's `contact.pad_pitch`, if all have the same
+    """
+
+    pitch_m: Range
+    step_m: Range | None = None
+    laid: str = ""
+
+
+def endings(
+    outcomes: Mapping[str, int], config: ContactConfig, contact: bool, pads: Pads | None = None
+) -> list[dict[str, Any]]:
+    """How many walks ended how, the most frequent first, those that walked aside.
+
+    outcomes  how many walks ended in each way; what is no walk's outcome does not count
+    contact   whether they were the contact model's
+    pads      on which walks ended off-pad
+
+    Returns for each `outcome`, `walks`, `of`, whether the `ground` has to do with it, and all that in words: `said`.
+    """
+    total = sum(walks for outcome, walks in outcomes.items() if outcome in WHAT or outcome == WALKED)
+    rows = []
+    for outcome, walks in sorted(outcomes.items(), key=lambda one: -one[1]):
+        if outcome in WHAT:
+            why = causes(outcome, config, contact, pads)
+            said = " ".join([f"{walks:,} of {total:,} walks {WHAT[outcome]}.", *why])
+            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": said})
+    return rows
+
+
+def causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None = None) -> list[str]:
+    """What the ground has to do with an outcome, in sentences; none where it has nothing to do with it."""
+    if not contact or config.contact is None:
+        return []
+    if outcome != "off-pad":
+        return [GROUNDS[outcome]] if outcome in GROUNDS else []
+    told = ["The pads end them, not the walker."]
+    if pads is not None:
+        steps = "" if pads.step_m is None else f"; their last steps were {metres(pads.step_m)} long"
+        told.append(f"The pads' pitch is {metres(pads.pitch_m)}{LAID.get(pads.laid, '')}{steps}.")
+    return [*told, f"Try {' or '.join(other_grounds(config))}."]
+
+
+def other_grounds(config: ContactConfig) -> list[str]:
+    """Grounds on which no pad ends a walk, and pads that fit the walk: legs with knees clear a plane."""
+    contact = config.contact
+    terrain = "plane" if isinstance(config.walker, Kneed) else "after-mid-swing"
+    own = contact is not None and contact.pad_pitch != "own"
+    return [f"contact.terrain={terrain}", *(["contact.pad_pitch=own"] if own else [])]
+
+
+def metres(lengths: Range) -> str:
+    """Lengths in words."""
+    least, most = (f"{one:.3g}" for one in lengths)
+    return f"{least} m" if least == most else f"{least} to {most} m"
