@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import re
+from typing import ClassVar, Final
+
+ADVISED: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
+"""A command in a text, unless it is about no run."""
+
+
+def to_type_back(text: str, typed: str) -> str:
+    """A text with the options that say which run it is about in the commands that it advises.
+
+    typed  these options, with a blank in front
+    """
+    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):

@@ -3,8 +3,10 @@ import subprocess
 import sys
 
 import pytest
+from typer.testing import CliRunner
 
 import walkerlab
+from walkerlab.cli.main import program
 from walkerlab.stages.graph import STAGES
 
 HEAVY = (
@@ -124,3 +126,17 @@ def completed(walker, typed):
 def test_a_shell_completes_keys_configs_and_options(walker, typed, offered):
     (walker.folder / "simple.yaml").write_text("extends: paper\n", encoding="utf-8")
     assert completed(walker, typed) == offered
+
+
+@pytest.mark.parametrize("typed", ["--slope_deg", "--slope-deg", "--hip_mass_kg"])
+def test_a_key_typed_as_an_option_is_told_with_how_it_is_set(typed):
+    done = CliRunner().invoke(program(), ["fixedpoint", typed, "3"])
+    assert done.exit_code == 2
+    assert f"{typed.lstrip('-').replace('-', '_')}=VALUE" in done.output
+    assert "--set" in done.output
+
+
+def test_an_option_that_is_no_key_is_told_as_any_other():
+    done = CliRunner().invoke(program(), ["fixedpoint", "--colour", "3"])
+    assert done.exit_code == 2
+    assert "--set" not in done.output

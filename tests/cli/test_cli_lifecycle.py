@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.cli.failures import to_type_back
 from walkerlab.cli.request import Request
 from walkerlab.config.loader import load, safe_name
+from walkerlab.errors import to_type_back
 
 
 def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):

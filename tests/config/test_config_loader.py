@@ -224,3 +224,25 @@ def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(
     assert "it is 1.05 m" in refused("extends: parts\n", [f"walker.feet=[{', '.join(arcs)}]"])
     own_frames = (BUILTIN_FOLDER / "parts.yaml").read_text().replace("centre_m: [0.0, -0.5]", "centre_m: [0.0, -0.4]")
     assert "5:17: walker.leg_length_m: 1.0 is not what" in refused(own_frames.split("\n", 2)[2])
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("slope_rad=1", "slope_rad is in radians, so this is 57.3 degrees; slope_deg takes degrees"),
+        ("walker.leg_mass_kg=5000", "walker.leg_mass_kg is 5000 kg on legs of 1 m; masses are in kg, not in g"),
+    ],
+)
+def test_a_number_that_is_perhaps_in_another_unit_is_told_and_taken_as_it_is(setting: str, said: str) -> None:
+    assert load(sets=[setting]).warnings == (f"--set {setting}: {said}",)
+
+
+def test_a_steep_slope_in_degrees_and_heavy_walkers_of_their_size_are_taken_without_a_word() -> None:
+    assert load(sets=["slope_deg=45"]).warnings == ()
+    large = ("walker.leg_length_m=10", "walker.foot_to_mass_m=5", "walker.leg_mass_kg=5000")
+    assert load(sets=large).warnings == ()
+
+
+def test_masses_of_parts_are_told_too() -> None:
+    (warning,) = load(sets=["walker.torso={mass_kg: 5000, above_hip_m: 0.3}"]).warnings
+    assert "walker.torso.mass_kg is 5000 kg" in warning

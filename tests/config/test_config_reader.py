@@ -114,7 +114,7 @@ def test_a_text_without_content_is_nothing(text: str) -> None:
         ("a: 1\n---\nb: 2\n", "f.yaml:2:1", "a second document"),
         ("%YAML 1.1\n---\na: no\n", "f.yaml:2:1", "YAML 1.2"),
         ("? [a, b]\n: 1\n", "f.yaml:1:3", "a key is a word"),
-        ("a:\n\t- 1\n", "f.yaml:2:1", "not YAML"),
+        ("a:\n\t- 1\n", "f.yaml:2:1", "a tab"),
         ("a: {b: 1\n", "f.yaml:2:1", "not YAML"),
         ("a: 1\n  b: 2\n", "f.yaml:2:4", "not YAML"),
         ("a: 1\nb: \x00\n", "f.yaml:2:4", "\\x00 cannot be in a config"),
@@ -159,3 +159,8 @@ def test_any_text_is_read_or_refused(text: str) -> None:
 @given(st.text(alphabet="[]{}:,-?&*!|>'\"%@`# \n\t~ab1.", max_size=60))
 def test_any_punctuation_is_read_or_refused(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")
+
+
+def test_a_tab_is_told_in_words() -> None:
+    with pytest.raises(ConfigError, match=r"^mine\.yaml:2:1: a tab: YAML is indented by spaces"):
+        read("walker:\n\ttype: compass\n", "mine.yaml")

@@ -10,7 +10,9 @@ from pydantic import ValidationError
 
 from walkerlab.config import schema
 from walkerlab.config.fields import Block, extra, leaves
+from walkerlab.config.loader import load
 from walkerlab.config.schema import METHODS, CompassWalker, Config, Contact, SolverSettings
+from walkerlab.errors import ConfigError
 
 
 def admits(block: type[Block], **values: Any) -> bool:
@@ -191,3 +193,10 @@ def test_a_key_left_out_is_the_same_quantity_in_either_units(exponent: float) ->
 def test_numbers_in_si_are_taken_as_they_are() -> None:
     law = Contact(units="si", stiffness=1e5, exponent=1.0, damping=90.0).in_si()
     assert (law.stiffness_N_per_m_e, law.damping_N_s_m, law.full_damping_penetration_m) == (1e5, 90.0, 1e-4)
+
+
+@pytest.mark.parametrize(("key", "meant"), [("walker.nonsense", ""), ("walker.slope_rad", "; did you mean slope_rad?")])
+def test_a_key_that_walkers_have_not_is_not_taken_for_a_like_one_of_another_block(key: str, meant: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load(sets=[f"{key}=1"])
+    assert caught.value.message.startswith(f"--set {key}=1: {key}: unknown key (1){meant or '; allowed'}")

@@ -213,6 +213,12 @@ def test_a_walk_that_ends_before_its_first_step_is_an_answer_that_can_be_stored(
     np.testing.assert_array_equal(stored, content["trajectory"]["angle"])
 
 
+def test_straight_legs_that_scuff_on_a_plane_are_told_what_to_do():
+    content = run("contact.terrain=plane", "outputs=[]")
+    assert content.summary["outcome"] != "walked"
+    assert "contact.terrain: after-mid-swing" in content.summary["advice"]
+
+
 def test_a_start_of_ones_own_needs_no_gait_where_the_pads_do_not():
     """The step that pads and steps are measured by is then that of the start itself."""
     content = run("start=[-0.2042, 0.1694, -0.6, -0.86]", "contact.pad_pitch=0.3714", "outputs=[]", inputs=())

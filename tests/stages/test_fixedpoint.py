@@ -1,10 +1,12 @@
 """The fixedpoint stage: what it stores and says, for slopes with and without a gait."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
@@ -82,6 +84,11 @@ def test_another_seed_finds_the_same_gait(paper):
     other = run(seed=7)
     assert other.summary["state"] == pytest.approx(paper.summary["state"], abs=1e-12)
     assert other.summary["random_hits"] != paper.summary["random_hits"]
+
+
+@pytest.mark.parametrize(("slope", "advised"), [(0.009, "Try a steeper slope"), (0.3, "Try a gentler slope")])
+def test_a_walker_with_knees_is_told_on_which_side_of_its_gaits_the_slope_is(slope, advised):
+    assert fixedpoint.advice(load(Path("kneed"), [f"slope_rad={slope}"]).config).startswith(advised)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import contextlib
 import errno
 import json
 import os
-import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -14,14 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.errors import StoppedError, StorageError, WalkerlabError
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError, to_type_back
 from walkerlab.stopping import raise_on
 
 if TYPE_CHECKING:
     from walkerlab.cli.request import Request
 
-ADVISED = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
-"""A command in a text, unless it is about no run."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -72,11 +69,6 @@ def say(error: WalkerlabError, typed: str = "") -> None:
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
         print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
-
-
-def to_type_back(text: str, typed: str) -> str:
-    """A text with the options that say which run it is about in the commands that it advises."""
-    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
 def failed(name: str, request: Request, error: WalkerlabError) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
+from typer.core import TyperCommand
 
 from walkerlab.cli.console import Console
 
@@ -168,6 +169,28 @@ OF_TALK = ("as_json", "quiet", "verbose")
 """The options that say how much is printed, and how."""
 
 
+class KeysAreNoOptions(TyperCommand):
+    """A command that says how a key of the config is changed where somebody types it as an option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options; an option that there is not is told with the `--set` of the key that it names, if any."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:  # click's NoSuchOption, which each version of typer has in another place
+            typed = str(getattr(error, "option_name", ""))
+            key = key_of_option(typed) if any(option.name == "sets" for option in self.params) else None
+            if key is not None:
+                said = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
+                error.message = said  # type: ignore[attr-defined]
+            raise
+
+
+def key_of_option(typed: str) -> str | None:
+    """The key of a config that somebody has typed as an option; None if it is no key."""
+    name = typed.lstrip("-").replace("-", "_")
+    return next((key for key in keys_to_vary("") if name in (key, key.rpartition(".")[2])), None) if name else None
+
+
 def command(
     app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, without: Collection[str] = ()
 ) -> Callable[[F], F]:
@@ -188,7 +211,7 @@ def command(
         options = [one for one in own if one.name not in without] + [SHARED[field] for field in shared]
         by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in options]
         run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
-        app.command(name or function.__name__, help=purpose or inspect.getdoc(function))(run)
+        app.command(name or function.__name__, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function
 
     return register

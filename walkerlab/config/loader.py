@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
 from walkerlab.config.layers import ConfigSetting, option_setting, parse_settings, stacked, with_settings
@@ -17,6 +19,11 @@ from walkerlab.config.run_name import run_name
 from walkerlab.config.schema import CompassWalker, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
 from walkerlab.config.validation import typed
+
+STEEP_RAD: Final = 0.5
+"""No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""
+HEAVY_KG_M3: Final = 1000.0
+"""A mass above that of a cube of water as wide as the legs are long is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +115,8 @@ def template(
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
     folder = name or run_name(base, changed, degrees, None if run is None else run.name)
-    warnings = (*_renamed(tree, file), *_left_behind(config, changed_tree), *warnings)
+    own = (*_renamed(tree, file), *_left_behind(config, changed_tree), *_in_other_units(config, changed_tree))
+    warnings = (*own, *warnings)
     return Template(LoadedConfig(config, folder, warnings, file.label), changed_tree)
 
 
@@ -134,6 +142,36 @@ def _renamed(tree: Mapping, file: ConfigFile) -> tuple[str, ...]:
     if not isinstance(name, Scalar) or name.position != Position(file.label, 1, 1) or name.value == file.path.stem:
         return ()
     return (f"{file.label}: the run is named {name.value}, since a run folder cannot be named as the file is",)
+
+
+def _in_other_units(config: Config, tree: Mapping) -> tuple[str, ...]:
+    """That a slope is perhaps meant in degrees, and masses in grams."""
+    found = []
+    slope = tree.keys.get("slope_rad")
+    if slope is not None and abs(config.slope_rad) > STEEP_RAD:
+        degrees = short(round(math.degrees(config.slope_rad), 1))
+        found.append(f"{slope}: slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees")
+    block = tree.entries.get("walker")
+    places = block.keys if isinstance(block, Mapping) else {}
+    heavy = HEAVY_KG_M3 * config.walker.leg_length_m**3
+    for key, mass in masses("walker", config.walker.model_dump(mode="json")):
+        if mass > heavy:
+            given = places.get(key.split(".")[1], tree.position)
+            legs = f"legs of {short(config.walker.leg_length_m)} m"
+            found.append(f"{given}: {key} is {short(mass)} kg on {legs}; masses are in kg, not in g")
+    return tuple(found)
+
+
+def masses(key: str, value: Any) -> Iterator[tuple[str, float]]:
+    """The masses (kg) in a block, with their keys."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from masses(f"{key}.{name}", inner)
+    elif isinstance(value, list):
+        for place, inner in enumerate(value):
+            yield from masses(f"{key}.{place}", inner)
+    elif key.endswith("mass_kg") and isinstance(value, int | float):
+        yield key, float(value)
 
 
 def _left_behind(config: Config, tree: Mapping) -> tuple[str, ...]:

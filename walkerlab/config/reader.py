@@ -78,6 +78,8 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
+        if r"'\t'" in str(reason):
+            raise refusal([Problem(where, "a tab: YAML is indented by spaces")], "Replace tabs by spaces.") from None
         raise refusal([Problem(where, f"not YAML: {shown(str(reason))}")]) from None
 
 

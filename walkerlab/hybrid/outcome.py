@@ -32,6 +32,11 @@ class Outcome(IntEnum):
         """Whether the question was answered: a walker that falls is an answer, a failed solver is not."""
         return self not in (Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
 
+    @property
+    def stumbled(self) -> bool:
+        """Whether the walker itself could not go on."""
+        return self.answered and self not in (Outcome.WALKED, Outcome.REJECTED)
+
 
 ADVICE = {
     Outcome.WALKED: "The walker took every step it was asked for.",
@@ -44,8 +49,8 @@ ADVICE = {
     "velocity.",
     Outcome.NO_HEEL_STRIKE: "The swing foot did not come down within ten pendulum times; the start is far from "
     "walking.",
-    Outcome.BUDGET_EXHAUSTED: "The run used up its right-hand sides; loosen solver.*.rtol, soften the contact, or ask "
-    "for fewer strides.",
+    Outcome.BUDGET_EXHAUSTED: "The run exhausted its evaluation budget; loosen solver.*.rtol, soften the contact, "
+    "or ask for fewer strides.",
     Outcome.SOLVER_FAILED: "The step size fell to rounding, or the energy balance does not close; choose another "
     "solver.*.rtol or solver.*.method.",
     Outcome.BENT_KNEE: "A foot came down on a knee that had not locked; start nearer to a gait (start: fixed-point), "

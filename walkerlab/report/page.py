@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from walkerlab.config.schema import Source
+from walkerlab.errors import to_type_back
 from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.symbols import CARET, POWER, power, raised
 
@@ -30,6 +32,7 @@ class Page:
     study     what is redone; None if that is not said
     redone    how the scene stands to that study, in a word or two
     pending   the results that are still being computed
+    run       name of the run, for commands that the page advises; empty for the run that these have without options
     """
 
     title: str
@@ -39,6 +42,7 @@ class Page:
     study: Source | None = None
     redone: str = "Redoes"
     pending: tuple[str, ...] = ()
+    run: str = ""
 
 
 def render(page: Page) -> str:
@@ -51,7 +55,7 @@ def render(page: Page) -> str:
         raise ValueError(f"two sections of the report have one anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     return (
-        environment()
+        environment(page.run)
         .get_template("page.html.j2")
         .render(
             page=page,
@@ -89,8 +93,8 @@ def render_sweep(page: SweepPage) -> str:
     return environment().get_template("sweep.html.j2").render(page=page, figure=figure)
 
 
-def environment() -> Environment:
-    """Where templates are found, and that every text is escaped."""
+def environment(run: str = "") -> Environment:
+    """Where templates are found, that every text is escaped, and which run it is about."""
     made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -98,7 +102,8 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters["said"] = said
+    options = f" -c {shlex.quote(run)}" if run else ""
+    made.filters["said"] = lambda text: said(to_type_back(text, options))
     return made
 
 

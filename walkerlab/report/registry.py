@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.report.blocks import MAIN, Section
@@ -70,12 +71,11 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
         place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
         main.insert(place, links)
     redone = "After" if results.departures else "Redoes"
-    title = f"Passive walking: {run}"
-    report = Page(
-        title, tuple(main), (lead(results.config, run),), MAIN, results.config.source, redone, results.pending
-    )
+    of_run = "" if run == DEFAULT else run
+    title, source = f"Passive walking: {run}", results.config.source
+    report = Page(title, tuple(main), (lead(results.config, run),), MAIN, source, redone, results.pending, of_run)
     beside = (
-        Page(f"{name} · {run}", found, file=file)
+        Page(f"{name} · {run}", found, file=file, run=of_run)
         for file, name in closing.TITLES.items()
         if (found := closing.on(file, sections))
     )

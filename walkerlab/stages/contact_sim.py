@@ -43,6 +43,10 @@ BUDGET_PER_STEP = 1_000_000  # right-hand sides
 SAMPLES_PER_PENDULUM_TIME = 200
 RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
+SCUFFED = (
+    "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
+    "contact.terrain: after-mid-swing, or checkerboard."
+)
 Floats = NDArray[np.float64]
 
 
@@ -68,7 +72,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     if not result.outcome.answered:
         raise NoAnswer(
             f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
-            result.advice,
+            said["advice"],
             partial=Content(stored, said),
         )
     if again:
@@ -137,7 +141,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
     """What the command prints."""
     return {
         "outcome": result.outcome.label,
-        "advice": result.advice,
+        "advice": advice(config, scene, result),
         **numbers_of_steps(result.touch_time_s, result.periods_s, result.lengths_m, knee_strikes(scene, result)),
         "end_time_s": result.end_time_s,
         "max_penetration_m": result.max_penetration_m,
@@ -156,6 +160,14 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         **scene_measures(scene),
         "left_out": list(of_contact_walk(config)),
     }
+
+
+def advice(config: ContactConfig, scene: ContactScene, result: ContactWalkResult) -> str:
+    """What the outcome means and what to try next; straight legs on a plane have a reason of their own to end."""
+    on_plane = config.contact is not None and config.contact.terrain == "plane"
+    if on_plane and result.outcome.stumbled and not isinstance(scene.walker.knees, Knees):
+        return SCUFFED
+    return result.advice
 
 
 def mean_of(values: Floats) -> float | None:
