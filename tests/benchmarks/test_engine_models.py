@@ -174,8 +174,7 @@ def test_a_touch_between_two_steps_is_that_of_the_cubic():
     def velocity(t):
         return -(1.0 + t + 3.0 * t * t) + (touch - t) * (1.0 + 6.0 * t)
 
-    before, now = [0.0, height(0.0), 0.0, velocity(0.0)], [0.0, height(h), 0.0, velocity(h)]
-    assert h * crossing(before, now, h) == pytest.approx(touch, abs=1e-15)
+    assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
 
 
 def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():

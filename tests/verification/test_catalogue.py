@@ -5,8 +5,7 @@ import pytest
 from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
 from walkerlab.verification.catalogue import config_of, shipped, without_doubles
-from walkerlab.verification.cells import CaseCell
-from walkerlab.verification.judge import judge
+from walkerlab.verification.judge import CaseCell, judge
 from walkerlab.verification.starts import HEIGHT, prepared
 
 CASES = {case.name: case for case in shipped()}

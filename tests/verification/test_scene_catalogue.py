@@ -17,7 +17,7 @@ from walkerlab.stages.identity import Identities
 from walkerlab.stages.known_problems import known_of, known_row
 from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
-from walkerlab.verification.cells import CaseCell
+from walkerlab.verification.judge import CaseCell
 from walkerlab.verification.known import Known
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import TwinScale, scaled, to_twin

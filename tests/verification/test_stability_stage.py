@@ -14,8 +14,7 @@ from walkerlab.report.sections.stability import section
 from walkerlab.report.tables import Table
 from walkerlab.stages.stability import cases_group, known_group, summary_of, verdict
 from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.cells import CaseCell, cells_of, run_cells
-from walkerlab.verification.judge import judge
+from walkerlab.verification.judge import CaseCell, judge, run_cells
 from walkerlab.verification.known import Known
 from walkerlab.verification.starts import prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
@@ -97,7 +96,8 @@ def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_the
 def test_one_and_two_processes_find_the_same():
     cases = [case for case in shipped() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")]
     one, two = (
-        [replace(item, wall_s=0.0) for found in run_cells(cells_of(cases), jobs) for item in found] for jobs in (1, 2)
+        [replace(item, wall_s=0.0) for found in run_cells([*map(CaseCell, cases)], jobs) for item in found]
+        for jobs in (1, 2)
     )
     assert one == two
 
@@ -121,10 +121,7 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
             "cases.yaml:4:26: start: case x starts with its feet together",
         ),
         ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),
-        (
-            "- {name: x, expected: [walked], reason: mine, budgett: 3}\n",
-            "cases.yaml:1:47: .*cases.budgett: .*mean",
-        ),
+        ("- {name: x, expected: [walked], reason: mine, budgett: 3}\n", "cases.yaml:1:47: .*cases.budgett: .*mean"),
         (
             "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    walker: {leg_mas_kg: 3}\n",
             "cases.yaml:5:14: walker.leg_mas_kg: unknown key .3.; did you mean walker.leg_mass_kg",

@@ -121,16 +121,16 @@ class ContactTrial:
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
-        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget)
-        return lambda: self._walk(tolerances)
-
-    def _walk(self, tolerances: Tolerances) -> TrialRun:
         from walkerlab.hybrid.contact_run import walk_contact
 
-        result = walk_contact(
-            self.walker, self.ground, None, self.stance, self.start, tolerances, self.steps, None, track_energy=False
-        )
-        return finished(result.outcome, np.array(result.end_state), result.work)
+        scene = self.walker, self.ground, None, self.stance, self.start
+        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget)
+
+        def run() -> TrialRun:
+            result = walk_contact(*scene, tolerances, self.steps, None, track_energy=False)
+            return finished(result.outcome, np.array(result.end_state), result.work)
+
+        return run
 
 
 def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:

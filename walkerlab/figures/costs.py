@@ -16,22 +16,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
+from walkerlab.figures import style
 from walkerlab.figures.canvas import blank, entry, legend_above
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
-from walkerlab.figures.style import (
-    BLACK,
-    BLUE,
-    CONTACT,
-    GREEN,
-    GREY,
-    NARROW_BELOW,
-    ORANGE,
-    PALE,
-    PURPLE,
-    RIGID,
-    VERMILLION,
-    Look,
-)
 from walkerlab.figures.walk_figures import TUNE_STAGE
 from walkerlab.figures.walks import Array, redoes_the_paper
 from walkerlab.paper.printed import ANGLE_ERROR
@@ -48,24 +35,24 @@ def decades(axes: Axes) -> None:
     """A logarithmic axis of errors with a label at every decade, or at fewer where letters would meet."""
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(
-        LogLocator(numticks=20 if axes.figure.bbox.width > NARROW_BELOW * axes.figure.dpi else 8)
+        LogLocator(numticks=20 if axes.figure.bbox.width > style.NARROW_BELOW * axes.figure.dpi else 8)
     )
     axes.yaxis.set_minor_locator(NullLocator())
 
 
 LOOKS = {
-    "dop853": Look("dop853", BLUE, "-", 1.8, "o", order=5),
-    "radau5": Look("radau5", VERMILLION, "-", 1.8, "s", order=5),
-    "scipy-rk45": Look("scipy-rk45", GREEN, DASHED, 1.0, "v"),
-    "scipy-dop853": Look("scipy-dop853", BLUE, DASHED, 1.0, "o"),
-    "scipy-lsoda": Look("scipy-lsoda", ORANGE, DASHED, 1.0, "^"),
-    "scipy-radau": Look("scipy-radau", VERMILLION, DASHED, 1.0, "s"),
-    "scipy-bdf": Look("scipy-bdf", PURPLE, DASHED, 1.0, "D"),
-    "cvode-bdf": Look("cvode-bdf", PURPLE, DOTTED, 1.0, "d"),
-    "cvode-adams": Look("cvode-adams", GREEN, DOTTED, 1.0, "<"),
-    "scipy-dop853-numpy": Look("scipy-dop853-numpy", GREY, DOTTED, 1.2, "P"),
+    "dop853": style.Look("dop853", style.BLUE, "-", 1.8, "o", order=5),
+    "radau5": style.Look("radau5", style.VERMILLION, "-", 1.8, "s", order=5),
+    "scipy-rk45": style.Look("scipy-rk45", style.GREEN, DASHED, 1.0, "v"),
+    "scipy-dop853": style.Look("scipy-dop853", style.BLUE, DASHED, 1.0, "o"),
+    "scipy-lsoda": style.Look("scipy-lsoda", style.ORANGE, DASHED, 1.0, "^"),
+    "scipy-radau": style.Look("scipy-radau", style.VERMILLION, DASHED, 1.0, "s"),
+    "scipy-bdf": style.Look("scipy-bdf", style.PURPLE, DASHED, 1.0, "D"),
+    "cvode-bdf": style.Look("cvode-bdf", style.PURPLE, DOTTED, 1.0, "d"),
+    "cvode-adams": style.Look("cvode-adams", style.GREEN, DOTTED, 1.0, "<"),
+    "scipy-dop853-numpy": style.Look("scipy-dop853-numpy", style.GREY, DOTTED, 1.2, "P"),
 }
-OTHERS = Look("", BLACK, DOTTED, 1.0, "*")
+OTHERS = style.Look("", style.BLACK, DOTTED, 1.0, "*")
 METHOD_VARIABLES = ("method", "tolerance", "reached", "error", "wall_s", "rhs_evaluations", "outcome")
 SMALLEST = 1e-17  # below any floor
 FAILED = 30.0  # where failures are drawn, in terms of the largest error
@@ -75,7 +62,7 @@ FAILED = 30.0  # where failures are drawn, in terms of the largest error
 class MethodSeries:
     """One method's runs on a scene, from loose to tight tolerance."""
 
-    look: Look
+    look: style.Look
     runs: Mapping[str, Array]
 
     @property
@@ -95,7 +82,7 @@ def series_of(scene: str, results: Results) -> Iterator[MethodSeries]:
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
-        look = LOOKS.get(name, Look(name, OTHERS.colour, OTHERS.style, OTHERS.width, OTHERS.marker))
+        look = LOOKS.get(name, style.Look(name, OTHERS.colour, OTHERS.style, OTHERS.width, OTHERS.marker))
         yield MethodSeries(look, {variable: rows[variable][methods == name] for variable in METHOD_VARIABLES})
 
 
@@ -115,7 +102,7 @@ def plot_methods(scene: str, results: Results) -> Figure:
     panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides (1)"))
     for axes, cost, label in panels:
         axes.set(xscale="log", xlabel=label)
-        axes.axhspan(SMALLEST, floor, color=PALE, zorder=0)
+        axes.axhspan(SMALLEST, floor, color=style.PALE, zorder=0)
         for one in every:
             draw_method(axes, one, one.runs[cost].astype(float), floor, failed)
         decades(axes)
@@ -137,8 +124,8 @@ def draw_method(axes: Axes, one: MethodSeries, cost: Array, floor: float, failed
 def entries(every: Sequence[MethodSeries], floor: float) -> list[Line2D]:
     """The legend: methods, failures, and what is below the reference's own uncertainty."""
     methods = [entry(one.look.label, **one.line) for one in every]
-    cross = entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0)
-    known = entry(f"reference unsure, {floor:.0e}", color=PALE, linewidth=6.0)
+    cross = entry("end not reached", color=style.BLACK, linestyle="none", marker="x", markersize=5.0)
+    known = entry(f"reference unsure, {floor:.0e}", color=style.PALE, linewidth=6.0)
     return [*methods, *([] if all(one.reached.all() for one in every) else [cross]), known]
 
 
@@ -168,8 +155,8 @@ ACCURACY = tuple(methods_on(scene) for scene in ("rigid", "contact", "contact-ne
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
 OF_A_SERIES = ("step_s", "error", "wall_s", "period_s", "outcome")
 ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *OF_A_SERIES)
-COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
-OTHER_ENGINES = (ORANGE, PURPLE, GREY)
+COLOURS = {OURS: style.BLACK, "mujoco": style.VERMILLION, "drake": style.BLUE, "exudyn": style.GREEN}
+OTHER_ENGINES = (style.ORANGE, style.PURPLE, style.GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2, 1.0, 1.2)), (0.0, (2.0, 2.0)))
 
@@ -261,9 +248,9 @@ def plot_periods(scene: str, results: Results) -> Figure:
     for one in every:
         draw_engine(axes, one, "step_s", np.where(one.walked, one.runs["period_s"], np.nan))
     reference = results[ENGINES_STAGE].summary["reference"][scene]
-    levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
+    levels = [axes.axhline(reference["period_s"], color=style.CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
-        level, look = reference["rigid_period_s"], RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
+        level, look = reference["rigid_period_s"], style.RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
         levels.append(axes.axhline(level, **look, label="rigid gait"))
     few_ticks(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
@@ -315,10 +302,10 @@ ALIGNED, VELOCITY, RAW = "angle_error_rad", "velocity_error_rad_s", "raw_angle_e
 NUMERICAL, WALL = "numerical_time_s", "wall_s"
 LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
 ERRORS: Final = (
-    (RAW, Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v")),
-    (ALIGNED, Look("angle in phase (rad)", BLUE, "-", 1.6, "o")),
-    (VELOCITY, Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s")),
-    (NUMERICAL, Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x")),
+    (RAW, style.Look("angle at the same time (rad)", style.VERMILLION, ":", 1.2, "v")),
+    (ALIGNED, style.Look("angle in phase (rad)", style.BLUE, "-", 1.6, "o")),
+    (VELOCITY, style.Look("angular velocity in phase (rad/s)", style.ORANGE, "--", 1.4, "s")),
+    (NUMERICAL, style.Look("numerical error, last touch (s)", style.GREY, "-.", 1.0, "x")),
 )
 LIMIT = (
     Need(
@@ -338,13 +325,15 @@ def plot_limit(results: Results) -> Figure:
     for axes, (rows, title) in zip(both, found, strict=True):
         draw_limit(axes, rows)
         if redoes_the_paper(results):
-            axes.axhline(ANGLE_ERROR.value, color=BLACK, linestyle=CLAIM, linewidth=1.0)
+            axes.axhline(ANGLE_ERROR.value, color=style.BLACK, linestyle=CLAIM, linewidth=1.0)
         axes.set(title=title, xlabel="run time of the walk (s)")
     both[0].set_ylabel("error")
     key: list[Artist] = [entry(look.label, **look.line, marker=look.marker, markersize=4) for _, look in ERRORS]
     if redoes_the_paper(results):
-        key.append(entry("the paper's claim", color=BLACK, linestyle=CLAIM, linewidth=1.0))
-    key.append(entry("the config's contact", color=BLACK, linestyle="", marker="o", markersize=9, fillstyle="none"))
+        key.append(entry("the paper's claim", color=style.BLACK, linestyle=CLAIM, linewidth=1.0))
+    key.append(
+        entry("the config's contact", color=style.BLACK, linestyle="", marker="o", markersize=9, fillstyle="none")
+    )
     legend_above(figure, key)
     return figure
 
@@ -363,7 +352,7 @@ def draw_limit(axes: Axes, rows: Group) -> None:
         values = np.maximum(np.abs(rows[name]), LEAST)
         axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
         if name != NUMERICAL:
-            axes.plot(rows[WALL][:1], values[:1], "o", markersize=9, color=BLACK, fillstyle="none")
+            axes.plot(rows[WALL][:1], values[:1], "o", markersize=9, color=style.BLACK, fillstyle="none")
     axes.set(xscale="log", yscale="log")
 
 

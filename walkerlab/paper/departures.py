@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Any, Final
 
@@ -36,10 +36,9 @@ def of_the_rigid_model(config: RigidConfig) -> Iterator[str]:
     if not isinstance(config.walker, CompassWalker):
         yield said("walker.type", config.walker.type, CompassWalker().type)
         return
-    yield from different(CompassWalker(), config.walker, leave_out=PHYSICAL_MODEL_ONLY)
-    gravity = Config.model_fields["gravity_m_s2"].default
-    if not same(config.gravity_m_s2, gravity):
-        yield said("gravity_m_s2", config.gravity_m_s2, gravity)
+    compass = [name for name in CompassWalker.model_fields if name not in PHYSICAL_MODEL_ONLY]
+    yield from different(config.walker, CompassWalker(), compass)
+    yield from different(config, Config(), ["gravity_m_s2"])
     slope, rounding = slope_of(*X_P[:2])
     if abs(config.slope_rad - slope) > rounding:
         yield said("slope_rad", config.slope_rad, slope)
@@ -47,31 +46,22 @@ def of_the_rigid_model(config: RigidConfig) -> Iterator[str]:
 
 def of_the_contact(walker: CompassWalker, contact: Contact) -> Iterator[str]:
     """Foot, force laws and terrain."""
-    paper = CompassWalker()
-    for name in PHYSICAL_MODEL_ONLY:
-        if not same(getattr(walker, name), getattr(paper, name)):
-            yield said(name, getattr(walker, name), getattr(paper, name))
-    laws, paper_laws = contact.in_si(), Contact().in_si()
-    for field in fields(laws):
-        if not same(getattr(laws, field.name), getattr(paper_laws, field.name)):
-            yield said(field.name, getattr(laws, field.name), getattr(paper_laws, field.name))
+    laws, paper = contact.in_si(), Contact()
+    yield from different(walker, CompassWalker(), PHYSICAL_MODEL_ONLY)
+    yield from different(laws, paper.in_si(), [field.name for field in fields(laws)])
     for name in LAWS:
-        if getattr(contact, name) != getattr(Contact(), name):
-            yield said(f"contact.{name}", getattr(contact, name), getattr(Contact(), name))
+        if getattr(contact, name) != getattr(paper, name):
+            yield said(f"contact.{name}", getattr(contact, name), getattr(paper, name))
 
 
-def different(paper: CompassWalker, used: CompassWalker, leave_out: tuple[str, ...]) -> Iterator[str]:
-    """Keys of the walker with another value."""
-    for name in CompassWalker.model_fields:
-        if name not in leave_out and not same(getattr(used, name), getattr(paper, name)):
+def different(used: Any, paper: Any, names: Iterable[str]) -> Iterator[str]:
+    """The names by which the two have different values."""
+    for name in names:
+        if not same(getattr(used, name), getattr(paper, name)):
             yield said(name, getattr(used, name), getattr(paper, name))
 
 
-def said(name: str, used: Any, paper: Any) -> str:
+def said(name: str, *values: Any) -> str:
     """A difference in words."""
-    return f"{name} {shown(used)} instead of {shown(paper)}"
-
-
-def shown(value: Any) -> str:
-    """A value in words."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    used, paper = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in values)
+    return f"{name} {used} instead of {paper}"

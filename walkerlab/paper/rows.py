@@ -4,37 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from walkerlab.paper import printed
 from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
 from walkerlab.paper.judged import JudgedNumber, NumberVerdict, agreement, judged, regardless, weigh
 from walkerlab.paper.measured import CYCLES, Measured
-from walkerlab.paper.printed import (
-    ANGLE_ERROR,
-    COORDINATES,
-    DAMPING,
-    DYNAMIC_FRICTION,
-    E_AVG,
-    EIGENVALUES,
-    FOOT_RADIUS,
-    LEG_INERTIA,
-    LOST_BALANCE,
-    RAISED,
-    STATIC_FRICTION,
-    STEP_LENGTH,
-    STIFFNESS,
-    STRIDES,
-    T_CYCLE,
-    T_LEFT,
-    T_RIGHT,
-    TABLE_1,
-    TABLE_2,
-    TABLE_3,
-    VELOCITY_DIFFERENCE,
-    VELOCITY_ERROR,
-    X_P,
-    Printed,
-    ResultRow,
-    StartRow,
-)
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
@@ -46,49 +19,49 @@ WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     """All rows, in the paper's order."""
     contact = measured.contact
-    for entry, parameter in zip(TABLE_1, WALKER_PARAMETERS, strict=True):
+    for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
         yield input_of_both(entry, float(getattr(measured.walker, parameter)), measured.departures.rigid)
-    for coordinate in range(len(COORDINATES)):
-        yield fixed_point_row(X_P[coordinate], coordinate, measured)
+    for coordinate in range(len(printed.COORDINATES)):
+        yield fixed_point_row(printed.X_P[coordinate], coordinate, measured)
     yield eigenvalue_row(measured)
-    yield input_of_both(LEG_INERTIA, measured.walker.leg_inertia, measured.departures.rigid)
-    yield input_of_contact(FOOT_RADIUS, contact.foot_radius * MM, measured)
-    yield unitless_row(STIFFNESS, contact.law.stiffness, measured)
-    yield unitless_row(DAMPING, contact.law.damping, measured)
-    yield input_of_contact(STATIC_FRICTION, contact.law.static_friction, measured)
-    yield input_of_contact(DYNAMIC_FRICTION, contact.law.dynamic_friction, measured)
+    yield input_of_both(printed.LEG_INERTIA, measured.walker.leg_inertia, measured.departures.rigid)
+    yield input_of_contact(printed.FOOT_RADIUS, contact.foot_radius * MM, measured)
+    yield unitless_row(printed.STIFFNESS, contact.law.stiffness, measured)
+    yield unitless_row(printed.DAMPING, contact.law.damping, measured)
+    yield input_of_contact(printed.STATIC_FRICTION, contact.law.static_friction, measured)
+    yield input_of_contact(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, measured)
     yield lost_balance_row(measured)
-    for entry, table_row in zip(RAISED, TABLE_2[2:], strict=True):
+    for entry, table_row in zip(printed.RAISED, printed.TABLE_2[2:], strict=True):
         yield raised_row(entry, table_row, measured)
-    for coordinate, table_row in enumerate(TABLE_2):
+    for coordinate, table_row in enumerate(printed.TABLE_2):
         yield fixed_point_row(table_row.matlab, coordinate, measured)
         yield adams_start_row(table_row.adams, coordinate, measured, study)
         yield percent_row(table_row, coordinate, measured)
     yield strides_row(measured)
-    yield error_row(ANGLE_ERROR, measured, study, "angle")
-    yield error_row(VELOCITY_ERROR, measured, study, "velocity")
+    yield error_row(printed.ANGLE_ERROR, measured, study, "angle")
+    yield error_row(printed.VELOCITY_ERROR, measured, study, "velocity")
     yield step_length_row(measured)
     yield velocity_difference_row(measured)
-    for result in TABLE_3:
+    for result in printed.TABLE_3:
         yield matlab_row(result, measured, study)
         yield adams_row(result, measured)
 
 
-def input_of_both(entry: Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
+def input_of_both(entry: printed.Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
     """A parameter of both models."""
     text = prose("evidence.input", value, entry.unit)
     verdict, evidence = weigh(value == entry.value, NumberVerdict.EXPLAINED, departures, text)
     return JudgedNumber(entry, value, value, value, verdict, evidence)
 
 
-def input_of_contact(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
+def input_of_contact(entry: printed.Printed, value: float, measured: Measured) -> JudgedNumber:
     """A parameter of the contact model alone."""
     agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
     text = prose("evidence.input", value, entry.unit)
     return judged(entry, {}, value, weigh(agrees, NumberVerdict.EXPLAINED, measured.departures.contact, text))
 
 
-def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> JudgedNumber:
+def fixed_point_row(entry: printed.Printed, coordinate: int, measured: Measured) -> JudgedNumber:
     """A coordinate of x_p."""
     values = {name: model.state[coordinate] for name, model in measured.models.items()}
     found = {name: agreement(entry, value) for name, value in values.items()}
@@ -101,12 +74,14 @@ def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> Judg
 def eigenvalue_row(measured: Measured) -> JudgedNumber:
     """Whether the gait is stable."""
     radii = measured.spectral_radii
-    stable = bool(radii) and all(radius < EIGENVALUES.value for radius in radii.values())
+    stable = bool(radii) and all(radius < printed.EIGENVALUES.value for radius in radii.values())
     text = prose("evidence.eigenvalue", radii)
-    return judged(EIGENVALUES, radii, None, weigh(stable, NumberVerdict.REFUTED, measured.departures.rigid, text))
+    return judged(
+        printed.EIGENVALUES, radii, None, weigh(stable, NumberVerdict.REFUTED, measured.departures.rigid, text)
+    )
 
 
-def unitless_row(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
+def unitless_row(entry: printed.Printed, value: float, measured: Measured) -> JudgedNumber:
     """Stiffness or damping, which are printed without a unit."""
     text = prose("evidence.unitless", measured.contact)
     return judged(entry, {}, value, weigh(False, NumberVerdict.EXPLAINED, measured.departures.contact, text))
@@ -116,11 +91,11 @@ def lost_balance_row(measured: Measured) -> JudgedNumber:
     """The failure from MATLAB's initial conditions."""
     steps, outcome = measured.contact.from_x_p
     right = None if measured.departures.rigid else measured.corrected
-    short = None if right is None else 100.0 * (1.0 - X_P[3].value / right.state[3])
+    short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
     text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
-    agrees = outcome != "walked" and steps == LOST_BALANCE.value
+    agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
     return judged(
-        LOST_BALANCE, {}, float(steps), weigh(agrees, NumberVerdict.REFUTED, measured.departures.contact, text)
+        printed.LOST_BALANCE, {}, float(steps), weigh(agrees, NumberVerdict.REFUTED, measured.departures.contact, text)
     )
 
 
@@ -138,16 +113,16 @@ def velocities_raised(measured: Measured) -> list[float | None]:
     return [raised_percent(measured, coordinate) for coordinate in (2, 3)]
 
 
-def raised_row(entry: Printed, table_row: StartRow, measured: Measured) -> JudgedNumber:
+def raised_row(entry: printed.Printed, table_row: printed.StartRow, measured: Measured) -> JudgedNumber:
     """An increase of a velocity that section 4 claims: arithmetic, whatever the config."""
     agrees = bool(agreement(entry, percent_of(table_row).of_matlab))
     verdict = NumberVerdict.REPRODUCED if agrees else NumberVerdict.REFUTED
     text = prose("evidence.raised", measured.contact, velocities_raised(measured))
     text = regardless(measured.departures.contact, text)
-    return judged(entry, {}, raised_percent(measured, TABLE_2.index(table_row)), (verdict, text))
+    return judged(entry, {}, raised_percent(measured, printed.TABLE_2.index(table_row)), (verdict, text))
 
 
-def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> JudgedNumber:
+def percent_row(table_row: printed.StartRow, coordinate: int, measured: Measured) -> JudgedNumber:
     """A percentage of Table 2: arithmetic, whatever the config."""
     entry, percent = table_row.percent, percent_of(table_row)
     agrees = bool(agreement(entry, percent.of_matlab))
@@ -157,7 +132,7 @@ def percent_row(table_row: StartRow, coordinate: int, measured: Measured) -> Jud
     return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
 
 
-def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
+def adams_start_row(entry: printed.Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
     """A coordinate of the ADAMS start: what it is, whatever the config, and what ours was."""
     start = measured.contact.start
     value = None if start is None else start[coordinate]
@@ -174,17 +149,20 @@ def strides_row(measured: Measured) -> JudgedNumber:
     strides = {name: float(model.steps // STEPS_OF_A_STRIDE) for name, model in models.items()}
     done = contact.steps // STEPS_OF_A_STRIDE
     went_on = contact.outcome == "walked"
-    text = prose("evidence.strides", contact, done, went_on and done < STRIDES.value)
+    text = prose("evidence.strides", contact, done, went_on and done < printed.STRIDES.value)
     otherwise = NumberVerdict.EXPLAINED if went_on else NumberVerdict.REFUTED
     return judged(
-        STRIDES, strides, float(done), weigh(done >= STRIDES.value, otherwise, measured.departures.contact, text)
+        printed.STRIDES,
+        strides,
+        float(done),
+        weigh(done >= printed.STRIDES.value, otherwise, measured.departures.contact, text),
     )
 
 
-def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
+def error_row(entry: printed.Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
     """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config."""
     errors = measured.errors
-    late = abs(T_LEFT.matlab.value - T_LEFT.adams.value)
+    late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
     off = study.fastest * late if which == "angle" else study.largest_jump
     ways = {
         "raw": "at the same time",
@@ -208,8 +186,10 @@ def step_length_row(measured: Measured) -> JudgedNumber:
     contact = measured.contact.step_length
     found = [*lengths.values(), *([] if contact is None else [contact])]
     text = prose("evidence.step_length", lengths, contact, max(found, default=None))
-    agrees = any(agreement(STEP_LENGTH, length) for length in lengths.values())
-    return judged(STEP_LENGTH, lengths, contact, weigh(agrees, NumberVerdict.REFUTED, measured.departures.rigid, text))
+    agrees = any(agreement(printed.STEP_LENGTH, length) for length in lengths.values())
+    return judged(
+        printed.STEP_LENGTH, lengths, contact, weigh(agrees, NumberVerdict.REFUTED, measured.departures.rigid, text)
+    )
 
 
 def velocity_difference_row(measured: Measured) -> JudgedNumber:
@@ -220,32 +200,35 @@ def velocity_difference_row(measured: Measured) -> JudgedNumber:
         rigid = model.table_3.v_com
         if rigid and contact is not None:
             found[name] = 100.0 * abs(contact - rigid) / abs(rigid)
-    sums = speed_difference(T_LEFT.matlab.value + T_RIGHT.matlab.value, T_LEFT.adams.value + T_RIGHT.adams.value)
-    printed = speed_difference(T_CYCLE.matlab.value, T_CYCLE.adams.value)
-    text = regardless(measured.departures.contact, prose("evidence.velocity_difference", found, printed, sums))
-    agrees = bool(found) and max(found.values()) < VELOCITY_DIFFERENCE.value
-    refuted = NumberVerdict.REFUTED if sums >= VELOCITY_DIFFERENCE.value else NumberVerdict.EXPLAINED
+    sums = speed_difference(
+        printed.T_LEFT.matlab.value + printed.T_RIGHT.matlab.value,
+        printed.T_LEFT.adams.value + printed.T_RIGHT.adams.value,
+    )
+    by_cycle = speed_difference(printed.T_CYCLE.matlab.value, printed.T_CYCLE.adams.value)
+    text = regardless(measured.departures.contact, prose("evidence.velocity_difference", found, by_cycle, sums))
+    agrees = bool(found) and max(found.values()) < printed.VELOCITY_DIFFERENCE.value
+    refuted = NumberVerdict.REFUTED if sums >= printed.VELOCITY_DIFFERENCE.value else NumberVerdict.EXPLAINED
     verdict = NumberVerdict.REPRODUCED if agrees else refuted
-    return judged(VELOCITY_DIFFERENCE, found, None, (verdict, text))
+    return judged(printed.VELOCITY_DIFFERENCE, found, None, (verdict, text))
 
 
-def columns(entry: ResultRow, measured: Measured) -> tuple[dict[str, float], float | None]:
+def columns(entry: printed.ResultRow, measured: Measured) -> tuple[dict[str, float], float | None]:
     """Ours for a row of Table 3: of each set of equations, and of the contact model."""
     found = {name: getattr(model.table_3, entry.name) for name, model in measured.models.items()}
     rigid = {name: value for name, value in found.items() if value is not None}
     return rigid, getattr(measured.contact.table_3, entry.name)
 
 
-def names_of(entry: ResultRow) -> tuple[str, ...]:
+def names_of(entry: printed.ResultRow) -> tuple[str, ...]:
     """The entries that a row's evidence has; of the step periods both, as they have one cause."""
-    return ("t_left", "t_right") if entry in (T_LEFT, T_RIGHT) else (entry.name,)
+    return ("t_left", "t_right") if entry in (printed.T_LEFT, printed.T_RIGHT) else (entry.name,)
 
 
-def matlab_row(entry: ResultRow, measured: Measured, study: PaperStudy) -> JudgedNumber:
+def matlab_row(entry: printed.ResultRow, measured: Measured, study: PaperStudy) -> JudgedNumber:
     """A number of Table 3's MATLAB column against the rigid model."""
     rigid, contact = columns(entry, measured)
-    means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is E_AVG else {}
-    taken = [steps for steps, mean in means.items() if agreement(E_AVG.matlab, mean)]
+    means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is printed.E_AVG else {}
+    taken = [steps for steps, mean in means.items() if agreement(printed.E_AVG.matlab, mean)]
     # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
     otherwise = NumberVerdict.EXPLAINED if taken else NumberVerdict.REFUTED
     text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
@@ -253,7 +236,7 @@ def matlab_row(entry: ResultRow, measured: Measured, study: PaperStudy) -> Judge
     return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
 
 
-def adams_row(entry: ResultRow, measured: Measured) -> JudgedNumber:
+def adams_row(entry: printed.ResultRow, measured: Measured) -> JudgedNumber:
     """A number of Table 3's ADAMS column against the contact model."""
     rigid, contact = columns(entry, measured)
     text = prose("evidence.adams", entry, measured, names_of(entry))

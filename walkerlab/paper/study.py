@@ -8,32 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.paper import measured, printed
 from walkerlab.paper.adams_start import AdamsStart, adams_start
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
-from walkerlab.paper.measured import (
-    ENERGY_STEPS,
-    TIGHT,
-    Characteristics,
-    RigidModel,
-    characteristics,
-    five_cycles,
-    rigid_model,
-)
 from walkerlab.paper.misprints import (
     MISPRINTED,
     fixed_point,
     foothold_speed_after_impact,
     height_over_slope,
     inertia_at_impact,
-)
-from walkerlab.paper.printed import (
-    SIGNS,
-    TABLE_2,
-    X_P,
-    adams_start_as_printed,
-    fixed_point_as_printed,
-    slope_of,
-    walker_of_the_paper,
 )
 from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
@@ -78,9 +61,9 @@ class PaperStudy:
 
     slope: float
     slope_rounding: float
-    as_printed: RigidModel
-    corrected: RigidModel
-    from_x_p: Characteristics
+    as_printed: measured.RigidModel
+    corrected: measured.RigidModel
+    from_x_p: measured.Characteristics
     five_steps_energy: float
     fastest: float
     largest_jump: float
@@ -91,37 +74,40 @@ class PaperStudy:
     @property
     def angles_in_words(self) -> str:
         """On which slopes the feet of the ADAMS start and of x_p stand."""
-        return prose("adams_start.angles", self, slope_of(TABLE_2[0].adams, TABLE_2[1].adams)[1])
+        return prose(
+            "adams_start.angles", self, printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)[1]
+        )
 
 
 def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
-    printed, right = walker_of_the_paper(AS_PRINTED), walker_of_the_paper(CORRECTED)
-    gaits = {name: settled(walker_of_the_paper(sign)) for name, sign in SIGNS.items()}
-    one_step = take_walk(assembled(printed), TIGHT, gaits["as-printed"], 1, sampled=True)
-    cycles = five_cycles(printed, fixed_point_as_printed())
-    five_steps = take_walk(assembled(printed), TIGHT, fixed_point_as_printed(), ENERGY_STEPS)
-    slope, rounding = slope_of(*X_P[:2])
+    wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
+    gaits = {name: settled(printed.walker_of_the_paper(sign)) for name, sign in printed.SIGNS.items()}
+    one_step = take_walk(assembled(wrong), measured.TIGHT, gaits["as-printed"], 1, sampled=True)
+    cycles = measured.five_cycles(wrong, printed.fixed_point_as_printed())
+    five_steps = take_walk(assembled(wrong), measured.TIGHT, printed.fixed_point_as_printed(), measured.ENERGY_STEPS)
+    slope, rounding = printed.slope_of(*printed.X_P[:2])
     return PaperStudy(
         slope=slope,
         slope_rounding=rounding,
-        as_printed=rigid_model(printed, gaits["as-printed"]),
-        corrected=rigid_model(right, gaits["corrected"]),
-        from_x_p=characteristics(cycles.periods, cycles.lengths, cycles.mean_energy),
+        as_printed=measured.rigid_model(wrong, gaits["as-printed"]),
+        corrected=measured.rigid_model(right, gaits["corrected"]),
+        from_x_p=measured.characteristics(cycles.periods, cycles.lengths, cycles.mean_energy),
         five_steps_energy=five_steps.mean_energy,
         fastest=fastest_leg(one_step),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
-        impact=misprinted_impact(printed, one_step),
+        impact=misprinted_impact(wrong, one_step),
         ordering=order_of_coordinates(right),
         adams=adams_start(
-            assembled(right._replace(slope=slope_of(TABLE_2[0].adams, TABLE_2[1].adams)[0])), adams_start_as_printed()
+            assembled(right._replace(slope=printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)[0])),
+            printed.adams_start_as_printed(),
         ),
     )
 
 
 def settled(walker: RigidWalker) -> State:
     """The stable gait that walking from x_p leads to."""
-    walk = take_walk(assembled(walker), TIGHT, fixed_point_as_printed(), SETTLING_STEPS)
+    walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), SETTLING_STEPS)
     if walk.steps < SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
     return walk.final_state
@@ -135,7 +121,7 @@ def fastest_leg(walk: RecordedWalk) -> float:
 
 def misprinted_impact(walker: RigidWalker, one_step: RecordedWalk) -> Impact:
     """What (A.55) as printed does to the gait whose step is given."""
-    theta_1, theta_2 = fixed_point_as_printed()[:2]
+    theta_1, theta_2 = printed.fixed_point_as_printed()[:2]
     return Impact(
         height=height_over_slope(walker, theta_1, theta_2, MISPRINTED),
         foothold_speed=foothold_speed_after_impact(walker, as_state(one_step.before[0]), MISPRINTED),
@@ -145,7 +131,7 @@ def misprinted_impact(walker: RigidWalker, one_step: RecordedWalk) -> Impact:
 
 def order_of_coordinates(walker: RigidWalker) -> Ordering:
     """Kinetic energies at x_p with a moving foot."""
-    theta_1, theta_2, omega_1, omega_2 = fixed_point_as_printed()
+    theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
     D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
     foot_first = np.array([*FOOT_VELOCITY, omega_1, omega_2])

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from walkerlab.paper.arithmetic import MM, percent_of
 from walkerlab.paper.measured import Measured
-from walkerlab.paper.printed import COORDINATES, FOOT_RADIUS, LEG_INERTIA, TABLE_1, TABLE_2, TABLE_3
+from walkerlab.paper.printed import (
+    COORDINATES,
+    FOOT_RADIUS,
+    LEG_INERTIA,
+    TABLE_1,
+    TABLE_2,
+    TABLE_3,
+    ResultRow,
+    StartRow,
+)
 from walkerlab.paper.study import PaperStudy
 
 Table = dict[str, dict[str, Any]]
@@ -38,17 +48,12 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 def table_2(measured: Measured) -> Table:
     """The initial values, and the percentages on both bases."""
-    table = {}
+    table, start = {}, measured.contact.start
     for coordinate, row in enumerate(TABLE_2):
-        percent, start = percent_of(row), measured.contact.start
+        percent = percent_of(row)
         states = {name: model.state[coordinate] for name, model in measured.models.items()}
         table[COORDINATES[coordinate]] = {
-            "unit": row.matlab.unit,
-            "paper_matlab": row.matlab.value,
-            "paper_adams": row.adams.value,
-            "as_printed": states.get("as-printed"),
-            "corrected": states.get("corrected"),
-            "contact": None if start is None else start[coordinate],
+            **beside(row, states, None if start is None else start[coordinate]),
             "paper_percent": row.percent.value,
             "percent_of_matlab": percent.of_matlab,
             "percent_of_adams": percent.of_adams,
@@ -58,15 +63,18 @@ def table_2(measured: Measured) -> Table:
 
 def table_3(measured: Measured) -> Table:
     """The characteristics of both models."""
-    table = {}
-    for row in TABLE_3:
-        found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
-        table[row.name] = {
-            "unit": row.matlab.unit,
-            "paper_matlab": row.matlab.value,
-            "paper_adams": row.adams.value,
-            "as_printed": found.get("as-printed"),
-            "corrected": found.get("corrected"),
-            "contact": getattr(measured.contact.table_3, row.name),
-        }
-    return table
+    models, contact = measured.models.items(), measured.contact.table_3
+    found = {row: {name: getattr(model.table_3, row.name) for name, model in models} for row in TABLE_3}
+    return {row.name: beside(row, values, getattr(contact, row.name)) for row, values in found.items()}
+
+
+def beside(row: StartRow | ResultRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
+    """Both printed numbers of a row beside those of the rigid model, by set of equations, and of the contact model."""
+    return {
+        "unit": row.matlab.unit,
+        "paper_matlab": row.matlab.value,
+        "paper_adams": row.adams.value,
+        "as_printed": rigid.get("as-printed"),
+        "corrected": rigid.get("corrected"),
+        "contact": contact,
+    }

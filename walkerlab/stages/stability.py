@@ -18,7 +18,7 @@ from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group
 from walkerlab.verification.catalogue import judged
-from walkerlab.verification.cells import cells_of, run_cells
+from walkerlab.verification.judge import CaseCell, run_cells
 from walkerlab.verification.known import Known
 from walkerlab.verification.ordinary import CAP, FINE, Choice
 from walkerlab.verification.scene_catalogue import scene_cases
@@ -39,9 +39,9 @@ def run(
     if judged_in_its_scene(config):
         own = scene_cases(spelled_out(config, inputs))
         judged(config.stability.cases, [case for case, _ in own])
-        cells = cells_of(config.stability.cases, own)
+        cells = [*(CaseCell(*case) for case in own), *map(CaseCell, config.stability.cases)]
     else:
-        cells = cells_of(judged(config.stability.cases))
+        cells = [*map(CaseCell, judged(config.stability.cases))]
     progress.start("stability", len(cells))
     cases: list[CaseResult] = []
     ordinary: list[Choice] = []

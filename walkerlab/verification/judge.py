@@ -1,9 +1,9 @@
-"""One case: walked, again with a tenfold tolerance and by another method, and as its twin."""
+"""Cases, each walked, again with a tenfold tolerance and by another method, and as its twin."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,9 +13,12 @@ from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import METHODS, Method, method_named
+from walkerlab.verification.catalogue import config_of
+from walkerlab.verification.ordinary import Choice, choices
 from walkerlab.verification.scaling import scaled, to_twin
 from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, configured, prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
+from walkerlab.workers import in_order
 
 TENFOLD = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
@@ -38,14 +41,35 @@ class Second:
     tried: str
 
 
+@dataclass(frozen=True)
+class CaseCell:
+    """A case to be judged, and tried with ordinary methods; here or in another process.
+
+    config  of a scene's own case; None for a few lines over the paper's config
+    """
+
+    case: Case
+    config: Config | None = None
+
+    def run(self) -> tuple[CaseResult | Choice, ...]:
+        """The verdict, then the ordinary methods."""
+        config = self.config or config_of(self.case)
+        return (judge(self.case, config), *choices(self.case, config))
+
+
+def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
+    """The cases' results in their order, whoever ran them; the first of each model is run first."""
+    models = [cell.case.model for cell in cells]
+    first = [models.index(model) for model in ("contact", "rigid") if model in models]
+    return in_order([cell.run for cell in cells], jobs, first)
+
+
 def judge(case: Case, config: Config) -> CaseResult:
     """Run a case of either model and judge it."""
+    about = case.name, case.family, case.model, case.reason, case.expected
     start = prepared(config, case)
     if start is None:
-        rejected, none = Outcome.REJECTED.label, "there is no start"
-        return CaseResult(
-            case.name, case.family, case.model, case.reason, case.expected, rejected, 0, 0.0, 0, 0.0, (), (), "", none
-        )
+        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="there is no start")
     methods = configured(start, case)
     began = time.perf_counter()
     walk = first_walk(start, case)
@@ -67,17 +91,13 @@ def judge(case: Case, config: Config) -> CaseResult:
                 remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
     found += start.momentum(walk, case)
     return CaseResult(
-        name=case.name,
-        family=case.family,
-        model=case.model,
-        reason=case.reason,
-        expected=case.expected,
-        outcome=walk.outcome.label,
-        steps=int(walk.touches.size),
-        energy_balance_residual_J=finite(walk.residual_J),
-        rhs_evaluations=walk.rhs_evaluations,
-        wall_s=wall_s,
-        findings=tuple(one for one in found if isinstance(one, Measure)),
+        *about,
+        walk.outcome.label,
+        int(walk.touches.size),
+        finite(walk.residual_J),
+        walk.rhs_evaluations,
+        wall_s,
+        tuple(one for one in found if isinstance(one, Measure)),
         remarks=tuple(remarks),
         second_method=second.method,
         second_tried=second.tried,
@@ -96,7 +116,7 @@ def of_one_walk(walk: JudgedWalk, start: Start, case: Case) -> list[Measure]:
     """Measures that need no second walk."""
     return [
         Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
-        start.balance(walk, case),
+        Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
         *start.measures(walk, case),
     ]

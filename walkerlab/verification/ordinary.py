@@ -83,9 +83,7 @@ def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
         return ()
     name, rtol, atol = REFERENCE
     arrival = arrival_of(
-        case.name,
-        start.walk(case, Tolerances(name, rtol, atol, case.budget)).record,
-        natural_units(config),
+        case.name, start.walk(case, Tolerances(name, rtol, atol, case.budget)).record, natural_units(config)
     )
     if arrival.time_s == 0.0:
         return ()

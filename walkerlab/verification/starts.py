@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +57,12 @@ class JudgedWalk:
 
 @dataclass(frozen=True)
 class RigidStart:
-    """A walker of the rigid model and the state that it starts from."""
+    """A walker of the rigid model and the state that it starts from.
 
+    kept  what its residual is of, in words
+    """
+
+    kept: ClassVar[str] = "energy drift within a swing"
     config: WalksConfig
     walker: Standing
     start: State
@@ -88,15 +92,8 @@ class RigidStart:
         """Walk a case by a method."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
-        touches = walk.heel_strikes / pendulum_time(self.config)
-        work = walk.work
-        return JudgedWalk(
-            walk.outcome, touches, None, walk.energy_drift, work.rhs_evaluations, work.accepted, numbers, walk
-        )
-
-    def balance(self, walk: JudgedWalk, case: Case) -> Measure:
-        """How well the energy is kept."""
-        return Measure("energy drift within a swing over energy", finite(walk.residual_J / self.energy), case.balance)
+        touches, cost = walk.heel_strikes / pendulum_time(self.config), (walk.work.rhs_evaluations, walk.work.accepted)
+        return JudgedWalk(walk.outcome, touches, None, walk.energy_drift, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
         """What heel strikes must keep."""
@@ -123,8 +120,10 @@ class ContactStart:
     """A walker on its ground, in the state that it starts from.
 
     energy  m g L and the energy of the start (J): what residuals are measured by
+    kept    what its residual is of, in words
     """
 
+    kept: ClassVar[str] = "energy balance residual"
     config: WalksConfig
     scene: ContactScene
     start: State
@@ -145,20 +144,11 @@ class ContactStart:
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
-        return JudgedWalk(
-            walk.outcome,
-            walk.touch_time_s / unit,
-            walk.end_time_s / unit,
-            walk.energy_balance_residual_J,
-            int(walk.work[RHS]),
-            int(walk.work[ACCEPTED]),
-            numbers,
-            walk,
+        times, cost = (
+            (walk.touch_time_s / unit, walk.end_time_s / unit),
+            (int(walk.work[RHS]), int(walk.work[ACCEPTED])),
         )
-
-    def balance(self, walk: JudgedWalk, case: Case) -> Measure:
-        """How well the energy balance closes."""
-        return Measure("energy balance residual over energy", finite(walk.residual_J / self.energy), case.balance)
+        return JudgedWalk(walk.outcome, *times, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
         """That friction and damping give nothing back, of a walk that was sampled."""

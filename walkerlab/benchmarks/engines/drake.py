@@ -16,30 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.benchmarks.engines.adapter import (
-    EngineContact,
-    Floats,
-    Forces,
-    Integrator,
-    OnStep,
-    OwnContact,
-    Simulation,
-    Stepping,
-)
+from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
 INTEGRATORS = {
-    "semi_explicit_euler": Integrator(1, 25_000),
-    "runge_kutta3": Integrator(3, 25_000),
-    "runge_kutta3 adaptive": Integrator(3, 60_000, adapts=True),
-    "discrete": Integrator(1, 45_000, for_contact_only=True),
+    "semi_explicit_euler": adapter.Integrator(1, 25_000),
+    "runge_kutta3": adapter.Integrator(3, 25_000),
+    "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
+    "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
 EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
-CONTACTS = {
-    "sap": "discrete",
-    "lagged": "discrete",
-    "hunt-crossley": "runge_kutta3 adaptive",
-}
+CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
     "a force that grows with a power of the penetration: point contact is linear in it",
@@ -50,7 +37,7 @@ CANNOT_EXPRESS = (
 )
 
 
-def tuned(model: str, target: EngineContact) -> OwnContact:
+def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     """The closed forms above, solved for what the target says."""
     stiffness = target.mass * target.gravity / target.penetration
     omega = math.sqrt(target.gravity / target.penetration)
@@ -63,7 +50,7 @@ def tuned(model: str, target: EngineContact) -> OwnContact:
     }
     unused = {"sap": ("hunt_crossley_dissipation", "stiction_tolerance"), "lagged": ("relaxation_time",)}
     left = unused.get(model, ("relaxation_time",))
-    return OwnContact(model, {name: value for name, value in settings.items() if name not in left})
+    return adapter.OwnContact(model, {name: value for name, value in settings.items() if name not in left})
 
 
 def slip_share(model: str, load: float) -> float:
@@ -75,10 +62,10 @@ def slip_share(model: str, load: float) -> float:
     return float(brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15))
 
 
-class EngineRun(Simulation):
+class EngineRun(adapter.Simulation):
     """A diagram, its simulator and its context."""
 
-    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
+    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
         """Build the diagram and put it into its start state."""
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
         from pydrake.systems.analysis import Simulator
@@ -113,7 +100,7 @@ class EngineRun(Simulation):
             integrate_by(self._simulator, self.stepping)
         self._simulator.Initialize()
 
-    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+    def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""
         from pydrake.systems.framework import EventStatus
 
@@ -133,7 +120,7 @@ class EngineRun(Simulation):
         self._simulator.set_monitor(monitor)
         self._simulator.AdvanceTo(until_s)
 
-    def _march(self, steps: int, until_s: float, on_step: OnStep) -> None:
+    def _march(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         """Discrete updates, one after the other."""
         h = self._h
         for count in range(1, min(steps, round(until_s / h)) + 1):
@@ -141,7 +128,7 @@ class EngineRun(Simulation):
             if not on_step(count * h, *self._state()):
                 return
 
-    def _state(self) -> tuple[Floats, Floats]:
+    def _state(self) -> tuple[adapter.Floats, adapter.Floats]:
         """Coordinates and velocities."""
         x = self._plant.GetPositionsAndVelocities(self._at)
         return x[self._order], x[self._rates]
@@ -162,7 +149,7 @@ class EngineRun(Simulation):
             self._declared[ball] = manager.ApplyTransient(declaration)
 
 
-def integrate_by(simulator: Any, stepping: Stepping) -> None:
+def integrate_by(simulator: Any, stepping: adapter.Stepping) -> None:
     """Choose the integrator, with steps of one size or adapted ones."""
     from pydrake.systems.analysis import ResetIntegratorFromFlags
 
@@ -185,7 +172,7 @@ def set_approximation(plant: Any, model: str) -> None:
     plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, APPROXIMATIONS[model]))
 
 
-def assembled(plant: Any, model: PlanarModel, own: OwnContact | None) -> tuple[list[Any], list[Any], Any]:
+def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
     """Build bodies, joints and feet; the joints in the order of the coordinates, the feet's geometries, the floor's."""
     from pydrake.geometry import HalfSpace
     from pydrake.multibody.plant import ContactModel
@@ -247,7 +234,7 @@ def inertia(link: Link) -> Any:
     )
 
 
-def material(own: OwnContact) -> Any:
+def material(own: adapter.OwnContact) -> Any:
     """Surface of a foot and of the floor alike: half of the compliance each."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
@@ -259,10 +246,7 @@ def material(own: OwnContact) -> Any:
     stiffness = settings["point_contact_stiffness"]
     # two springs in series
     AddContactMaterial(
-        properties=properties,
-        dissipation=dissipation,
-        point_stiffness=2.0 * stiffness,
-        friction=friction,
+        properties=properties, dissipation=dissipation, point_stiffness=2.0 * stiffness, friction=friction
     )
     if "relaxation_time" in settings:
         # times of two surfaces add up
@@ -270,7 +254,7 @@ def material(own: OwnContact) -> Any:
     return properties
 
 
-def apply(builder: Any, plant: Any, forces: Forces, place: Any) -> None:
+def apply(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
     """A system that computes the ground's forces from the plant's state at every evaluation.
 
     place  where each coordinate is among Drake's

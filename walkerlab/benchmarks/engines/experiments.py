@@ -12,19 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.benchmarks.engines import runs
 from walkerlab.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
 from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.benchmarks.engines.registry import Engine
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.benchmarks.engines.runs import (
-    SwingAnswer,
-    SwingTask,
-    TuningAnswer,
-    TuningTask,
-    WalkAnswer,
-    WalkTask,
-    pinned_model,
-)
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.held import held_flags, no_stops
@@ -106,10 +98,10 @@ def state_at_end(result: ContactWalkResult) -> Floats:
     return np.asarray(result.samples.states[1])
 
 
-def answered(result: ContactWalkResult, wall_s: float, touches: int) -> WalkAnswer:
+def answered(result: ContactWalkResult, wall_s: float, touches: int) -> runs.WalkAnswer:
     """Our own walk as an engine would have answered, of so many touches."""
     there = result.samples is not None and len(result.samples.states) > 1
-    return WalkAnswer(
+    return runs.WalkAnswer(
         result.outcome.label,
         state_at_end(result) if there else None,
         result.touch_time_s[:touches],
@@ -131,7 +123,9 @@ class EngineExperiment:
     experiment: str
     truth: Truth | None = None  # what runs are compared with, if they are
 
-    def row(self, integrator: str, stepping: Stepping, answer: WalkAnswer | TaskLost, start: float = 1.0) -> EngineRow:
+    def row(
+        self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
+    ) -> EngineRow:
         """A run with its errors, or that it was lost with its process or refused by the engine.
 
         integrator  or contact model on an engine's own law
@@ -151,7 +145,7 @@ class EngineExperiment:
         return EngineRow(*head, step_s, tolerance, *numbers, answer.touches_s.size, answer.outcome)
 
     def errors(
-        self, answer: WalkAnswer, truth: Truth, period_s: float | None, start: float
+        self, answer: runs.WalkAnswer, truth: Truth, period_s: float | None, start: float
     ) -> tuple[float | None, float | None]:
         """Of the end state and of the touches, None where there is none; on an engine's own law, of the last period.
 
@@ -188,7 +182,7 @@ def same_law_rows(
         if integrator.for_contact_only:
             continue
         for stepping in ladder_of(name, integrator, truth.until_s):
-            task = WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
+            task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
             row = experiment.row(name, stepping, answer)
             yield row
@@ -214,7 +208,7 @@ def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> li
     return [Stepping(name, h) for h in steps_s]
 
 
-def last_step(answer: WalkAnswer) -> tuple[float | None, float | None, float | None]:
+def last_step(answer: runs.WalkAnswer) -> tuple[float | None, float | None, float | None]:
     """Period (s), length (m) and slip (m) of the last step; of less than two steps there are none.
 
     There is no slip either where its foot did not lift.
@@ -245,8 +239,8 @@ def tuned(
     engine: Engine, contact: str, scene: EngineScene, target: EngineContact, process: OwnProcess
 ) -> tuple[OwnContact | None, list[TuningRow], TaskLost | None]:
     """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
-    task = TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
-    answer: TuningAnswer | TaskLost = process.do(task, PATIENCE_S)
+    task = runs.TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
+    answer: runs.TuningAnswer | TaskLost = process.do(task, PATIENCE_S)
     if isinstance(answer, TaskLost):
         return None, [], answer
     settings = dict(answer.own.settings)
@@ -273,7 +267,7 @@ def own_law_rows(
     most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
 
     def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
-        task = WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
+        task = runs.WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
         answer = process.do(task, PATIENCE_S)
         row = experiment.row(contact, stepping, answer, factor)
         if isinstance(answer, TaskLost):
@@ -314,7 +308,7 @@ def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
 
 def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
     """The hinged walker's swing over step sizes, by each of an engine's integrators."""
-    model, chain = pinned_model(scene)
+    model, chain = runs.pinned_model(scene)
     n = len(chain)
     start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
     truth, energy = swing_truth(scene, start)
@@ -323,8 +317,10 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         before = None
         for stepping in steppings(integrator, entry, SWING_STEPS):
-            task = SwingTask(engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps)
-            answer: SwingAnswer | TaskLost = process.do(task, PATIENCE_S)
+            task = runs.SwingTask(
+                engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps
+            )
+            answer: runs.SwingAnswer | TaskLost = process.do(task, PATIENCE_S)
             if isinstance(answer, TaskLost):
                 lost.append(answer)
                 break

@@ -14,22 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.benchmarks.engines.adapter import (
-    EngineContact,
-    Floats,
-    Forces,
-    Integrator,
-    OnStep,
-    OwnContact,
-    Simulation,
-)
+from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import PlanarModel
 
 INTEGRATORS = {
-    "ExplicitEuler": Integrator(1, 45_000),
-    "RK44": Integrator(4, 45_000),
-    "TrapezoidalIndex2": Integrator(2, 25_000),
-    "DOPRI5 adaptive": Integrator(5, 60_000, adapts=True),
+    "ExplicitEuler": adapter.Integrator(1, 45_000),
+    "RK44": adapter.Integrator(4, 45_000),
+    "TrapezoidalIndex2": adapter.Integrator(2, 25_000),
+    "DOPRI5 adaptive": adapter.Integrator(5, 60_000, adapts=True),
 }
 CONTACTS = {"sphere-triangle": "RK44", "sphere-triangle implicit": "TrapezoidalIndex2"}
 CANNOT_EXPRESS = (
@@ -46,7 +38,7 @@ NO_ITERATION = 1e12
 EXPLICIT = ("ExplicitEuler", "RK44")
 
 
-def tuned(model: str, target: EngineContact) -> OwnContact:
+def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     """The target's own parameters, and the zone over which friction rises."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
@@ -56,13 +48,13 @@ def tuned(model: str, target: EngineContact) -> OwnContact:
         "dynamic_friction": target.friction,
         "friction_proportional_zone": target.creep_velocity * target.friction / target.creep_load,
     }
-    return OwnContact(model, settings)
+    return adapter.OwnContact(model, settings)
 
 
-class EngineRun(Simulation):
+class EngineRun(adapter.Simulation):
     """A system of one tree, and its contacts."""
 
-    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
+    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
         """Build the system in its start state."""
         import exudyn as exu
         from exudyn.itemInterface import NodeGenericODE2
@@ -82,7 +74,7 @@ class EngineRun(Simulation):
         self._contacts = [] if self.own is None else list(contacts(self._system, model, tree, places, self.own))
         self._system.Assemble()
 
-    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+    def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""
         import exudyn as exu
 
@@ -119,7 +111,7 @@ class EngineRun(Simulation):
             self._system.SetObjectParameter(self._contacts[ball], "activeConnector", has_ground)
 
 
-def assembled(system: Any, model: PlanarModel, node: Any, forces: Forces | None) -> tuple[Any, list[int]]:
+def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
     """Add the tree; its number, and where each link is among its joints."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
@@ -165,7 +157,7 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: Forces | None)
     return tree, places
 
 
-def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: OwnContact) -> Iterator[Any]:
+def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact) -> Iterator[Any]:
     """A ball on a large triangle for each foot; the numbers of these objects."""
     from exudyn.itemInterface import (
         MarkerBodyRigid,

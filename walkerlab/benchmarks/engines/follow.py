@@ -20,31 +20,8 @@ from walkerlab.ground.held import BENT, FLEXED, LOCKED, RELEASED, held_flags, st
 from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import Terrain, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import FootMotion
-from walkerlab.hybrid.contact_events import (
-    EXTENSION,
-    FALLEN_HIP,
-    HEIGHT,
-    PASSING,
-    PER_FOOT,
-    VERTICAL_VELOCITY,
-    farthest_slide,
-    material_along,
-)
+from walkerlab.hybrid import contact_events, contact_rules
 from walkerlab.hybrid.contact_knee import locked
-from walkerlab.hybrid.contact_rules import (
-    GOES_ON,
-    LAST_TOUCH,
-    STANCE,
-    STEPS,
-    WalkState,
-    find_ground,
-    is_above,
-    is_to_lift,
-    knee_stops,
-    lift,
-    release,
-    touch,
-)
 from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
@@ -52,7 +29,8 @@ from walkerlab.solvers.scipy_methods import entry_point
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
-Feet = list[list[float]]
+Feet = tuple[FootMotion, FootMotion]
+Bends = list[tuple[float, float]]
 HALVINGS = 60
 FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get to
 
@@ -62,8 +40,8 @@ class RuleFollower:
     """The rules of a walk, kept up to date step by step.
 
     walk state   what the walk remembers
-    feet     of the last state: along (m), height (m), slip (m/s) and velocity of the height (m/s), twice
-    bends    of the last state: each knee's extension (rad) and its rate (rad/s), in the places of a foot's height
+    feet     of the last state
+    bends    of the last state: each knee's extension (rad) and its rate (rad/s)
     edges    between which a foot is over the same pad or gap (m), twice
     outcome  how it ended; None while it goes on
     turn     a knee that locks or is released in the step that was just seen, which then counts for nothing
@@ -72,9 +50,9 @@ class RuleFollower:
 
     scene: EngineScene
     look: FeetAndForces
-    walk_state: WalkState
+    walk_state: contact_rules.WalkState
     feet: Feet
-    bends: Feet
+    bends: Bends
     edges: list[tuple[float, float]]
     time_s: float = 0.0
     grounded_s: float = 0.0
@@ -85,7 +63,7 @@ class RuleFollower:
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Take in the state at the end of a step; whether the ground under a foot may have changed."""
         before, now = self.feet, self.look.feet(q, v)
-        if not is_near(*now[0]) or not is_near(*now[1]):
+        if not all(-FAR_AWAY < place < FAR_AWAY for foot in now for place in (foot.along, foot.height)):
             self._end(int(Outcome.SOLVER_FAILED))
             return False
         if self.bends:
@@ -104,8 +82,7 @@ class RuleFollower:
 
     def _happened(self, before: Feet, now: Feet) -> bool:
         """Whether a foot has crossed the ground or a pad's edge, or passed the other."""
-        (x0, h0, _, _), (x1, h1, _, _) = before
-        (y0, k0, _, _), (y1, k1, _, _) = now
+        (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
         (left0, right0), (left1, right1) = self.edges
         crossed = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0)
         return crossed or (x0 < x1) != (y0 < y1) or not (left0 <= y0 < right0 and left1 <= y1 < right1)
@@ -114,38 +91,41 @@ class RuleFollower:
         """Let everything happen that lies between two states."""
         walk_state, terrain, walker = self.walk_state, self.scene.ground.terrain, self.scene.ours
         self._cross_edges(now)
-        if (before[0][0] < before[1][0]) != (now[0][0] < now[1][0]):
-            walk_state.sides[PASSING] = 1 if now[1][0] > now[0][0] else -1
+        if (before[0].along < before[1].along) != (now[0].along < now[1].along):
+            walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
             for foot in range(2):
-                find_ground(terrain, walk_state, foot, is_above(walk_state, foot))
+                contact_rules.find_ground(terrain, walk_state, foot, contact_rules.is_above(walk_state, foot))
         h = time_s - self.time_s
         for foot in range(2):
-            if (before[foot][1] < 0.0) == (now[foot][1] < 0.0):
+            above = now[foot].height >= 0.0
+            if (before[foot].height >= 0.0) == above:
                 continue
-            walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if now[foot][1] >= 0.0 else -1
-            share = crossing(before[foot], now[foot], h)
+            walk_state.sides[foot * contact_events.PER_FOOT + contact_events.HEIGHT] = 1 if above else -1
+            share = crossing(*rise_of(before[foot]), *rise_of(now[foot]), h)
             there = between(before, now, share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
-            if now[foot][1] >= 0.0:
-                lift(walker, terrain, walk_state, there, foot, y)
+            if above:
+                contact_rules.lift(walker, terrain, walk_state, there, foot, y)
             else:
-                self._end(touch(walker, terrain, walk_state, there, foot, self.time_s + share * h, y))
-        if walk_state.feet[STEPS] == walk_state.touch_time.size and not is_to_lift(walk_state):
+                self._end(contact_rules.touch(walker, terrain, walk_state, there, foot, self.time_s + share * h, y))
+        if walk_state.feet[contact_rules.STEPS] == walk_state.touch_time.size and not contact_rules.is_to_lift(
+            walk_state
+        ):
             self._end(int(Outcome.WALKED))
 
-    def _turning(self, h: float, now: Feet, bends: Feet) -> Turn | None:
+    def _turning(self, h: float, now: Feet, bends: Bends) -> Turn | None:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
         walk_state, found = self.walk_state, []
-        stance = walk_state.feet[STANCE]
-        if walk_state.releasing[0] and now[stance][3] >= 0.0:
-            sinking = max(0.0, -self.feet[stance][3])
-            share = sinking / (sinking + now[stance][3]) if sinking > 0.0 else 0.0
-            found.append(Turn(share, int(stance) * PER_FOOT + VERTICAL_VELOCITY))
+        stance = walk_state.feet[contact_rules.STANCE]
+        if walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0:
+            sinking = max(0.0, -self.feet[stance].vertical_velocity)
+            share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
+            found.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
         for knee, (old, bend) in enumerate(zip(self.bends, bends, strict=True)):
-            if walk_state.knee[knee] == RELEASED and bend[1] < -FLEXED:
+            if walk_state.knee[knee] == RELEASED and bend[0] < -FLEXED:
                 walk_state.knee[knee] = BENT
-            elif walk_state.knee[knee] == BENT and bend[1] >= 0.0:
-                found.append(Turn(crossing(old, bend, h), EXTENSION + knee))
+            elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
+                found.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
         return min(found, default=None)
 
     def turn_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -158,13 +138,13 @@ class RuleFollower:
             self.scene.about_centre(q, v),
         )
         state = tuple(y.tolist())
-        if event >= EXTENSION:
-            knee_stops(knees, walk_state, event, self.time_s)
+        if event >= contact_events.EXTENSION:
+            contact_rules.knee_stops(knees, walk_state, event, self.time_s)
             walker, has_ground = self.scene.ours, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1]))
             held = held_flags(walker.held, walker.knees, walk_state.knee)
             state, _ = locked(OnGround(walker, has_ground, held, stop_flags(knees, walk_state.knee)), state)
         else:
-            release(knees, walk_state, 1 - int(walk_state.feet[STANCE]))
+            contact_rules.release(knees, walk_state, 1 - int(walk_state.feet[contact_rules.STANCE]))
         self.turn = None
         return self._in_next_model(state)
 
@@ -191,39 +171,39 @@ class RuleFollower:
         if not terrain.has_pads:
             return
         for foot in range(2):
-            cell = cell_at(terrain, foot, now[foot][0])
+            cell = cell_at(terrain, foot, now[foot].along)
             if cell == walk_state.cells[foot]:
                 continue
             walk_state.cells[foot] = cell
             walk_state.has_ground[foot] = has_ground_in_cell(cell)
             self.edges[foot] = edges_at(terrain, foot, cell)
-            if walk_state.has_ground[foot] and now[foot][1] < 0.0:
+            if walk_state.has_ground[foot] and now[foot].height < 0.0:
                 self._end(int(Outcome.OFF_PAD))
 
     def _end(self, outcome: int) -> None:
         """End the walk with the first outcome there is."""
-        if outcome != GOES_ON and self.outcome is None:
+        if outcome != contact_rules.GOES_ON and self.outcome is None:
             self.outcome = Outcome(outcome)
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
         """End the walk that has fallen, slid, flown or taken too long."""
         ground, has_ground = self.scene.ground, self.walk_state.has_ground
         tau, t = ground.frame.pendulum_time, self.time_s
-        inside = (now[0][1] < 0.0 and has_ground[0] != 0, now[1][1] < 0.0 and has_ground[1] != 0)
+        inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t
-            stance = self.walk_state.feet[STANCE]
-            far = farthest_slide(ground.terrain)
-            if inside[stance] and abs(now[stance][0] - self.walk_state.foothold[stance]) > far:
+            stance = self.walk_state.feet[contact_rules.STANCE]
+            far = contact_events.farthest_slide(ground.terrain)
+            if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
-                material = material_along(self.scene.ours, stance, now[stance][0], y)
+                material = contact_events.material_along(self.scene.ours, stance, now[stance].along, y)
                 if abs(material - self.walk_state.touched[stance]) > far:
                     self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
-        if q[1] < FALLEN_HIP * ground.frame.leg_length:
+        if q[1] < contact_events.FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
-        elif t - self.walk_state.times[LAST_TOUCH] > LONGEST_STEP * tau:
+        elif t - self.walk_state.times[contact_rules.LAST_TOUCH] > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))
 
 
@@ -235,14 +215,9 @@ class Turn:
     event: int
 
 
-def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Feet:
+def bends_of(scene: EngineScene, q: Floats, v: Floats) -> Bends:
     """Extension and its rate of each knee, zero of a locked one."""
-    return [[0.0, float(q[place]), 0.0, float(v[place])] if place >= 0 else [0.0] * 4 for place in scene.knee_places]
-
-
-def is_near(along: float, height: float, _slip: float, _vertical_velocity: float) -> bool:
-    """Whether a foot is anywhere near; one whose numbers are lost is not."""
-    return -FAR_AWAY < along < FAR_AWAY and -FAR_AWAY < height < FAR_AWAY
+    return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in scene.knee_places]
 
 
 class FeetAndForces:
@@ -260,7 +235,8 @@ class FeetAndForces:
     def feet(self, q: Floats, v: Floats) -> Feet:
         """How the feet move."""
         self._call(*self._fixed, q, v, self._feet, self._none)
-        return self._feet.tolist()
+        first, second = self._feet.tolist()
+        return FootMotion(*first), FootMotion(*second)
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         """The generalised forces of the ground, in memory that the next call overwrites."""
@@ -272,11 +248,10 @@ def follower(scene: EngineScene, steps: int, q: Floats, v: Floats) -> RuleFollow
     """The rules at the start of a walk of at most `steps` steps, both feet on the ground."""
     walk_state = new_walk_state(scene.ours, scene.ground.terrain, scene.stance, steps, scene.start)
     look = FeetAndForces(scene, walk_state.has_ground)
-    feet = look.feet(q, v)
-    for row in feet:
-        row[1] = min(row[1], -sys.float_info.min)  # both stand on the ground, inside or outside by rounding
+    # both stand on the ground, inside or outside by rounding
+    first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in look.feet(q, v))
     edges = [edges_at(scene.ground.terrain, foot, int(walk_state.cells[foot])) for foot in range(2)]
-    return RuleFollower(scene, look, walk_state, feet, bends_of(scene, q, v), edges)
+    return RuleFollower(scene, look, walk_state, (first, second), bends_of(scene, q, v), edges)
 
 
 def edges_at(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
@@ -284,32 +259,31 @@ def edges_at(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
     return cell_edges(terrain, foot, cell) if terrain.has_pads else (-math.inf, math.inf)
 
 
-def motions(rows: Feet) -> tuple[FootMotion, FootMotion]:
-    """Rows of numbers as the feet's motion."""
-    return FootMotion(*rows[0]), FootMotion(*rows[1])
+def rise_of(foot: FootMotion) -> tuple[float, float]:
+    """Height (m) and its rate (m/s)."""
+    return foot.height, foot.vertical_velocity
 
 
-def crossing(before: list[float], now: list[float], h: float) -> float:
-    """Share of a step of h (s) at which a foot's height, a cubic, goes through zero."""
+def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
+    """Share of a step of h (s) at which a cubic through values and rates at its ends goes through zero."""
     low, high = 0.0, 1.0
-    above = before[1] >= 0.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if (cubic(before[1], before[3], now[1], now[3], h, middle) >= 0.0) == above:
+        if (cubic(x0, v0, x1, v1, h, middle) >= 0.0) == (x0 >= 0.0):
             low = middle
         else:
             high = middle
     return high
 
 
-def between(before: Feet, now: Feet, share: float, h: float) -> tuple[FootMotion, FootMotion]:
-    """The feet within a step: heights as cubics, the place along the slope by its mean velocity."""
-    rows = []
-    for old, new in zip(before, now, strict=True):
-        along = old[0] + share * (new[0] - old[0])
-        height = cubic(old[1], old[3], new[1], new[3], h, share)
-        rows.append([along, height, *(a + share * (b - a) for a, b in zip(old[2:], new[2:], strict=True))])
-    return motions(rows)
+def between(before: Feet, now: Feet, share: float, h: float) -> Feet:
+    """The feet within a step: heights as cubics, all else by its mean rate."""
+
+    def at(old: FootMotion, new: FootMotion) -> FootMotion:
+        straight = FootMotion(*(a + share * (b - a) for a, b in zip(old, new, strict=True)))
+        return straight._replace(height=cubic(*rise_of(old), *rise_of(new), h, share))
+
+    return at(before[0], now[0]), at(before[1], now[1])
 
 
 def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:

@@ -12,18 +12,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from walkerlab.benchmarks.engines.adapter import (
-    EngineContact,
-    Floats,
-    Forces,
-    Integrator,
-    OnStep,
-    OwnContact,
-    Simulation,
-)
+from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
 
-INTEGRATORS = {"Euler": Integrator(1, 120_000), "RK4": Integrator(4, 120_000)}
+INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
     "a force that grows with a power of the penetration, or damping that does: its contact is linear",
@@ -38,7 +30,7 @@ AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hin
 MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
-def tuned(model: str, target: EngineContact) -> OwnContact:
+def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     """The closed forms above, solved for what the target says."""
     stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
     damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
@@ -50,13 +42,13 @@ def tuned(model: str, target: EngineContact) -> OwnContact:
         "impratio": creep / target.creep_velocity,
         "friction": target.friction,
     }
-    return OwnContact(model, settings)
+    return adapter.OwnContact(model, settings)
 
 
-class EngineRun(Simulation):
+class EngineRun(adapter.Simulation):
     """A model and its data."""
 
-    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
+    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
         """Compile the model and put it into its start state."""
         import mujoco
 
@@ -69,7 +61,7 @@ class EngineRun(Simulation):
         self._data.qpos[:], self._data.qvel[:] = q, v
         mujoco.set_mjcb_passive(None if self.forces is None else applied(self.forces, self._data))
 
-    def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
+    def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         """Step until a time, or for a number of steps, or until it is told to stop."""
         model, data, advance = self._model, self._data, self._advance
         q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
@@ -84,7 +76,7 @@ class EngineRun(Simulation):
             self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(has_ground)
 
 
-def applied(forces: Forces, data: Any) -> Any:
+def applied(forces: adapter.Forces, data: Any) -> Any:
     """The callback for passive forces, which every stage of every integrator asks."""
     q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
@@ -94,7 +86,7 @@ def applied(forces: Forces, data: Any) -> Any:
     return passive
 
 
-def described(model: PlanarModel, own: OwnContact | None) -> str:
+def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
     """The model in MuJoCo's own language."""
     contact = own.settings if own is not None else None
     ratio = f'cone="elliptic" impratio="{contact["impratio"]!r}"' if contact is not None else ""

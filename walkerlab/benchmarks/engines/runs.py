@@ -5,22 +5,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.benchmarks.engines import planar
 from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
 from walkerlab.benchmarks.engines.follow import RuleFollower, follower
-from walkerlab.benchmarks.engines.planar import (
-    HINGED,
-    UPRIGHT,
-    Ball,
-    Link,
-    PlanarModel,
-    ball_and_ground,
-    planar_model,
-    skeleton,
-)
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.hybrid.contact_rules import STEPS, steps_with_lift
@@ -171,7 +163,7 @@ class SwingTask:
 
     engine: str
     stepping: Stepping
-    model: PlanarModel
+    model: planar.PlanarModel
     chain: Floats
     slope: float
     start: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
@@ -181,19 +173,26 @@ class SwingTask:
     def run(self) -> SwingAnswer:
         """Swing."""
         n = len(self.chain)
-        q, v = np.linalg.lstsq(self.chain, np.column_stack((self.start[:n] + self.slope, self.start[n:])), rcond=None)[
-            0
-        ].T
+        absolute = np.column_stack((self.start[:n] + self.slope, self.start[n:]))
+        q, v = np.linalg.lstsq(self.chain, absolute, rcond=None)[0].T
         engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v, None)
         begun = time.process_time()
-        last = recorded(engine, self.most, self.until_s)[-1]
+        motion = recorded(engine, self.most, self.until_s)
         wall = time.process_time() - begun
-        end = np.concatenate((self.chain @ last[1] - self.slope, self.chain @ last[2]))
+        end = np.concatenate((self.chain @ motion.q[-1] - self.slope, self.chain @ motion.v[-1]))
         return SwingAnswer(end, wall)
 
 
-def recorded(engine: Simulation, steps: int, until_s: float) -> list[tuple[float, Floats, Floats]]:
-    """Time, coordinates and velocities at the end of every step."""
+class EngineMotion(NamedTuple):
+    """Times (steps,), coordinates and velocities (steps, n) at the ends of an engine's steps."""
+
+    t: Floats
+    q: Floats
+    v: Floats
+
+
+def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
+    """What an engine goes through."""
     seen: list[tuple[float, Floats, Floats]] = []
 
     def on_step(time_s: float, q: Floats, v: Floats) -> bool:
@@ -201,14 +200,14 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> list[tuple[float
         return True
 
     engine.run(steps, until_s, on_step)
-    return seen
+    return EngineMotion(*(np.array(column) for column in zip(*seen, strict=True)))
 
 
-def pinned_model(scene: EngineScene) -> tuple[PlanarModel, Floats]:
+def pinned_model(scene: EngineScene) -> tuple[planar.PlanarModel, Floats]:
     """The scene's walker hinged at the centre of its stance foot, and its chain of angles."""
     foot = scene.assembly.feet[scene.stance]
-    bones = skeleton(scene.assembly, foot.body, foot.centre_m, scene.locked)
-    return planar_model(scene.assembly, bones, HINGED, scene.gravity, scene.ours.slope), bones.chain
+    bones = planar.skeleton(scene.assembly, foot.body, foot.centre_m, scene.locked)
+    return planar.planar_model(scene.assembly, bones, planar.HINGED, scene.gravity, scene.ours.slope), bones.chain
 
 
 @dataclass(frozen=True)
@@ -259,17 +258,21 @@ class Bench:
         h  step (s)
         """
         target = self.task.target
-        radius, ground = ball_and_ground(0.0)
-        link = Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
-        model = PlanarModel(
-            (link,), UPRIGHT, (Ball(0, (0.0, 0.0), radius, ground),), along * target.gravity, target.gravity
+        radius, ground = planar.ball_and_ground(0.0)
+        link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
+        model = planar.PlanarModel(
+            (link,),
+            planar.UPRIGHT,
+            (planar.Ball(0, (0.0, 0.0), radius, ground),),
+            along * target.gravity,
+            target.gravity,
         )
         name = self.adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, ROUNDING if self.adapter.INTEGRATORS[name].adapts else None)
         engine = self.adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
         steps = max(2, round(time_s / h))
-        return EngineMotion(recorded(engine, MANY, steps * h))
+        return recorded(engine, MANY, steps * h)
 
     @property
     def settling_s(self) -> float:
@@ -307,13 +310,3 @@ class Bench:
         """Velocity (m/s) at which a block that stands on an incline creeps down."""
         target, h = self.task.target, STEADY * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
-
-
-class EngineMotion:
-    """A recorded motion: times (steps,), coordinates and velocities (steps, 2) at the ends of steps."""
-
-    def __init__(self, seen: list[tuple[float, Floats, Floats]]) -> None:
-        """Stack what was seen."""
-        self.t = np.array([time_s for time_s, _, _ in seen])
-        self.q = np.array([q for _, q, _ in seen])
-        self.v = np.array([v for _, _, v in seen])

@@ -129,32 +129,15 @@ def scene_of(config: ContactConfig, rigid_step_length_m: float, rigid_state: Sta
     start = start_state(scene, rigid_state)
     base = assembly.legs[STANCE_FOOT][0]
     hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
-    name = "kneed" if assembly.knees else "compass"
-    return engine_scene(name, assembly, base, hip, config.gravity_m_s2, scene.walker, scene.ground, start)
-
-
-def engine_scene(
-    name: str,
-    assembly: Assembly,
-    base: str,
-    hip: Position,
-    gravity: float,
-    ours: ContactWalker,
-    ground: JudgedGround,
-    start: State,
-) -> EngineScene:
-    """The scene of an assembly that hangs from the hip."""
-    feet = tuple(
-        foot._replace(
-            lever_x=tuple(float(x) for x in d[:, 0]),
-            lever_y=tuple(float(x) for x in d[:, 1]),
-        )
-        for foot, part in zip(ours.feet, assembly.feet, strict=True)
-        for d in (levers_from(assembly, base, hip, part.body, part.centre_m),)
+    levers = [levers_from(assembly, base, hip, part.body, part.centre_m).T.tolist() for part in assembly.feet]
+    first, second = (
+        foot._replace(lever_x=tuple(x), lever_y=tuple(y))
+        for foot, (x, y) in zip(scene.walker.feet, levers, strict=True)
     )
-    walker = ours._replace(feet=(feet[0], feet[1]), merging=Unmerged())
-    scene = EngineScene(name, assembly, base, hip, gravity, ours, walker, ground, STANCE_FOOT, start)
-    return scene.with_knees_locked(knees_at_start(ours, STANCE_FOOT, start))
+    walker = scene.walker._replace(feet=(first, second), merging=Unmerged())
+    name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
+    free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
+    return free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start))
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
@@ -167,8 +150,7 @@ def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state
         )
     if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
         raise ConfigError(
-            "engines: the compliant stop of a knee is not taken to other engines.",
-            "Choose walker.knee.lock: ideal.",
+            "engines: the compliant stop of a knee is not taken to other engines.", "Choose walker.knee.lock: ideal."
         )
     length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
     return (scene_of(config, length, rigid_state),)
