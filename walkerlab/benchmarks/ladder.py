@@ -147,21 +147,13 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     """A run with its error."""
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
-    return MethodRow(
-        one.trial.name,
-        one.method,
-        run.tolerance,
-        result.outcome,
-        error,
-        end.method,
-        error is not None and error <= reference.agreement,
-        median(run.walls_s),
-        min(run.walls_s),
-        len(run.walls_s),
-        result.rhs_evaluations,
-        result.accepted,
-        result.rejected,
+    known = error is not None and error <= reference.agreement
+    asked, times = (
+        (one.trial.name, one.method, run.tolerance),
+        (median(run.walls_s), min(run.walls_s), len(run.walls_s)),
     )
+    work = result.rhs_evaluations, result.accepted, result.rejected
+    return MethodRow(*asked, result.outcome, error, end.method, known, *times, *work)
 
 
 def left_of(one: Ascent) -> list[dict[str, Any]]:

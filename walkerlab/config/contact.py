@@ -12,9 +12,11 @@ from walkerlab.config.fields import Block, key
 
 MM_PER_M: Final = 1000.0
 
-LENGTH_BOUNDS_M: Final = (1e-12, 10.0)
-STICTION_BOUNDS_M_S: Final = (1e-7, 10.0)
-FRICTION_VELOCITY_BOUNDS_M_S: Final = (1e-7, 1000.0)
+BOUNDS_SI: Final = {
+    "full_damping_penetration": (1e-12, 10.0, "m"),
+    "stiction_velocity": (1e-7, 10.0, "m/s"),
+    "friction_velocity": (1e-7, 1000.0, "m/s"),
+}
 
 _ADAMS = "ADAMS/View default, not given in the paper"
 _FIG_4B = "section 4 and Fig. 4b, unit not given"
@@ -121,24 +123,14 @@ class Contact(Block):
             return data
         exponent = data.get("exponent", 2.2)
         power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
-        quantities = {
-            "stiffness": 1.0e5 * MM_PER_M**power,
-            "damping": 90.0 * MM_PER_M,
-            "full_damping_penetration": 1.0e-4,
-            "stiction_velocity": 0.1,
-            "friction_velocity": 1.0,
+        factors = {
+            "stiffness": MM_PER_M**power,
+            "damping": MM_PER_M,
+            "full_damping_penetration": 1 / MM_PER_M,
+            "stiction_velocity": 1 / MM_PER_M,
+            "friction_velocity": 1 / MM_PER_M,
         }
-        return quantities | data
-
-    @field_validator("full_damping_penetration")
-    @classmethod
-    def _penetration_within_bounds(cls, value: float, info: ValidationInfo) -> float:
-        return _within(value, LENGTH_BOUNDS_M, "m", info)
-
-    @field_validator("stiction_velocity")
-    @classmethod
-    def _stiction_velocity_within_bounds(cls, value: float, info: ValidationInfo) -> float:
-        return _within(value, STICTION_BOUNDS_M_S, "m/s", info)
+        return {name: factor * cls.model_fields[name].default for name, factor in factors.items()} | data
 
     @field_validator("friction_velocity")
     @classmethod
@@ -146,7 +138,27 @@ class Contact(Block):
         stiction = info.data.get("stiction_velocity")
         if stiction is not None and value <= stiction:
             raise PydanticCustomError("order", "must exceed stiction_velocity, {least}", {"least": f"{stiction:g}"})
-        return _within(value, FRICTION_VELOCITY_BOUNDS_M_S, "m/s", info)
+        return value
+
+    @field_validator(*BOUNDS_SI)
+    @classmethod
+    def _within_bounds(cls, value: float, info: ValidationInfo) -> float:
+        """Refuse a length or velocity outside its bounds, which are the same physical ones in either units."""
+        adams = info.data.get("units", "adams") == "adams"
+        scale, prefix = (MM_PER_M, "m") if adams else (1.0, "")
+        least, most, unit = BOUNDS_SI[str(info.field_name)]
+        if least * scale <= value <= most * scale:
+            return value
+        raise PydanticCustomError(
+            "bounds",
+            "must be from {low} to {high} {unit}, as `units: {units}` has it",
+            {
+                "low": f"{least * scale:g}",
+                "high": f"{most * scale:g}",
+                "unit": prefix + unit,
+                "units": "adams" if adams else "si",
+            },
+        )
 
     @field_validator("dynamic_friction")
     @classmethod
@@ -169,17 +181,3 @@ class Contact(Block):
             static_friction=self.static_friction,
             dynamic_friction=self.dynamic_friction,
         )
-
-
-def _within(value: float, bounds_si: tuple[float, float], unit: str, info: ValidationInfo) -> float:
-    """Refuse a length or velocity outside its bounds, which are the same physical ones in either units."""
-    adams = info.data.get("units", "adams") == "adams"
-    scale, prefix = (MM_PER_M, "m") if adams else (1.0, "")
-    low, high = (bound * scale for bound in bounds_si)
-    if low <= value <= high:
-        return value
-    raise PydanticCustomError(
-        "bounds",
-        "must be from {low} to {high} {unit}, as `units: {units}` has it",
-        {"low": f"{low:g}", "high": f"{high:g}", "unit": prefix + unit, "units": "adams" if adams else "si"},
-    )

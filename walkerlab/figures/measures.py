@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -82,11 +83,17 @@ def said(key: str, value: float, unit: str = "") -> str:
     return f"{key}: {value:g} {unit}".rstrip()
 
 
-def weighing(prefix: str, body: Any) -> tuple[str, ...]:
-    """The words of a body's mass, with its inertia if it has one."""
-    keys = (f"{prefix}mass_kg", f"{prefix}inertia_kg_m2")
-    mass, inertia = (getattr(body, key.rpartition(".")[2], 0.0) for key in keys)
-    return (said(keys[0], mass), *((said(keys[1], inertia),) if inertia else ()))
+def weighing(walker: Any, prefix: str) -> tuple[str, ...]:
+    """The words of a body's mass, with its inertia if it has one; its keys begin with the prefix."""
+    inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
+    mass = said(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
+    return (mass, said(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
+
+
+def value_of(walker: Any, key: str, *otherwise: float) -> float:
+    """What a config's walker has under a dotted key; otherwise ..., if that is given."""
+    *blocks, last = key.split(".")
+    return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
 
 
 def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
@@ -94,44 +101,35 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
     lengths: list[Length] = []
-    masses = [Mass(weighing("hip_", walker), hip)]
-    if (torso := walker.torso) is not None:
-        head = (0.0, top + torso.above_hip_m)
-        lengths.append(Length("torso.above_hip_m", torso.above_hip_m, head, hip))
-        masses.append(Mass(weighing("torso.", torso), head))
+    masses = [Mass(weighing(walker, "hip_"), hip)]
+
+    def measured(key: str, start: Point, end: Point) -> None:
+        lengths.append(Length(key, value_of(walker, key), start, end))
+
+    if walker.torso is not None:
+        head = (0.0, top + walker.torso.above_hip_m)
+        measured("torso.above_hip_m", head, hip)
+        masses.append(Mass(weighing(walker, "torso."), head))
         top = head[1]
+    limbs = [("leg_", "hip", hip, sole)]
     if isinstance(walker, Kneed):
-        knee = (0.0, walker.shank.length_m)
-        joints.append(knee)
-        for name, limb, joint, below, end in (
-            ("thigh", walker.thigh, "hip", hip, knee),
-            ("shank", walker.shank, "knee", knee, sole),
-        ):
-            down = getattr(limb, f"mass_below_{joint}_m")
-            mass = (limb.mass_ahead_m, below[1] - down)
-            lengths += [
-                Length(f"{name}.mass_below_{joint}_m", down, below, mass),
-                Length(f"{name}.length_m", limb.length_m, below, end),
-                Length(f"{name}.mass_ahead_m", limb.mass_ahead_m, (0.0, mass[1]), mass),
-            ]
-            masses.append(Mass(weighing(f"{name}.", limb), mass))
-    else:
+        joints.append((0.0, walker.shank.length_m))
+        limbs = [("thigh.", "hip", hip, joints[1]), ("shank.", "knee", joints[1], sole)]
+    for limb, joint, above, end in limbs:
         if isinstance(walker, CompassWalker):
             mass = (0.0, walker.foot_to_mass_m)
-            lengths.append(Length("foot_to_mass_m", walker.foot_to_mass_m, mass, sole))
+            measured("foot_to_mass_m", mass, sole)
         else:
-            mass, centre = (
-                (walker.leg_mass_ahead_m, hip[1] - walker.leg_mass_below_hip_m),
-                (walker.foot_centre_ahead_m, radius),
-            )
-            lengths += [
-                Length("leg_mass_below_hip_m", walker.leg_mass_below_hip_m, hip, mass),
-                Length("leg_mass_ahead_m", walker.leg_mass_ahead_m, (0.0, mass[1]), mass),
-                Length("foot_centre_ahead_m", walker.foot_centre_ahead_m, (0.0, radius), centre),
-            ]
-        lengths.append(Length("leg_length_m", walker.leg_length_m, hip, sole))
-        masses.append(Mass(weighing("leg_", walker), mass))
-    lengths.append(Length("foot_radius_m", radius, centre, (centre[0], 0.0)))
+            below, ahead = f"{limb}mass_below_{joint}_m", f"{limb}mass_ahead_m"
+            mass = (value_of(walker, ahead), above[1] - value_of(walker, below))
+            measured(below, above, mass)
+            measured(ahead, (0.0, mass[1]), mass)
+        measured(f"{limb}length_m", above, end)
+        masses.append(Mass(weighing(walker, limb), mass))
+    if isinstance(walker, StraightLegs):
+        centre = (walker.foot_centre_ahead_m, radius)
+        measured("foot_centre_ahead_m", (0.0, radius), centre)
+    measured("foot_radius_m", centre, (centre[0], 0.0))
     return UprightLeg(tuple(joints), centre, radius, tuple(lengths), tuple(masses), top)
 
 
@@ -149,12 +147,15 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     leg = upright(walker)
     figure = blank(HEIGHT)
     axes = figure.add_subplot()
-    axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_xlim(-1.15 * leg.length, 1.35 * leg.length)
+    axes.set(aspect="equal", xlim=(-1.15 * leg.length, 1.35 * leg.length))
     axes.set_ylim(-0.16 * leg.length, leg.top + 0.1 * leg.length)
     ground(axes, leg.length)
-    other_leg(axes, leg)
+    # the other leg, off the ground behind, its knee bent if it has one
+    line, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    for angle, above, below in zip(angles, leg.joints, leg.line[1:], strict=True):
+        line.append(turned(angle, above, below, line[-1]))
+    draw_leg(axes, line, turned(angles[-1], leg.joints[-1], leg.centre, line[-2]), leg.radius, FAINT)
     draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [leg.length, leg.top], color=BLACK, linewidth=2.0)
     draw_heights(axes, leg)
@@ -180,14 +181,6 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     across, up = np.subtract(line[-1], line[-2])
     around = np.arctan2(across, -up) + ARC
     axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
-
-
-def other_leg(axes: Axes, leg: UprightLeg) -> None:
-    """The other leg, off the ground behind, its knee bent if it has one."""
-    line, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
-    for angle, above, below in zip(angles, leg.joints, leg.line[1:], strict=True):
-        line.append(turned(angle, above, below, line[-1]))
-    draw_leg(axes, line, turned(angles[-1], leg.joints[-1], leg.centre, line[-2]), leg.radius, FAINT)
 
 
 def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
@@ -245,8 +238,7 @@ def of_parts(walker: PartsWalker) -> Figure:
     for place, body in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), place + 1)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_title(f"name: {body.name}\n" + "\n".join(weighing("", body)))
-        axes.set_xlabel("ahead (m)")
+        axes.set(title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
         marks = list(marks_of(walker, body.name, body.centre_m))

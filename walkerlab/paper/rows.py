@@ -11,6 +11,7 @@ from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
+REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
 STEPS_OF_A_STRIDE = 2
 AROUND = 2.0  # 'around 1e-4' is up to twice that
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
@@ -50,7 +51,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
 def input_of_both(entry: printed.Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
     """A parameter of both models."""
     text = prose("evidence.input", value, entry.unit)
-    verdict, evidence = weigh(value == entry.value, NumberVerdict.EXPLAINED, departures, text)
+    verdict, evidence = weigh(value == entry.value, EXPLAINED, departures, text)
     return JudgedNumber(entry, value, value, value, verdict, evidence)
 
 
@@ -58,7 +59,7 @@ def input_of_contact(entry: printed.Printed, value: float, measured: Measured) -
     """A parameter of the contact model alone."""
     agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
     text = prose("evidence.input", value, entry.unit)
-    return judged(entry, {}, value, weigh(agrees, NumberVerdict.EXPLAINED, measured.departures.contact, text))
+    return judged(entry, {}, value, weigh(agrees, EXPLAINED, measured.departures.contact, text))
 
 
 def fixed_point_row(entry: printed.Printed, coordinate: int, measured: Measured) -> JudgedNumber:
@@ -66,9 +67,7 @@ def fixed_point_row(entry: printed.Printed, coordinate: int, measured: Measured)
     values = {name: model.state[coordinate] for name, model in measured.models.items()}
     found = {name: agreement(entry, value) for name, value in values.items()}
     text = prose("evidence.fixed_point", values, found)
-    return judged(
-        entry, values, None, weigh(any(found.values()), NumberVerdict.REFUTED, measured.departures.rigid, text)
-    )
+    return judged(entry, values, None, weigh(any(found.values()), REFUTED, measured.departures.rigid, text))
 
 
 def eigenvalue_row(measured: Measured) -> JudgedNumber:
@@ -76,15 +75,13 @@ def eigenvalue_row(measured: Measured) -> JudgedNumber:
     radii = measured.spectral_radii
     stable = bool(radii) and all(radius < printed.EIGENVALUES.value for radius in radii.values())
     text = prose("evidence.eigenvalue", radii)
-    return judged(
-        printed.EIGENVALUES, radii, None, weigh(stable, NumberVerdict.REFUTED, measured.departures.rigid, text)
-    )
+    return judged(printed.EIGENVALUES, radii, None, weigh(stable, REFUTED, measured.departures.rigid, text))
 
 
 def unitless_row(entry: printed.Printed, value: float, measured: Measured) -> JudgedNumber:
     """Stiffness or damping, which are printed without a unit."""
     text = prose("evidence.unitless", measured.contact)
-    return judged(entry, {}, value, weigh(False, NumberVerdict.EXPLAINED, measured.departures.contact, text))
+    return judged(entry, {}, value, weigh(False, EXPLAINED, measured.departures.contact, text))
 
 
 def lost_balance_row(measured: Measured) -> JudgedNumber:
@@ -94,9 +91,7 @@ def lost_balance_row(measured: Measured) -> JudgedNumber:
     short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
     text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
     agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
-    return judged(
-        printed.LOST_BALANCE, {}, float(steps), weigh(agrees, NumberVerdict.REFUTED, measured.departures.contact, text)
-    )
+    return judged(printed.LOST_BALANCE, {}, float(steps), weigh(agrees, REFUTED, measured.departures.contact, text))
 
 
 def raised_percent(measured: Measured, coordinate: int) -> float | None:
@@ -116,7 +111,7 @@ def velocities_raised(measured: Measured) -> list[float | None]:
 def raised_row(entry: printed.Printed, table_row: printed.StartRow, measured: Measured) -> JudgedNumber:
     """An increase of a velocity that section 4 claims: arithmetic, whatever the config."""
     agrees = bool(agreement(entry, percent_of(table_row).of_matlab))
-    verdict = NumberVerdict.REPRODUCED if agrees else NumberVerdict.REFUTED
+    verdict = REPRODUCED if agrees else REFUTED
     text = prose("evidence.raised", measured.contact, velocities_raised(measured))
     text = regardless(measured.departures.contact, text)
     return judged(entry, {}, raised_percent(measured, printed.TABLE_2.index(table_row)), (verdict, text))
@@ -126,8 +121,8 @@ def percent_row(table_row: printed.StartRow, coordinate: int, measured: Measured
     """A percentage of Table 2: arithmetic, whatever the config."""
     entry, percent = table_row.percent, percent_of(table_row)
     agrees = bool(agreement(entry, percent.of_matlab))
-    otherwise = NumberVerdict.EXPLAINED if agreement(entry, percent.of_adams) else NumberVerdict.REFUTED
-    verdict = NumberVerdict.REPRODUCED if agrees else otherwise
+    otherwise = EXPLAINED if agreement(entry, percent.of_adams) else REFUTED
+    verdict = REPRODUCED if agrees else otherwise
     text = regardless(measured.departures.contact, prose("evidence.percent", percent, verdict))
     return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
 
@@ -138,8 +133,8 @@ def adams_start_row(entry: printed.Printed, coordinate: int, measured: Measured,
     value = None if start is None else start[coordinate]
     is_angle = coordinate < 2
     text = prose("evidence.adams_start", study, is_angle, measured.contact, velocities_raised(measured))
-    otherwise = NumberVerdict.EXPLAINED if is_angle or study.adams.starts_a_gait else NumberVerdict.REFUTED
-    verdict = NumberVerdict.REPRODUCED if agreement(entry, value) else otherwise
+    otherwise = EXPLAINED if is_angle or study.adams.starts_a_gait else REFUTED
+    verdict = REPRODUCED if agreement(entry, value) else otherwise
     return judged(entry, {}, value, (verdict, regardless(measured.departures.contact, text)))
 
 
@@ -150,7 +145,7 @@ def strides_row(measured: Measured) -> JudgedNumber:
     done = contact.steps // STEPS_OF_A_STRIDE
     went_on = contact.outcome == "walked"
     text = prose("evidence.strides", contact, done, went_on and done < printed.STRIDES.value)
-    otherwise = NumberVerdict.EXPLAINED if went_on else NumberVerdict.REFUTED
+    otherwise = EXPLAINED if went_on else REFUTED
     return judged(
         printed.STRIDES,
         strides,
@@ -174,8 +169,8 @@ def error_row(entry: printed.Printed, measured: Measured, study: PaperStudy, whi
     text = prose("evidence.error", entry, late, off, measured.equations, found)
     raw, aligned = (max(getattr(errors[way], which)) if way in errors else None for way in ("raw", "aligned"))
     limit = AROUND * entry.value
-    otherwise = NumberVerdict.EXPLAINED if aligned is not None and aligned <= limit else NumberVerdict.REFUTED
-    verdict = NumberVerdict.REPRODUCED if raw is not None and raw <= limit else otherwise
+    otherwise = EXPLAINED if aligned is not None and aligned <= limit else REFUTED
+    verdict = REPRODUCED if raw is not None and raw <= limit else otherwise
     text = regardless(measured.departures.contact, text)
     return judged(entry, {}, raw if aligned is None else aligned, (verdict, text))
 
@@ -187,9 +182,7 @@ def step_length_row(measured: Measured) -> JudgedNumber:
     found = [*lengths.values(), *([] if contact is None else [contact])]
     text = prose("evidence.step_length", lengths, contact, max(found, default=None))
     agrees = any(agreement(printed.STEP_LENGTH, length) for length in lengths.values())
-    return judged(
-        printed.STEP_LENGTH, lengths, contact, weigh(agrees, NumberVerdict.REFUTED, measured.departures.rigid, text)
-    )
+    return judged(printed.STEP_LENGTH, lengths, contact, weigh(agrees, REFUTED, measured.departures.rigid, text))
 
 
 def velocity_difference_row(measured: Measured) -> JudgedNumber:
@@ -207,8 +200,8 @@ def velocity_difference_row(measured: Measured) -> JudgedNumber:
     by_cycle = speed_difference(printed.T_CYCLE.matlab.value, printed.T_CYCLE.adams.value)
     text = regardless(measured.departures.contact, prose("evidence.velocity_difference", found, by_cycle, sums))
     agrees = bool(found) and max(found.values()) < printed.VELOCITY_DIFFERENCE.value
-    refuted = NumberVerdict.REFUTED if sums >= printed.VELOCITY_DIFFERENCE.value else NumberVerdict.EXPLAINED
-    verdict = NumberVerdict.REPRODUCED if agrees else refuted
+    refuted = REFUTED if sums >= printed.VELOCITY_DIFFERENCE.value else EXPLAINED
+    verdict = REPRODUCED if agrees else refuted
     return judged(printed.VELOCITY_DIFFERENCE, found, None, (verdict, text))
 
 
@@ -230,7 +223,7 @@ def matlab_row(entry: printed.ResultRow, measured: Measured, study: PaperStudy) 
     means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is printed.E_AVG else {}
     taken = [steps for steps, mean in means.items() if agreement(printed.E_AVG.matlab, mean)]
     # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
-    otherwise = NumberVerdict.EXPLAINED if taken else NumberVerdict.REFUTED
+    otherwise = EXPLAINED if taken else REFUTED
     text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
     agrees = any(agreement(entry.matlab, value) for value in rigid.values())
     return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
@@ -240,6 +233,6 @@ def adams_row(entry: printed.ResultRow, measured: Measured) -> JudgedNumber:
     """A number of Table 3's ADAMS column against the contact model."""
     rigid, contact = columns(entry, measured)
     text = prose("evidence.adams", entry, measured, names_of(entry))
-    otherwise = NumberVerdict.EXPLAINED if contact is None else NumberVerdict.REFUTED
+    otherwise = EXPLAINED if contact is None else REFUTED
     agrees = bool(agreement(entry.adams, contact))
     return judged(entry.adams, rigid, contact, weigh(agrees, otherwise, measured.departures.contact, text))

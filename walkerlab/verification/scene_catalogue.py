@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
 
 from walkerlab.config.contact import Contact
+from walkerlab.config.fields import Block
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.walkers import Kneed, PartsWalker
@@ -22,6 +23,7 @@ SOFTER, STICKIER = 100.0, 10.0
 STOP = 10.0
 
 Judged = tuple[Case, Config]
+B = TypeVar("B", bound=Block)
 
 
 def scene_cases(config: Config) -> list[Judged]:
@@ -49,7 +51,7 @@ def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
     yield case("as-it-is", "the scene's walk on its own ground", "walkers", steps=AS_IT_IS_STEPS, twin=True), config
 
     def on(**changes: float) -> Config:
-        return config.model_copy(update={"contact": ground.model_copy(update=changes)})
+        return changed(config, "contact", changes)
 
     stiffer = case("stiffness-times-100", "nearer to rigid; no more damped, so feet may bounce", "ground")
     yield stiffer, on(stiffness=SOFTER * ground.stiffness)
@@ -62,8 +64,7 @@ def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
         yield smooth, on(static_friction=0.0, dynamic_friction=0.0)
 
     def solved(rtol: float, atol: float) -> Config:
-        settings = config.solver.contact.model_copy(update={"rtol": rtol, "atol": atol})
-        return config.model_copy(update={"solver": config.solver.model_copy(update={"contact": settings})})
+        return changed(config, "solver.contact", {"rtol": rtol, "atol": atol})
 
     loose = case("loose", "ordinary library tolerances", "numerics", agreement=0.05, balance=1e-3)
     yield loose, solved(1e-3, 1e-5)
@@ -85,12 +86,12 @@ def start_cases(config: Config) -> Iterator[Judged]:
 def knee_cases(config: Config) -> Iterator[Judged]:
     """The knees' other instant of release, and their stops if they have some; nothing for straight legs."""
     walker = config.walker
-    if not isinstance(walker, Kneed | PartsWalker) or (isinstance(walker, PartsWalker) and not has_knees(walker)):
+    knees = isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
+    if not knees or not isinstance(walker, Kneed | PartsWalker):
         return
 
     def with_knee(**changes: Any) -> Config:
-        knee = walker.knee.model_copy(update=changes)
-        return config.model_copy(update={"walker": walker.model_copy(update={"knee": knee})})
+        return changed(config, "walker.knee", changes)
 
     other = "touch" if walker.knee.release == "compression" else "compression"
     yield case(f"released-at-{other}", "the other instant of release", "knees"), with_knee(release=other)
@@ -100,9 +101,12 @@ def knee_cases(config: Config) -> Iterator[Judged]:
         yield case("stop-over-10", "a softer stop", "knees"), with_knee(stop_stiffness=stiffness / STOP)
 
 
-def has_knees(walker: PartsWalker) -> bool:
-    """Whether a hinge locks."""
-    return any(hinge.locks for hinge in walker.hinges)
+def changed(block: B, path: str, changes: Mapping[str, Any]) -> B:
+    """A block with some keys of a block inside it, given by its dotted path, set anew."""
+    name, _, rest = path.partition(".")
+    inner = getattr(block, name)
+    inside = changed(inner, rest, changes) if rest else inner.model_copy(update=changes)
+    return block.model_copy(update={name: inside})
 
 
 def case(name: str, reason: str, family: str, expected: tuple[Fate, ...] = ENDS, **settings: Any) -> Case:
