@@ -11,12 +11,13 @@ from types import NoneType
 from typing import Any, cast
 
 from walkerlab.cli.text import in_words
+from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.placing import on_the_slope
-from walkerlab.config.schema import Config, Contact
+from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.tree import Mapping as Tree

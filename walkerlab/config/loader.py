@@ -16,9 +16,10 @@ from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.placing import on_the_slope
 from walkerlab.config.run_name import run_name
-from walkerlab.config.schema import CompassWalker, Config
+from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping, Position, Scalar
 from walkerlab.config.validation import typed
+from walkerlab.config.walkers import CompassWalker
 
 STEEP_RAD: Final = 0.5
 """No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from walkerlab.config.numbers import short
-from walkerlab.config.schema import Config, Kneed, PartsWalker
+from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping
+from walkerlab.config.walkers import Kneed, PartsWalker
 
 MOVED_RAD: Final = 1e-12
 

@@ -14,6 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 # The command line's help is made from types of this module, and loads no schema and no pydantic.
 if TYPE_CHECKING:
     from walkerlab.config import schema
+    from walkerlab.config.basin import Basin
+    from walkerlab.config.contact import Contact
+    from walkerlab.config.continuation import Continuation
+    from walkerlab.config.stability import Case
+    from walkerlab.config.walkers import Walker
 
 
 @cache
@@ -46,7 +51,7 @@ class RigidConfig(Protocol):
     """What the rigid model is made of."""
 
     @property
-    def walker(self) -> schema.Walker: ...
+    def walker(self) -> Walker: ...
     @property
     def gravity_m_s2(self) -> float: ...
     @property
@@ -59,7 +64,7 @@ class ContactConfig(RigidConfig, Protocol):
     """What both models are made of."""
 
     @property
-    def contact(self) -> schema.Contact | None: ...
+    def contact(self) -> Contact | None: ...
 
 
 class StartConfig(Protocol):
@@ -143,14 +148,14 @@ class OwnCases(Protocol):
     """The config's own cases."""
 
     @property
-    def cases(self) -> tuple[schema.Case, ...]: ...
+    def cases(self) -> tuple[Case, ...]: ...
 
 
 class CompassCasesConfig(Protocol):
     """What `stability` takes where the walker is the paper's compass: cases stand on the paper's config."""
 
     @property
-    def walker(self) -> schema.Walker: ...
+    def walker(self) -> Walker: ...
     @property
     def stability(self) -> OwnCases: ...
 
@@ -180,14 +185,14 @@ class ContinuationConfig(FixedPointConfig, ContactConfig, Protocol):
     """What `continuation` takes."""
 
     @property
-    def continuation(self) -> schema.Continuation: ...
+    def continuation(self) -> Continuation: ...
 
 
 class BasinConfig(FixedPointConfig, GroundConfig, Protocol):
     """What `basin` takes."""
 
     @property
-    def basin(self) -> schema.Basin: ...
+    def basin(self) -> Basin: ...
 
 
 class NamedConfig(Protocol):

@@ -10,50 +10,12 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.basin import Basin
-from walkerlab.config.contact import Contact, ContactSI
+from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key
-from walkerlab.config.stability import Case, Stability
+from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
-from walkerlab.config.walkers import (
-    CompassWalker,
-    Kneed,
-    PartsWalker,
-    StraightLegs,
-    Walker,
-    is_plain_compass,
-    rigid_bodies,
-    too_light_for_contact,
-)
-
-__all__ = [
-    "METHODS",
-    "OUTPUTS",
-    "Basin",
-    "Case",
-    "CompassWalker",
-    "Config",
-    "Contact",
-    "ContactSI",
-    "ContactSolver",
-    "Continuation",
-    "Equations",
-    "Kneed",
-    "Method",
-    "Output",
-    "PartsWalker",
-    "RigidSolver",
-    "SlopeInDegrees",
-    "SolverSettings",
-    "Solvers",
-    "Source",
-    "Stability",
-    "State",
-    "StraightLegs",
-    "Sweep",
-    "Tune",
-    "Walker",
-]
+from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, rigid_bodies, too_light_for_contact
 
 Equations = Literal["corrected", "as-printed"]
 Output = Literal["states", "energies", "forces"]

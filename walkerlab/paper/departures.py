@@ -6,9 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Any, Final
 
+from walkerlab.config.contact import Contact
 from walkerlab.config.numbers import same
 from walkerlab.config.reads import ContactConfig, RigidConfig
-from walkerlab.config.schema import CompassWalker, Config, Contact
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import CompassWalker
 from walkerlab.paper.measured import Departures
 from walkerlab.paper.printed import X_P, slope_of
 

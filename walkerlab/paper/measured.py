@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.schema import Contact
+from walkerlab.config.contact import Contact
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
 from walkerlab.hybrid.rigid_measures import energies

@@ -33,8 +33,8 @@ from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
+    from walkerlab.config.contact import Contact
     from walkerlab.config.reads import ContactConfig, RigidConfig
-    from walkerlab.config.schema import Contact
 
 GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
