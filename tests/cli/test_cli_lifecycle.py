@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 from pathlib import Path
@@ -18,8 +19,8 @@ def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
     assert done.returncode == 0
     assert "walkerlab report -c 'my walker.yaml'" in done.stdout
     text = (walker.folder / "my walker.yaml").read_text()
-    assert text.startswith("# yaml-language-server: $schema=.walkerlab-schema.json\nname: my-walker\n")
-    assert "# L: Table 1" in text
+    assert text.startswith("# yaml-language-server: $schema=.walkerlab-schema.json\n")
+    assert "# L, from foot to hip: number, from 0.001 to 1000 (m)\n  leg_length_m: 1.0\n" in text
     assert "slope_rad" in json.loads((walker.folder / ".walkerlab-schema.json").read_text())["properties"]
     assert (
         load(walker.folder / "my walker.yaml").config.model_dump()
@@ -41,6 +42,15 @@ def test_init_writes_a_type_or_a_built_in_config_under_its_name(walker, walker_t
     assert walker("init", "--type", walker_type).returncode == 0
     written = load(walker.folder / f"my-{walker_type}.yaml").config
     assert written.model_copy(update={"name": config}) == load(Path(config)).config
+
+
+@pytest.mark.parametrize("walker_type", ["compass", "straight-legs", "kneed", "parts", "torso"])
+def test_every_key_that_init_writes_has_a_comment_above_it(walker, walker_type):
+    assert walker("init", "x.yaml", "--type", walker_type).returncode == 0
+    lines = (walker.folder / "x.yaml").read_text().splitlines()
+    values = [n for n, line in enumerate(lines) if re.match(r" *\w+: \S", line)]
+    assert len(values) > 20
+    assert [lines[n] for n in values if not lines[n - 1].lstrip().startswith("#")] == []
 
 
 @pytest.mark.parametrize(("text", "name"), [("Läufer 2", "Laufer-2"), ("a  b", "a-b"), ("-x.", "x"), ("歩", "run")])

@@ -246,3 +246,24 @@ def test_a_steep_slope_in_degrees_and_heavy_walkers_of_their_size_are_taken_with
 def test_masses_of_parts_are_told_too() -> None:
     (warning,) = load(sets=["walker.torso={mass_kg: 5000, above_hip_m: 0.3}"]).warnings
     assert "walker.torso.mass_kg is 5000 kg" in warning
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "said"),
+    [
+        ("body: shank 2, centre_m", "body: shnk 2, centre_m", "21:14: walker.feet.1.body: shnk 2 is no body; did you"),
+        ("body: shank 2, centre_m", "body: shank 1, centre_m", "21:14: walker.feet.1.body: shank 1 is not of leg 2"),
+        ("body: thigh 2, at_m", "body: thigh, at_m", "18:39: walker.particles.0.body: thigh is no body"),
+        ("legs: [[thigh 1,", "legs: [[thigh 3,", "22:11: walker.legs.0.0: thigh 3 is no body"),
+        ("parent: thigh 1,", "parent: tigh 1,", "15:30: walker.hinges.1.parent: tigh 1 is no body"),
+    ],
+)
+def test_a_part_on_a_body_that_is_not_there_is_refused_where_it_stands(
+    line: str, wrong: str, said: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.yaml"
+    text = (BUILTIN_FOLDER / "parts.yaml").read_text()
+    assert line in text
+    file.write_text(text.replace(line, wrong, 1))
+    with pytest.raises(ConfigError, match=re.escape(f"mine.yaml:{said}")):
+        load(file)

@@ -6,29 +6,35 @@ import json
 import shlex
 from pathlib import Path
 
-from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin_names
+from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
 from walkerlab.config.problems import nearest
 from walkerlab.config.reference import as_json_schema
+from walkerlab.config.schema import Config
+from walkerlab.config.writer import commented
 from walkerlab.errors import ConfigError, StorageError
 
 SCHEMA = ".walkerlab-schema.json"
+QUESTIONS = ("stability", "tune", "continuation", "basin", "sweep")
+"""Blocks that are written only where they are not at their defaults."""
 
 
 def write_config(file: Path, walker: str) -> str:
-    """Write the built-in config of a type of walker as one of the user's own, and the schema beside it.
+    """Write the built-in config of a type of walker as one of the user's own, each key explained, and its schema.
 
     Raises ConfigError if there is no such type, StorageError if the file exists or cannot be written.
     """
-    text = (BUILTIN_FOLDER / f"{template(walker)}.yaml").read_text(encoding="utf-8")
+    config = load(Path(template(walker))).config
     if file.exists():
         raise StorageError(f"{file} is there already.", "Choose another name; nothing was overwritten.")
-    lines = [line for line in text.splitlines() if not line.startswith("name:")]
-    head = [f"# yaml-language-server: $schema={SCHEMA}", f"name: {safe_name(file.stem)}"]
+    default = Config()
+    untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
+    named = config.model_copy(update={"name": safe_name(file.stem)})
+    text = f"# yaml-language-server: $schema={SCHEMA}\n{commented(named, untouched)}"
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         (file.parent / SCHEMA).write_text(json.dumps(as_json_schema(), indent=1) + "\n", encoding="utf-8")
-        file.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
+        file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise StorageError(
             f"{file} could not be written: {error.strerror or error}.", "Choose a file in a folder that can be written."

@@ -143,5 +143,5 @@ def allowed(field: FieldInfo) -> str:
     if what == "word":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
-        bounds = f"{what}, {bounds}" if bounds else what
+        bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
     return with_unit(bounds, unit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -15,6 +16,7 @@ from walkerlab.config.layers import stacked
 from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence, plain
+from walkerlab.config.walkers import PartsWalker
 
 _REASONS: Final = {
     "float_type": "is not a number",
@@ -56,7 +58,47 @@ def typed(tree: Mapping) -> Config:
         problems += _problems(error, tree, Config)
     if problems:
         raise refusal(sorted(problems, key=_place))
+    refuse_unknown_bodies(config, tree)
     return config
+
+
+def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
+    """Raise ConfigError with their places for parts that are on bodies that the walker has not, or on the wrong leg."""
+    walker = config.walker
+    if not isinstance(walker, PartsWalker):
+        return
+    bodies = [body.name for body in walker.bodies]
+    problems = []
+    for place, name in bodies_named(walker):
+        if name not in bodies:
+            text = f"{dotted(place)}: {shown(name)} is no body"
+            problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(bodies), nearest(name, bodies)))
+    for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
+        if foot.body in bodies and foot.body not in leg:
+            place = ("walker", "feet", k, "body")
+            text = f"{dotted(place)}: {shown(foot.body)} is not of leg {k + 1}, whose foot this is"
+            problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(leg)))
+    if problems:
+        raise refusal(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
+
+
+def bodies_named(walker: PartsWalker) -> Iterator[tuple[tuple[int | str, ...], str]]:
+    """Where parts name a body, and which."""
+    for k, hinge in enumerate(walker.hinges):
+        yield ("walker", "hinges", k, "parent"), hinge.parent
+        yield ("walker", "hinges", k, "child"), hinge.child
+    for key in ("particles", "feet", "couplings"):
+        for k, part in enumerate(getattr(walker, key)):
+            yield ("walker", key, k, "body"), part.body
+    for k, coupling in enumerate(walker.couplings):
+        yield from ((("walker", "couplings", k, "of", n), name) for n, name in enumerate(coupling.of))
+    for k, leg in enumerate(walker.legs):
+        yield from ((("walker", "legs", k, n), name) for n, name in enumerate(leg))
+
+
+def dotted(place: tuple[int | str, ...]) -> str:
+    """A place in a config as a key, places in lists counted from 0."""
+    return ".".join(map(str, place))
 
 
 def _place(problem: Problem) -> tuple[str, int, int]:

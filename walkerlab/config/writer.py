@@ -1,22 +1,75 @@
-"""A resolved config as YAML text, as artifacts carry it: it loads back to the same config."""
+"""A config as YAML text that loads back to the same: bare, as artifacts carry it, or with a comment on each key."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
-from typing import Any
+import textwrap
+from collections.abc import Collection, Iterator
+from typing import Any, Final
 
+from pydantic.fields import FieldInfo
+
+from walkerlab.config.fields import Block, allowed, block_of
 from walkerlab.config.reader import value_of
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import Config, Source
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
 """What YAML may read as more than text in an unquoted value."""
+WIDTH: Final = 110
+ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
 
 def to_yaml(config: Config) -> str:
     """YAML text of every key of `config`, defaults included."""
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
+
+
+def commented(config: Config, left_alone: Collection[str] = ()) -> str:
+    """YAML text of `config` with meaning, bounds and unit of each key above it.
+
+    left_alone  keys of the config that are not written: they have their defaults
+    """
+    values = config.model_dump(mode="json", exclude=set(left_alone))
+    lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _commented(block: Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:
+    for name, value in values.items():
+        field, held = type(block).model_fields[name], getattr(block, name)
+        if isinstance(held, Block):
+            yield from [""] * (not indent)
+            yield from _comment(field.description or "", indent)
+            yield f"{indent}{name}:"
+            yield from _commented(held, value, f"{indent}  ", f"{path}{name}.")
+        elif value is None and block_of(field) is Source:
+            continue  # the study that a built-in config redoes is not a user's own
+        elif value is None and block_of(field) is not None:
+            yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
+        elif isinstance(held, tuple) and held and isinstance(held[0], Block):
+            yield from _comment(field.description or "", indent)
+            for inner, one in type(held[0]).model_fields.items():
+                yield from _comment(f"{inner}: {_meaning(one)}", f"{indent}  ")
+            yield f"{indent}{name}:"
+            for item in value:
+                yield f"{indent}  - {{{', '.join(f'{key}: {_value(inner)}' for key, inner in item.items())}}}"
+        else:
+            yield from _comment(_meaning(field), indent)
+            yield f"{indent}{name}: {_value(value)}"
+
+
+def _meaning(field: FieldInfo) -> str:
+    """What a key is, and what it allows."""
+    return ": ".join(part for part in (field.description, allowed(field)) if part)
+
+
+def _comment(text: str, indent: str) -> Iterator[str]:
+    return iter(
+        textwrap.wrap(
+            text, WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}#   ", break_on_hyphens=False
+        )
+    )
 
 
 def _lines(block: dict[str, Any], indent: str) -> Iterator[str]:
