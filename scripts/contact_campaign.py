@@ -296,7 +296,7 @@ def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
     config, start = load(Path(drawn.base), drawn.sets).config, drawn.start
     pads = config.contact is not None and config.contact.pad_pitch not in ("rigid", "own")
     scene = contact_scene(config, float(config.contact.pad_pitch) if config.contact and pads else PLANE_MEASURE_M)
-    plain, hinged = plain_scene(config, scene.pitch_m), scene.pinned is not None
+    plain, hinged = plain_scene(config, scene.pitch_m), scene.pinned
     coarse, fine = (plainly(plain, start, hinged, steps, h) for h in (step_s, 0.5 * step_s))
     expected = of_plain(plain, fine)
     plain_error = apart(of_plain(plain, coarse), expected)

@@ -10,16 +10,13 @@ import numpy as np
 
 from walkerlab.config import loader
 from walkerlab.ground.friction import Coulomb, Frictionless
-from walkerlab.ground.motion import OnGround
-from walkerlab.ground.walker import ContactWalker
+from walkerlab.ground.walker import ContactWalker, on_ground
 from walkerlab.kernels import inlined, kernel
 from walkerlab.mechanics.standing import BENT, Mode, Standing, swing_foot
 from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
-from walkerlab.scene.contact import contact_scene, hinged_walker
+from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import compass, rigid_walker
-from walkerlab.solvers import system as in_arrays
-from walkerlab.solvers.in_tuples import blank, derivative
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import State, derivative
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
 CALLS, STATES = 200_000, 64  # calls of a right-hand side, and the states that they are at
@@ -37,17 +34,11 @@ class AppendixA(NamedTuple):
     walker: RigidWalker
 
 
-@blank.case(AppendixA)
-def appendix_a_blank(system: AppendixA) -> State:
-    """Two angles and their velocities."""
-    return (0.0, 0.0, 0.0, 0.0)
-
-
 @derivative.case(AppendixA)
-def appendix_a_derivative(system: AppendixA, t: float, y: State) -> State:
+def appendix_a_derivative(system: AppendixA, t: float, y: Any, f: Any) -> None:
     """(A.58)."""
-    alpha_1, alpha_2 = accelerations(system.walker, y[0], y[1], y[2], y[3])
-    return (y[2], y[3], alpha_1, alpha_2)
+    f[0], f[1] = y[2], y[3]
+    f[2], f[3] = accelerations(system.walker, y[0], y[1], y[2], y[3])
 
 
 @kernel
@@ -55,7 +46,7 @@ def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
     """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
     for call in range(calls):
         place = call % states.shape[0]
-        in_arrays.derivative(system, 0.0, states[place], rates[place])
+        derivative(system, 0.0, states[place], rates[place])
 
 
 def systems() -> dict[str, tuple[Any, State]]:
@@ -68,11 +59,11 @@ def systems() -> dict[str, tuple[Any, State]]:
         "Appendix A": (AppendixA(compass(ONE_DEGREE, "corrected")), ANGLES),
         "rigid": (Mode(rigid, BENT), ANGLES),
         "rigid, inertia": (Mode(heavy, BENT), ANGLES),
-        "contact": (OnGround(walker, both), FREE),
-        "contact, friction of zero": (OnGround(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
-        "contact, frictionless": (OnGround(walker._replace(friction=Frictionless()), both), FREE),
-        "contact, inertia": (OnGround(walker_of(rigid, "walker.leg_inertia_kg_m2=0.1"), both), FREE),
-        "contact, hinged": (hinged_walker(ONE_DEGREE, walker), ANGLES),
+        "contact": (on_ground(walker, both), FREE),
+        "contact, friction of zero": (on_ground(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
+        "contact, frictionless": (on_ground(walker._replace(friction=Frictionless()), both), FREE),
+        "contact, inertia": (on_ground(walker_of(rigid, "walker.leg_inertia_kg_m2=0.1"), both), FREE),
+        "contact, hinged": (on_ground(walker, (False, False), hinged=True), ANGLES),
     }
 
 

@@ -17,22 +17,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from flip_shift import Ground, config_of
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.ground.held import NoKnees, NoneBends, always_held, no_stops
-from walkerlab.ground.merged import ByKnees, as_fewer, merged_state
-from walkerlab.ground.motion import OnGround, motion_gradient
-from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
-from walkerlab.hybrid.contact_events import feet_motion
+from walkerlab.ground.motion import mass_matrix, motion_gradient
+from walkerlab.ground.walker import (
+    LOCKED,
+    FootMotion,
+    OnGround,
+    feet_motion,
+    folded,
+    foot_force,
+    on_ground,
+    sines_cosines,
+)
 from walkerlab.hybrid.contact_run import walk_contact
-from walkerlab.mechanics.tree import mass_matrix, sines_cosines
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import derivative
 
+Floats = NDArray[np.float64]
 GROUNDS = (
     Ground(6.25, 1e-4),
     Ground(6.25, 1e-4, 100.0, 10.0),
@@ -54,52 +60,48 @@ class Struck(NamedTuple):
     share: float  # of the impulse normal to the ground that the leading foot took
 
 
-def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[ContactWalker, State]:
-    """A config's walker, with straight legs as one body each, and its state at its first touch."""
+def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Floats]:
+    """A config's walker on ground, with straight legs as one body each, and its state at its first touch."""
     config = config_of(ground, f"slope_deg={slope_deg!r}", "contact.terrain=after-mid-swing", of=name)
     rigid = rigid_walker(config, config.equations)
     gait = find_gaits(rigid, config.seed).gait
     assert gait is not None, "the slope has a gait"
     trial = contact_trial(config, tuple(gait.state), gait.step_length, 1)
     methods = Tolerances("radau5", 1e-10, 1e-13, 10**7)
-    y = walk_contact(trial.walker, trial.ground, None, TRAILING, trial.start, methods, 1, None, False).end_state
-    walker = trial.walker
-    if isinstance(walker.knees, NoKnees):
-        return walker, y
-    assert isinstance(walker.merging, ByKnees), "knees lock ideally"
-    assert not walker.knees.release_at_touch, "both are still locked as the foot sinks in"
-    both = walker.merging.both
-    straight = as_fewer(walker, both, both.held, NoneBends(walker.knees.release_at_touch))
-    return straight, merged_state(both.onto, np.array(y), straight.blank)
+    y = walk_contact(trial.walker, trial.ground, False, TRAILING, trial.start, methods, 1, None, False).end_state
+    assert not trial.walker.whole.release_at_touch, "both knees are still locked as the foot sinks in"
+    system = on_ground(trial.walker, (True, True), (LOCKED, LOCKED))
+    return system, folded(system.form, y)
 
 
-def freed(walker: ContactWalker, y: State) -> FootMotion:
+def freed(system: OnGround, y: Floats) -> FootMotion:
     """The trailing foot after an impact that only the leading foot takes: M dv = J' impulse, J v+ = 0."""
-    n = len(walker.tree.arm_x)
-    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    M = np.diag([walker.tree.mass, walker.tree.mass, *[0.0] * n])
-    M[2:, 2:] = np.array(mass_matrix(walker.tree, s, c)).reshape(n, n)
+    form, n = system.form, int(system.form.bodies)
+    s, c, M, masses = np.zeros(n), np.zeros(n), np.zeros((n, n)), np.diag([float(form.mass)] * (2 + n))
+    sines_cosines(form, y, s, c)
+    mass_matrix(form, s, c, M)
+    masses[2:, 2:] = M
     # how fast the leading foot slips and sinks, by each velocity
-    foot = walker.feet[LEADING]
-    J = np.array([motion_gradient(foot, s, c, y, 2 + n + i)[1:] for i in range(2 + n)]).T
-    v = np.array(y[2 + n :])
-    taken = np.linalg.solve(M, J.T)
+    J = np.array([motion_gradient(form, LEADING, s, c, y, 2 + n + i)[1:] for i in range(2 + n)]).T
+    v = y[2 + n :]
+    taken = np.linalg.solve(masses, J.T)
     after = v - taken @ np.linalg.solve(J @ taken, J @ v)
-    return feet_motion(walker, (*y[: 2 + n], *after.tolist()))[TRAILING]
+    return feet_motion(form, np.concatenate((y[: 2 + n], after)))[TRAILING]
 
 
-def strike(walker: ContactWalker, y: State) -> Struck:
+def strike(system: OnGround, y: Floats) -> Struck:
     """Integrate from the touch until the leading foot stops sinking in, with the normal impulses of both feet."""
-    system = OnGround(walker, (True, True), always_held(walker.held), no_stops(walker.knees))
 
-    def feet(x: Any) -> tuple[FootMotion, FootMotion]:
-        return feet_motion(walker, tuple(x[:-2].tolist()))
+    def feet(x: Floats) -> tuple[FootMotion, FootMotion]:
+        return feet_motion(system.form, x[:-2])
 
-    def rates(t: float, x: Any) -> tuple[float, ...]:
-        pushes = (foot_force(walker, foot).normal.force if foot.height < 0.0 else 0.0 for foot in feet(x))
-        return (*derivative(system, t, tuple(x[:-2].tolist())), *pushes)
+    def rates(t: float, x: Floats) -> Floats:
+        pushes = [foot_force(system, foot).normal.force if foot.height < 0.0 else 0.0 for foot in feet(x)]
+        f = np.zeros(y.size)
+        derivative(system, t, x[:-2], f)
+        return np.concatenate((f, pushes))
 
-    def sinking(_t: float, x: Any) -> float:
+    def sinking(_t: float, x: Floats) -> float:
         return feet(x)[LEADING].vertical_velocity
 
     ending: Any = sinking
@@ -122,8 +124,8 @@ def main() -> None:
     own = 4.2 if asked.config == "paper" else math.degrees(config_of(GROUNDS[0], of=asked.config).slope_rad)
     slope = own if asked.slope is None else asked.slope
     for ground in GROUNDS:
-        walker, y = at_touch(ground, asked.config, slope)
-        found, free = strike(walker, y), freed(walker, y)
+        system, y = at_touch(ground, asked.config, slope)
+        found, free = strike(system, y), freed(system, y)
         numbers = (
             ground.stiffer,
             ground.damped,

@@ -9,7 +9,7 @@ from walkerlab.benchmarks.engines.follow import crossing, follower
 from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
-from walkerlab.ground.held import BENT, LOCKED
+from walkerlab.ground.walker import BENT, LOCKED
 from walkerlab.hybrid.outcome import Outcome
 
 

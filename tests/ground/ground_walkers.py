@@ -20,8 +20,9 @@ def parts(radius=0.001, inertia=0.0):
     return CompassParts(1.0, 0.5, 5.0, 10.0, inertia, radius)
 
 
-def compass(friction=COULOMB, normal=ADAMS, radius=0.001, inertia=0.0, slope=SLOPE):
-    return contact_walker(compass_assembly(parts(radius, inertia)), normal, friction, GRAVITY, slope)
+def compass(friction=COULOMB, normal=ADAMS, radius=0.001, inertia=0.0, slope=SLOPE, hinged_foot=1):
+    assembly = compass_assembly(parts(radius, inertia))
+    return contact_walker(assembly, normal, friction, GRAVITY, slope, hinged_foot=hinged_foot)
 
 
 def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):
@@ -33,12 +34,13 @@ def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):
 
 def placed(walker, foot, depth, theta, omega, slip, vertical_velocity, along=0.0):
     """The state in which a foot's lowest point is `depth` inside the ground and moves with (slip, climb)."""
-    lever = walker.feet[foot]
+    whole, n = walker.whole, len(theta)
+    x, y, rolling = (lever[foot, :n] for lever in (whole.foot_x, whole.foot_y, whole.rolling))
     tilted, omega = np.array(theta) + walker.slope, np.array(omega)
     s, c = np.sin(tilted), np.cos(tilted)
-    forward, upward = c * lever.lever_x - s * lever.lever_y, s * lever.lever_x + c * lever.lever_y
-    position = along - forward.sum(), lever.radius - depth - upward.sum()
-    velocity = slip - omega @ (np.array(lever.rolling) - upward), vertical_velocity - omega @ forward
+    forward, upward = c * x - s * y, s * x + c * y
+    position = along - forward.sum(), whole.radius[foot] - depth - upward.sum()
+    velocity = slip - omega @ (rolling - upward), vertical_velocity - omega @ forward
     return tuple(map(float, (*position, *theta, *velocity, *omega)))
 
 

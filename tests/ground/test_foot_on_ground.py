@@ -6,14 +6,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from system_rates import gradient_of, rate_of
 
 from walkerlab.ground.energy import dissipated_power, kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.friction import Coulomb
-from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.walker import foot_force, foot_motion
-from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.in_tuples import derivative, jacobian
+from walkerlab.ground.walker import foot_force, on_ground, one_foot_motion
 
 BOTH = (True, True)
 angles = st.tuples(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7))
@@ -27,8 +25,7 @@ BALL = 0.05
 
 
 def motion_of(walker, foot, state):
-    s, c = sines_cosines(walker.tree, state, 2, walker.slope)
-    return foot_motion(walker, walker.feet[foot], s, c, state)
+    return one_foot_motion(walker.whole, foot, state)
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
@@ -59,8 +56,8 @@ def test_energies_are_those_of_legs_and_hip(theta, omega, slip, vertical_velocit
     state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     bodies = ground.masses_of_the_compass(state)
     field = ground.GRAVITY * np.array([np.sin(ground.SLOPE), -np.cos(ground.SLOPE)])
-    assert kinetic_energy(walker, state) == pytest.approx(sum(m * v @ v for m, _, v in bodies) / 2, rel=1e-12)
-    assert potential_energy(walker, state) == pytest.approx(-sum(m * p @ field for m, p, _ in bodies), rel=1e-12)
+    assert kinetic_energy(walker.whole, state) == pytest.approx(sum(m * v @ v for m, _, v in bodies) / 2, rel=1e-12)
+    assert potential_energy(walker.whole, state) == pytest.approx(-sum(m * p @ field for m, p, _ in bodies), rel=1e-12)
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
@@ -71,7 +68,7 @@ def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_conta
     walker = ground.compass(radius=BALL)
     has_ground = (foot == 0, foot == 1)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
-    rate = np.array(derivative(OnGround(walker, has_ground), 0.0, tuple(state)))
+    rate = np.array(rate_of(on_ground(walker, has_ground), state))
     motion = motion_of(walker, foot, tuple(state))
     force = foot_force(walker, motion)
     contact = np.array([motion.along, motion.height])
@@ -97,15 +94,15 @@ def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertica
     """dE/dt of the energy balance along the motion is what damping and friction take."""
     walker = ground.compass(normal=SOFT)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
-    rate = np.array(derivative(OnGround(walker, BOTH), 0.0, tuple(state)))
-    powers = [dissipated_power(walker, each, tuple(state))[:2] for each in range(2)]
+    rate = np.array(rate_of(on_ground(walker, BOTH), state))
+    powers = [dissipated_power(on_ground(walker, BOTH), each, tuple(state))[:2] for each in range(2)]
     damping, friction = np.sum(powers, axis=0)
     assert damping >= 0.0
     assert friction >= 0.0
     assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-5)  # the other foot is at no join of the law
     h = 1e-7 / (1.0 + np.abs(rate).max() * 1e-2)
-    before, after = (total_energy(walker, BOTH, tuple(state + step * rate)) for step in (-h, h))
-    size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker, tuple(state))
+    before, after = (total_energy(on_ground(walker, BOTH), tuple(state + step * rate)) for step in (-h, h))
+    size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker.whole, tuple(state))
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
 
@@ -113,12 +110,10 @@ def test_a_foot_in_the_air_or_without_ground_feels_nothing():
     walker = ground.compass()
     hovering = ground.placed(walker, 1, -0.3, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
     inside = ground.placed(walker, 1, 1e-4, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
-    assert derivative(OnGround(walker, BOTH), 0.0, hovering) == derivative(
-        OnGround(walker, (False, False)), 0.0, hovering
-    )
-    free = derivative(OnGround(walker, (False, False)), 0.0, inside)
+    assert rate_of(on_ground(walker, BOTH), hovering) == rate_of(on_ground(walker, (False, False)), hovering)
+    free = rate_of(on_ground(walker, (False, False)), inside)
     np.testing.assert_allclose(free[4:6], (walker.gravity_along, -walker.gravity_down), rtol=1e-15)
-    assert dissipated_power(walker, 1, hovering) == (0.0, 0.0, 0.0)
+    assert dissipated_power(on_ground(walker, BOTH), 1, hovering) == (0.0, 0.0, 0.0)
 
 
 def test_smooth_ground_has_no_tangential_force():
@@ -126,19 +121,17 @@ def test_smooth_ground_has_no_tangential_force():
     for slip in (-1.0, 0.05, 2.0):
         state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.9), slip, -0.01)
         assert foot_force(walker, motion_of(walker, 1, state)).along == 0.0
-        rate = derivative(OnGround(walker, BOTH), 0.0, state)
+        rate = rate_of(on_ground(walker, BOTH), state)
         assert rate[4] == walker.gravity_along
-        assert dissipated_power(walker, 1, state)[1] == 0.0
+        assert dissipated_power(on_ground(walker, BOTH), 1, state)[1] == 0.0
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
 def test_smooth_ground_is_friction_with_a_coefficient_of_zero(theta, omega, slip, vertical_velocity, depth, foot):
     smooth, none = ground.compass(friction=ground.SMOOTH), ground.compass(friction=Coulomb(0.0, 0.0, 0.1, 1.0))
     state = ground.placed(smooth, foot, depth, theta, omega, slip, vertical_velocity)
-    assert derivative(OnGround(smooth, BOTH), 0.0, state) == derivative(OnGround(none, BOTH), 0.0, state)
-    J, K = np.zeros((8, 8)), np.zeros((8, 8))
-    jacobian(OnGround(smooth, BOTH), 0.0, state, J)
-    jacobian(OnGround(none, BOTH), 0.0, state, K)
+    assert rate_of(on_ground(smooth, BOTH), state) == rate_of(on_ground(none, BOTH), state)
+    J, K = gradient_of(on_ground(smooth, BOTH), state), gradient_of(on_ground(none, BOTH), state)
     np.testing.assert_array_equal(J, K)
 
 
@@ -148,7 +141,7 @@ def differenced(system, state, steps):
         moved = [np.array(state) for _ in range(2)]
         moved[0][j] -= h
         moved[1][j] += h
-        below, above = (np.array(derivative(system, 0.0, tuple(y))) for y in moved)
+        below, above = (np.array(rate_of(system, y)) for y in moved)
         columns.append((above - below) / (moved[1][j] - moved[0][j]))
     return np.array(columns).T
 
@@ -171,11 +164,10 @@ def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
     has_ground = (foot == 0, foot == 1)
     motion = motion_of(walker, foot, state)
     assume(foot_force(walker, motion).normal.force > 1e-2)  # not clipped, nor about to be
-    J = np.zeros((8, 8))
-    jacobian(OnGround(walker, has_ground), 0.0, state, J)
+    J = gradient_of(on_ground(walker, has_ground), state)
     position = 1e-3 * depth
     steps = (1e-6, position, position, position, 1e-5, 1e-5, 1e-5, 1e-5)
-    expected = differenced(OnGround(walker, has_ground), state, steps)
+    expected = differenced(on_ground(walker, has_ground), state, steps)
     # every column by its own size: stiffness along the height is a million times friction's along the speed
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-4
@@ -185,10 +177,9 @@ def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
 def test_derivatives_hold_at_the_stiffness_of_the_paper(vertical_velocity):
     walker = ground.compass()
     state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, vertical_velocity)
-    J = np.zeros((8, 8))
-    jacobian(OnGround(walker, (False, True)), 0.0, state, J)
+    J = gradient_of(on_ground(walker, (False, True)), state)
     steps = (1e-6, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6)
-    expected = differenced(OnGround(walker, (False, True)), state, steps)
+    expected = differenced(on_ground(walker, (False, True)), state, steps)
     assert np.abs(J[:, 1]).max() > 1e6  # stiff indeed: so an absolute tolerance would say nothing
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-5
@@ -197,16 +188,17 @@ def test_derivatives_hold_at_the_stiffness_of_the_paper(vertical_velocity):
 def creep_velocity(slope, friction):
     """The velocity to which a loaded block settles on a slope."""
     block = ground.sledge(friction=friction, slope=slope)
-    system = OnGround(block, BOTH)
+    system = on_ground(block, BOTH)
     start = ground.placed(block, 0, 3e-5, (-slope,), (0.0,), 0.0, 0.0)
 
-    def jac(t, y):
-        J = np.zeros((6, 6))
-        jacobian(system, t, tuple(y), J)
-        return J
-
     path = solve_ivp(
-        lambda t, y: derivative(system, t, tuple(y)), (0.0, 1.0), start, method="Radau", jac=jac, rtol=1e-8, atol=1e-11
+        lambda _, y: rate_of(system, y),
+        (0.0, 1.0),
+        start,
+        method="Radau",
+        jac=lambda _, y: gradient_of(system, y),
+        rtol=1e-8,
+        atol=1e-11,
     )
     assert path.success
     return path.y[3, -1]

@@ -7,7 +7,8 @@ import pytest
 from contact_walks import FIXED_POINT, RIGID_STEP, faster, scene_of, settings, walked
 
 from walkerlab.ground.terrain import checkerboard
-from walkerlab.hybrid.contact_run import JudgedGround, walk_contact
+from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.scene.contact import start_state
 
 

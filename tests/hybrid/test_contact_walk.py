@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.motion import OnGround
-from walkerlab.hybrid.contact_events import farthest_slide, feet_motion
+from walkerlab.ground.walker import feet_motion, on_ground
+from walkerlab.hybrid.contact_events import farthest_slide
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
@@ -106,8 +106,8 @@ def test_glassy_ground_lets_the_stance_foot_slide_away_at_once():
 def slid_foot(tolerance, start):
     scene, walk = scene_of(*GLASSY), walked(*GLASSY, start=start, tolerance=tolerance)
     assert walk.outcome is Outcome.SLID
-    begin = feet_motion(scene.walker, start_state(scene, start))[STANCE_FOOT]
-    end = feet_motion(scene.walker, walk.end_state)[STANCE_FOOT]
+    begin = feet_motion(scene.walker.whole, start_state(scene, start))[STANCE_FOOT]
+    end = feet_motion(scene.walker.whole, walk.end_state)[STANCE_FOOT]
     # the ball has also rolled, by its radius times the change of the leg's angle
     turned = walk.end_state[2 + STANCE_FOOT] - start[STANCE_FOOT]
     return abs(end.along - begin.along + RADIUS * turned), end.height, farthest_slide(scene.terrain)
@@ -179,7 +179,7 @@ def test_times_of_touches_converge_with_the_tolerance():
 def test_single_support_agrees_with_scipys_radau_on_the_compiled_motion():
     """The same motion, integrated by another program from the start to before the swing foot leaves its pad."""
     scene = scene_of()
-    system = OnGround(scene.walker, (True, True))
+    system = on_ground(scene.walker, (True, True))
     start = np.array(start_state(scene, FIXED_POINT))
 
     def fun(t, y):

@@ -9,7 +9,8 @@ from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.hybrid import contact_run
-from walkerlab.hybrid.contact_run import JudgedGround, walk_contact
+from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import find_gait_from
 from walkerlab.orbits.contact_section import step_from_section
@@ -31,12 +32,12 @@ def nothing_explained(monkeypatch):
 def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_words():
     """The hinged walker moves as one with a heavier hip would; its energy is its own."""
     scene, heavier = scene_of("contact.stance=pinned"), scene_of("contact.stance=pinned", "walker.hip_mass_kg=20")
-    assert scene.pinned is not None
-    assert heavier.pinned is not None
+    forms = scene.walker.forms.copy()
+    forms[1] = heavier.walker.forms[1]
     taken = walk_contact(
-        scene.walker,
+        scene.walker._replace(forms=forms),
         JudgedGround(scene.terrain, scene.frame),
-        scene.pinned._replace(tree=heavier.pinned.tree),
+        True,
         STANCE_FOOT,
         start_state(scene, FIXED_POINT),
         settings(method="scipy-radau"),

@@ -22,12 +22,12 @@ from kneed_walks import (
     scene_of,
     walked,
 )  # fmt: skip
+from system_rates import gradient_of, rate_of
 
 from walkerlab.ground.compliant import KneeRules, contact_walker
-from walkerlab.ground.motion import OnGround
+from walkerlab.ground.knees import lock
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.hybrid.contact_events import feet_motion
-from walkerlab.hybrid.contact_knee import locked
+from walkerlab.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
 from walkerlab.hybrid.contact_run import by_channel
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, Particle
@@ -35,7 +35,6 @@ from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.orbits.contact_gait import find_gait_from, section_points
 from walkerlab.orbits.contact_section import coordinates_of, state_on_section, step_from_section
 from walkerlab.scene.contact import start_state
-from walkerlab.solvers.in_tuples import derivative, jacobian
 from walkerlab.solvers.registry import Tolerances
 
 KNEE_STRIKE = 0.348612  # s after heel strike, of the rigid gait
@@ -121,7 +120,7 @@ def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
     """Momentum sums over the masses: of the whole, and of the leg whose knee locks about the hip that carries it."""
     scene = scene_of()
     state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # straight just now
-    after, lost = locked(OnGround(scene.walker, (True, True), (False, False, True, True), (False, False)), state)
+    after, lost, _ = lock(scene.walker.whole, scene.walker.forms[0, 3], state)
     before_points, after_points = masses_of(state), masses_of(after)
     assert after[10] == pytest.approx(after[8], abs=1e-14)
     np.testing.assert_allclose(after[:8], state[:8], atol=0.0)
@@ -153,30 +152,31 @@ def test_the_equations_of_a_locked_knee_are_those_of_one_leg():
         Assembly(legs.bodies, legs.joints, (*legs.particles, *shanks), legs.feet, legs=legs.legs),
         scene.walker.normal, scene.walker.friction, GRAVITY, SLOPE,
     )  # fmt: skip
-    two = OnGround(scene.walker, (True, True), (False, False, True, True), (False, False))
+    two = on_ground(scene_of(KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))).walker, (True, True), (LOCKED, LOCKED))
     y = (0.1, 0.7, -0.3, 0.2, 0.3, -0.1, -0.5, -0.9)
     straight = (*y[:4], *y[2:4], *y[4:], *y[6:])
-    expected = derivative(OnGround(one, (True, True)), 0.0, y)
-    found = derivative(two, 0.0, straight)
+    expected = rate_of(on_ground(one, (True, True)), y)
+    found = rate_of(two, straight)
     np.testing.assert_allclose(found[:4] + found[6:10], expected, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(found[10:], found[8:10], rtol=0.0, atol=0.0)
 
 
-@pytest.mark.parametrize("held", [(False,) * 4, (False, False, False, True), (False, False, True, True)])
-@pytest.mark.parametrize("stop", [False, True])
-def test_exact_derivatives_are_those_of_differences(held, stop):
+@pytest.mark.parametrize(
+    "knee",
+    [(RELEASED, RELEASED), (STOPPING, RELEASED), (RELEASED, LOCKED), (STOPPING, LOCKED), (LOCKED, LOCKED)],
+)
+def test_exact_derivatives_are_those_of_differences(knee):
     rules = KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))
     scene = scene_of(rules)
     y = np.array(BENT_STATE)
     y[4] = y[2] + 5e-3
-    system = OnGround(scene.walker, (False, False), held, (stop and not held[2], False))
-    J = np.zeros((12, 12))
-    jacobian(system, 0.0, tuple(y), J)
+    system = on_ground(scene.walker, (False, False), knee)
+    J = gradient_of(system, y)
     differences = np.zeros((12, 12))
     for j in range(12):
         step = np.zeros(12)
         step[j] = 1e-6
-        ahead, behind = (np.array(derivative(system, 0.0, tuple(y + sign * step))) for sign in (1, -1))
+        ahead, behind = (np.array(rate_of(system, y + sign * step)) for sign in (1, -1))
         differences[:, j] = (ahead - behind) / 2e-6
     np.testing.assert_allclose(J, differences, atol=1e-5 * np.abs(differences).max())
 
@@ -257,5 +257,5 @@ def test_the_derivative_of_the_step_through_lock_and_release_is_its_slope():
 def test_a_round_foots_start_rolls_and_stands():
     scene = scene_of(radius=0.2)
     y = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
-    stance = feet_motion(scene.walker, y)[1]
+    stance = feet_motion(scene.walker.whole, y)[1]
     np.testing.assert_allclose((stance.slip, stance.vertical_velocity, stance.height), 0.0, atol=1e-14)

@@ -8,14 +8,14 @@ from compass_parts import CompassParts, compass_assembly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from printed_compass import released_mass_matrix
+from system_rates import rate_of
 
-from walkerlab.ground.compliant import contact_walker, pinned_walker
+from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Frictionless
-from walkerlab.ground.motion import OnGround
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.walker import on_ground
 from walkerlab.mechanics.assembly import Anchor
 from walkerlab.mechanics.equations import mass_matrix_and_bias
-from walkerlab.solvers.in_tuples import derivative
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
 STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)
@@ -73,7 +73,7 @@ def printed_swing(parts, theta_1, theta_2, w_1, w_2, g):
     return D, C @ np.array([w_1, w_2]), G
 
 
-def on_ground(parts, slope, g):
+def walker_of(parts, slope, g):
     return contact_walker(compass_assembly(parts), LAW, Frictionless(), g, slope)
 
 
@@ -94,10 +94,9 @@ def test_assembled_compass_equals_appendix_a(parts, state, g):
 @given(parts=compasses(), state=states)
 def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(parts, state):
     g = 9.81
-    walker = on_ground(parts, 0.0, g)
-    pinned = pinned_walker(compass_assembly(parts), walker, STANCE, 0.0)
+    hinged = on_ground(walker_of(parts, 0.0, g), (False, False), hinged=True)
     D, bias, G = printed_swing(parts, *state, g)
-    found = np.array(derivative(pinned, 0.0, state)[2:])
+    found = np.array(rate_of(hinged, state)[2:])
     # the residual of D ddq + C dq + G = 0, free of the matrix' condition
     size = np.abs(D).max() * np.abs(found).max() + np.abs(bias).max() + np.abs(G).max()
     close(D @ found, -bias - G, scale=10.0 * size)
@@ -106,11 +105,10 @@ def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(p
 @given(parts=compasses(), state=states, slope=st.floats(-0.5, 0.5))
 def test_slope_only_turns_the_frame(parts, state, slope):
     """Absolute angles: the swing phase does not know the slope; the floating base knows it by its axes alone."""
-    assembly = compass_assembly(parts)
-    level, tilted = on_ground(parts, 0.0, 9.81), on_ground(parts, slope, 9.81)
-    hinged = [derivative(pinned_walker(assembly, w, STANCE, 0.0), 0.0, state) for w in (level, tilted)]
+    level, tilted = walker_of(parts, 0.0, 9.81), walker_of(parts, slope, 9.81)
+    hinged = [rate_of(on_ground(w, (False, False), hinged=True), state) for w in (level, tilted)]
     close(hinged[1], hinged[0], scale=1e3 * (1.0 + np.abs(hinged[0]).max()))
-    falling = derivative(OnGround(tilted, (False, False)), 0.0, (0.3, 9.0, *state[:2], 0.1, 0.2, *state[2:]))
+    falling = rate_of(on_ground(tilted, (False, False)), (0.3, 9.0, *state[:2], 0.1, 0.2, *state[2:]))
     close(np.hypot(falling[4], falling[5]), 9.81)
     assert math.isclose(math.atan2(falling[4], -falling[5]), slope, abs_tol=1e-12)
 
@@ -126,8 +124,8 @@ def test_free_tree_accelerates_alike_about_its_centre_of_mass_and_about_a_foot(s
     about_foot = np.linalg.solve(full.mass_matrix, -full.bias - full.weight)[:2]
     central = mass_matrix_and_bias(assembly, None, state[:2], state[2:], 9.81)
     about_centre = np.linalg.solve(central.mass_matrix, -central.bias - central.weight)
-    walker = on_ground(parts, 0.0, 9.81)
-    integrated = derivative(OnGround(walker, (True, True)), 0.0, (0.0, 50.0, *state[:2], 0.0, 0.0, *state[2:]))
+    walker = walker_of(parts, 0.0, 9.81)
+    integrated = rate_of(on_ground(walker, (True, True)), (0.0, 50.0, *state[:2], 0.0, 0.0, *state[2:]))
     size = 1e2 * (1.0 + np.abs(about_foot).max())
     close(about_foot, about_centre[:2], scale=size)
     close(about_centre[2:], [0.0, -9.81])
@@ -137,9 +135,9 @@ def test_free_tree_accelerates_alike_about_its_centre_of_mass_and_about_a_foot(s
 @given(state=states, along=st.floats(-1e3, 1e3), depth=st.floats(0.0, 1e-3))
 def test_where_the_walker_is_along_the_slope_does_not_matter(state, along, depth):
     parts = CompassParts(1.0, 0.5, 5.0, 10.0, 0.1, 0.001)
-    system = OnGround(on_ground(parts, 0.02, 9.81), (True, True))
+    system = on_ground(walker_of(parts, 0.02, 9.81), (True, True))
     height = 0.9 - depth
-    here, there = (derivative(system, 0.0, (x, height, *state[:2], 0.3, -0.1, *state[2:])) for x in (0.0, along))
+    here, there = (rate_of(system, (x, height, *state[:2], 0.3, -0.1, *state[2:])) for x in (0.0, along))
     assert here == there
 
 

@@ -7,19 +7,17 @@ import pytest
 from compass_parts import CompassParts, compass_assembly
 from hypothesis import given
 from hypothesis import strategies as st
+from system_rates import gradient_of, rate_of
 
 from walkerlab.config.loader import load
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb, Frictionless, switching_count
-from walkerlab.ground.motion import OnGround
-from walkerlab.ground.walker import FootMotion, foot_force
-from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL, feet_motion
+from walkerlab.ground.walker import FootMotion, feet_motion, foot_force, on_ground
+from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
 from walkerlab.mechanics.parts import Assembly, Body, Particle
-from walkerlab.mechanics.tree import mass_matrix, with_centrifugal
 from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
-from walkerlab.solvers.in_tuples import derivative, jacobian
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
@@ -41,7 +39,7 @@ def walker_with(radius=0.001, friction=None):
 def over(walker, foot, height, theta, omega, velocity):
     """The state in which the lowest point of a foot is at a height over the ground."""
     state = (0.0, 1.0, *theta, *velocity, *omega)
-    return (0.0, 1.0 + height - feet_motion(walker, state)[foot].height, *state[2:])
+    return (0.0, 1.0 + height - feet_motion(walker.whole, state)[foot].height, *state[2:])
 
 
 def same_to_rounding(found, expected, scale):
@@ -50,8 +48,7 @@ def same_to_rounding(found, expected, scale):
 
 def stiffest(walker, y):
     """By how much the ground magnifies the rounding of a foot's height: the force's gradient over the masses."""
-    J = np.zeros((8, 8))
-    jacobian(OnGround(walker, BOTH), 0.0, y, J)
+    J = gradient_of(on_ground(walker, BOTH), y)
     return np.abs(J).max()
 
 
@@ -65,21 +62,20 @@ states = st.tuples(
 def test_frictionless_ground_is_a_coefficient_of_zero(state, radius):
     zero, none = (walker_with(radius, law) for law in (NO_FRICTION, Frictionless()))
     y = over(zero, *state)
-    assert derivative(OnGround(none, BOTH), 0.0, y) == derivative(OnGround(zero, BOTH), 0.0, y)
-    found, expected = np.zeros((8, 8)), np.zeros((8, 8))
-    jacobian(OnGround(none, BOTH), 0.0, y, found)
-    jacobian(OnGround(zero, BOTH), 0.0, y, expected)
+    assert rate_of(on_ground(none, BOTH), y) == rate_of(on_ground(zero, BOTH), y)
+    found, expected = gradient_of(on_ground(none, BOTH), y), gradient_of(on_ground(zero, BOTH), y)
     np.testing.assert_array_equal(found, expected)
 
 
 def rates_with_point_feet(walker, y):
     """Rates of the state by feet that are described without a radius, the laws of force the package's."""
-    n = len(walker.tree.arm_x)
+    whole, n = walker.whole, int(walker.whole.bodies)
     angle, omega = np.array(y[2 : 2 + n]) + walker.slope, np.array(y[4 + n :])
     s, c = np.sin(angle), np.cos(angle)
-    push, torques = np.zeros(2), np.array(with_centrifugal(walker.tree, s, c, y, 4 + n, (0.0,) * n))
-    for foot in walker.feet:
-        d_x, d_y = np.array(foot.lever_x), np.array(foot.lever_y)
+    A, B, delta = whole.A[:n, :n], whole.B[:n, :n], angle[None, :] - angle[:, None]
+    push, torques = np.zeros(2), (A * np.sin(delta) - B * np.cos(delta)) @ omega**2
+    for foot in range(2):
+        d_x, d_y = whole.foot_x[foot, :n], whole.foot_y[foot, :n]
         forward, upward = c * d_x - s * d_y, s * d_x + c * d_y
         height = y[1] + upward.sum()
         slip, vertical_velocity = y[2 + n] - omega @ upward, y[3 + n] + omega @ forward
@@ -87,16 +83,16 @@ def rates_with_point_feet(walker, y):
             force = foot_force(walker, FootMotion(y[0] + forward.sum(), height, slip, vertical_velocity))
             push += (force.along, force.normal.force)
             torques = torques - force.along * upward + force.normal.force * forward
-    turning = np.linalg.solve(np.array(mass_matrix(walker.tree, tuple(s), tuple(c))).reshape(n, n), torques)
+    turning = np.linalg.solve(A * np.cos(delta) + B * np.sin(delta), torques)
     gravity = np.array((walker.gravity_along, -walker.gravity_down))
-    return (*y[2 + n :], *(gravity + push / walker.tree.mass), *turning)
+    return (*y[2 + n :], *(gravity + push / walker.mass), *turning)
 
 
 @given(state=states)
 def test_a_point_foot_is_a_ball_of_radius_zero(state):
     walker = walker_with(radius=0.0)
     y = over(walker, *state)
-    same_to_rounding(derivative(OnGround(walker, BOTH), 0.0, y), rates_with_point_feet(walker, y), stiffest(walker, y))
+    same_to_rounding(rate_of(on_ground(walker, BOTH), y), rates_with_point_feet(walker, y), stiffest(walker, y))
 
 
 @given(state=states, clearance=st.floats(1e-9, 0.5))
@@ -105,7 +101,7 @@ def test_a_foot_out_of_reach_moves_as_over_no_ground(state, clearance):
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)
     has_ground = (foot != 0, foot != 1)
-    assert derivative(OnGround(walker, has_ground), 0.0, y) == derivative(OnGround(walker, BOTH), 0.0, y)
+    assert rate_of(on_ground(walker, has_ground), y) == rate_of(on_ground(walker, BOTH), y)
 
 
 @given(state=states)
@@ -118,8 +114,8 @@ def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
     one = walker_with()
     other = contact_walker(points, one.normal, one.friction, 9.81, one.slope)
     y = over(one, *state)
-    found = derivative(OnGround(other, BOTH), 0.0, y)
-    expected = derivative(OnGround(one, BOTH), 0.0, y)
+    found = rate_of(on_ground(other, BOTH), y)
+    expected = rate_of(on_ground(one, BOTH), y)
     same_to_rounding(found, expected, stiffest(one, y))
 
 
@@ -188,7 +184,7 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
         f"{MATERIAL - FRICTION_SWITCHES} of the {MATERIAL} "
     )
     scene = contact_scene(load(None, ("contact.stance=pinned",)).config, 0.3714)
-    free, hinged = len(scene.walker.blank), len(scene.pinned.blank)
+    free, hinged = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)
     assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")
     config = load(None, ("outputs=[]",)).config
     rigid = left_out.of_rigid_walk(config)

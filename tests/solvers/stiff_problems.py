@@ -4,8 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from walkerlab.kernels import kernel
-from walkerlab.solvers.in_tuples import blank, derivative, jacobian
 from walkerlab.solvers.stepping import STEP_DONE, T, advance, begin
+from walkerlab.solvers.system import block, derivative, jacobian
 
 LINEAR, CURVE, VAN_DER_POL, EXPLOSION = range(4)
 ROBERTSON, HIRES = range(2)
@@ -20,21 +20,22 @@ class Planar(NamedTuple):
     told: float  # the part of the Jacobian that is told: 1 is all
 
 
-@blank.case(Planar)
-def planar_blank(system: Planar) -> Any:
+@block.case(Planar)
+def planar_block(system: Planar) -> Any:
     return (0.0, 0.0)
 
 
 @derivative.case(Planar)
-def planar_derivative(system: Planar, t: float, y: Any) -> Any:
+def planar_derivative(system: Planar, t: float, y: Any, f: Any) -> None:
     p, q = system.real, system.imaginary
     if system.kind == LINEAR:
-        return (p * y[0] - q * y[1], q * y[0] + p * y[1])
-    if system.kind == CURVE:
-        return (p * (y[0] - math.sin(t)) + math.cos(t), p * (y[1] - math.cos(t)) - math.sin(t))
-    if system.kind == VAN_DER_POL:
-        return (y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / p)
-    return (y[0] * y[0], 0.0)
+        f[0], f[1] = p * y[0] - q * y[1], q * y[0] + p * y[1]
+    elif system.kind == CURVE:
+        f[0], f[1] = p * (y[0] - math.sin(t)) + math.cos(t), p * (y[1] - math.cos(t)) - math.sin(t)
+    elif system.kind == VAN_DER_POL:
+        f[0], f[1] = y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / p
+    else:
+        f[0], f[1] = y[0] * y[0], 0.0
 
 
 @jacobian.case(Planar)
@@ -57,27 +58,28 @@ class Kinetics(NamedTuple):
     kind: int
 
 
-@blank.case(Kinetics)
-def kinetics_blank(system: Kinetics) -> Any:
+@block.case(Kinetics)
+def kinetics_block(system: Kinetics) -> Any:
     return (0.0,) * 8
 
 
 @derivative.case(Kinetics)
-def kinetics_derivative(system: Kinetics, t: float, y: Any) -> Any:
+def kinetics_derivative(system: Kinetics, t: float, y: Any, f: Any) -> None:
     if system.kind == ROBERTSON:
         slow, fast, middle = 0.04 * y[0], 3e7 * y[1] * y[1], 1e4 * y[1] * y[2]
-        return (middle - slow, slow - middle - fast, fast, 0.0, 0.0, 0.0, 0.0, 0.0)
+        f[0], f[1], f[2] = middle - slow, slow - middle - fast, fast
+        for i in range(3, 8):
+            f[i] = 0.0
+        return
     meeting = 280.0 * y[5] * y[7]
-    return (
-        -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
-        1.71 * y[0] - 8.75 * y[1],
-        -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
-        8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
-        -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6],
-        -meeting + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
-        meeting - 1.81 * y[6],
-        -meeting + 1.81 * y[6],
-    )
+    f[0] = -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007
+    f[1] = 1.71 * y[0] - 8.75 * y[1]
+    f[2] = -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4]
+    f[3] = 8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3]
+    f[4] = -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6]
+    f[5] = -meeting + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6]
+    f[6] = meeting - 1.81 * y[6]
+    f[7] = -meeting + 1.81 * y[6]
 
 
 @jacobian.case(Kinetics)

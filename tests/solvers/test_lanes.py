@@ -14,7 +14,7 @@ from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers import system
 from walkerlab.solvers.fused import fused
-from walkerlab.solvers.in_tuples import derivative
+from walkerlab.solvers.lane_steps import derivative
 from walkerlab.solvers.lanes import WIDTH, any_positive, choose, load_lanes, nearest, store_lanes, teach_arithmetic
 
 MODEL = assembled(RigidWalker(1.0, 0.4, 5.0, 10.0, 0.1, 9.81, 0.05, CORRECTED))

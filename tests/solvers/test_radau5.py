@@ -25,9 +25,9 @@ from stiff_problems import (
     Planar,
     drive,
 )
+from system_rates import rate_of
 
 from walkerlab.kernels import kernel
-from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.radau5 import new_radau5
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.solvers.stepping import (
@@ -128,9 +128,9 @@ SMOOTH = Planar(VAN_DER_POL, 1.0, 0.0, 1.0)
 
 def test_order_five_on_a_smooth_nonlinear_problem():
     start = (2.0, 0.0)
-    exact = solve_ivp(
-        lambda t, y: derivative(SMOOTH, t, tuple(y)), (0.0, 1.5), start, method="DOP853", rtol=1e-13, atol=1e-14
-    ).y[:, -1]
+    exact = solve_ivp(lambda _, y: rate_of(SMOOTH, y), (0.0, 1.5), start, method="DOP853", rtol=1e-13, atol=1e-14).y[
+        :, -1
+    ]
     errors = [np.abs(fixed_steps(SMOOTH, start, 1.5, h, 0.3 * h**4).y - exact).max() for h in (0.25, 0.125, 0.0625)]
     assert orders(errors) == pytest.approx(5.0, abs=0.25)
 
@@ -161,7 +161,7 @@ def test_dense_output_is_the_collocation_polynomial_of_order_three():
         worst = 0.0
         for fraction in (0.2, 0.5, 0.8):
             exact = solve_ivp(
-                lambda t, y: derivative(SMOOTH, t, tuple(y)),
+                lambda _, y: rate_of(SMOOTH, y),
                 (0.0, fraction * h),
                 start,
                 method="DOP853",

@@ -22,7 +22,7 @@ from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_co
 
 if TYPE_CHECKING:
     from walkerlab.ground.walker import ContactWalker
-    from walkerlab.hybrid.contact_run import JudgedGround
+    from walkerlab.hybrid.contact_events import JudgedGround
 
 Floats = NDArray[np.float64]
 USER_SCRIPT = "scipy-dop853-numpy"
@@ -123,7 +123,7 @@ class ContactTrial:
         """A function that does the walk with a method, ready to be timed."""
         from walkerlab.hybrid.contact_run import walk_contact
 
-        scene = self.walker, self.ground, None, self.stance, self.start
+        scene = self.walker, self.ground, False, self.stance, self.start
         tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget)
 
         def run() -> TrialRun:

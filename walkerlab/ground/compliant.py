@@ -5,25 +5,37 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.ground.friction import FrictionLaw
-from walkerlab.ground.held import Held, IdealLock, Knees, NoKnees, NoneHeld, always_held, no_stops
-from walkerlab.ground.merged import Unmerged, with_merged_bodies
+from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.pinned import Pinned
-from walkerlab.ground.walker import ContactWalker, Foot
-from walkerlab.mechanics.assembly import Anchor, levers, tree_about, tree_about_centre
-from walkerlab.mechanics.parts import Assembly
+from walkerlab.ground.walker import FORM, MAX_BODIES, NO_FOOT, ContactWalker
+from walkerlab.mechanics.assembly import Anchor, Tree, levers, tree_about, tree_about_centre
+from walkerlab.mechanics.parts import Assembly, Position
 
+Floats = NDArray[np.float64]
 SWING_FOOT, STANCE_FOOT = 0, 1  # of the first step; body k carries foot k
 
 
 @dataclass(frozen=True)
 class KneeRules:
-    """How knees lock and are released on compliant ground."""
+    """How knees lock and are released on compliant ground.
+
+    A walker with compliant stops keeps its bodies while its knees are locked: a stop that has latched keeps its angle.
+    """
 
     stop: NormalLaw | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
     release_at_touch: bool = False  # else when the leading foot stops sinking in
+
+
+@dataclass(frozen=True)
+class Root:
+    """A point of the tree, or its centre of mass, with the constants that hold about it."""
+
+    tree: Tree
+    numbers: dict[str, Any]  # fields of a form that are the same whichever bodies turn together
+    rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
 
 
 def contact_walker(
@@ -33,83 +45,127 @@ def contact_walker(
     gravity: float,
     slope: float,
     knee_rules: KneeRules | None = None,
+    hinged_foot: int = STANCE_FOOT,
 ) -> ContactWalker:
-    """The assembly on compliant ground; gravity in m/s^2, slope in rad. Foot k, and knee k, are those of leg k."""
-    tree, foot_levers = tree_about_centre(assembly)
-    bodies = len(assembly.bodies)
-    feet = tuple(
-        Foot(
-            lever_x=tuple(float(x) for x in d[:, 0]),
-            lever_y=tuple(float(x) for x in d[:, 1]),
-            rolling=tuple(foot.radius_m if body == assembly.index(foot.body) else 0.0 for body in range(bodies)),
-            radius=foot.radius_m,
+    """The assembly on compliant ground; gravity in m/s^2, slope in rad. Foot k, and knee k, are those of leg k.
+
+    hinged_foot  the foot whose ball's centre is the hinge of the hinged forms, at along = 0
+
+    Raises ValueError, in words for the user, for parts that no walk on compliant ground can be made of.
+    """
+    rules = knee_rules or KneeRules()
+    refuse_what_cannot_walk(assembly)
+    forms = np.zeros((2, 4), FORM)
+    forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
+    forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
+    for hinged, root in enumerate((about_centre(assembly), about_foot(assembly, hinged_foot))):
+        for locked in range(4):
+            knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
+            fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
+    return ContactWalker(forms, normal, friction, rules.stop, legs_of(assembly))
+
+
+def refuse_what_cannot_walk(assembly: Assembly) -> None:
+    """Raise ValueError for too many bodies, another number of feet than two, or a knee in one leg only."""
+    if len(assembly.bodies) > MAX_BODIES:
+        raise ValueError(
+            f"a walker on compliant ground has at most {MAX_BODIES} bodies; this assembly has {len(assembly.bodies)}"
         )
-        for foot, d in zip(assembly.feet, foot_levers, strict=True)
-    )
-    if len(feet) != 2:
-        raise ValueError(f"a walker has two feet; this assembly has {len(feet)}")
-    walker = ContactWalker(
-        tree=tree,
-        feet=(feet[0], feet[1]),
-        normal=normal,
-        friction=friction,
-        gravity_along=gravity * math.sin(slope),
-        gravity_down=gravity * math.cos(slope),
-        slope=slope,
-        held=held_bodies(assembly),
-        knees=knees_of(assembly, knee_rules or KneeRules()),
-        legs=legs_of(assembly),
-        blank=(0.0,) * (4 + 2 * bodies),
-        merging=Unmerged(),
-    )
-    return with_merged_bodies(walker)
-
-
-def held_bodies(assembly: Assembly) -> Held | NoneHeld:
-    """Which bodies follow others, always by a coupling or while a knee is locked."""
-    if not assembly.knees and not assembly.couplings:
-        return NoneHeld()
-    n = len(assembly.bodies)
-    weights, always = np.zeros((n, n)), np.zeros(n, bool)
-    for knee in assembly.knees:
-        weights[assembly.index(knee.shank), assembly.index(knee.thigh)] = 1.0
-    for coupling in assembly.couplings:
-        body = assembly.index(coupling.body)
-        always[body] = True
-        for other, weight in zip(coupling.of, coupling.weights, strict=True):
-            weights[body, assembly.index(other)] = weight
-    return Held(tuple(float(x) for x in weights.ravel()), tuple(bool(x) for x in always))
-
-
-def knees_of(assembly: Assembly, rules: KneeRules) -> Knees | NoKnees:
-    """The knees of both legs, or none; ValueError for a walker with a knee in one leg only."""
-    if not assembly.knees:
-        return NoKnees()
-    if len(assembly.knees) != 2:
+    if len(assembly.feet) != 2:
+        raise ValueError(f"a walker has two feet; this assembly has {len(assembly.feet)}")
+    if len(assembly.knees) not in (0, 2):
         raise ValueError(f"a walker has two knees or none; this assembly has {len(assembly.knees)}")
-    thighs = [assembly.index(knee.thigh) for knee in assembly.knees]
-    shanks = [assembly.index(knee.shank) for knee in assembly.knees]
-    return Knees((thighs[0], thighs[1]), (shanks[0], shanks[1]), rules.stop, rules.release_at_touch)
 
 
-def legs_of(assembly: Assembly) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Bodies of either leg; where none are named, those that carry the feet."""
-    named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
-    one, other = (tuple(assembly.index(body) for body in leg) for leg in named)
-    return one, other
+def about_centre(assembly: Assembly) -> Root:
+    """The walker about its centre of mass, free."""
+    tree, feet = tree_about_centre(assembly)
+    hip = hip_levers(assembly, feet[0])
+    return Root(tree, {"places": 2, "hinged": NO_FOOT}, levers_by_axis(feet, hip))
 
 
-def pinned_walker(assembly: Assembly, walker: ContactWalker, foot: int, along: float) -> Pinned:
-    """The walker hinged to the ground at the centre of a foot's ball, `along` the slope (m)."""
+def about_foot(assembly: Assembly, foot: int) -> Root:
+    """The walker about the centre of a foot's ball, hinged there: so it just touches the ground as the leg turns."""
     ball = assembly.feet[foot]
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
-    blank = (0.0,) * (2 * len(assembly.bodies))
-    return Pinned(walker, tree, foot, along, blank, always_held(walker.held), no_stops(walker.knees))
+    _, from_centre = tree_about_centre(assembly)
+    feet, hip = [d - from_centre[foot] for d in from_centre], hip_levers(assembly, from_centre[0]) - from_centre[foot]
+    arms = {"arm_x": tree.arm_x, "arm_y": tree.arm_y}
+    return Root(tree, {"places": 0, "hinged": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip) | arms)
 
 
-def centre_to(assembly: Assembly, body: str, at_m: tuple[float, float]) -> Any:
-    """Levers (bodies, 2), in m, from the centre of mass to a point of a body of a walker with feet."""
-    foot = assembly.feet[0]
-    anchor = Anchor(foot.body, foot.centre_m)
-    _, foot_levers = tree_about_centre(assembly)
-    return foot_levers[0] + levers(assembly, anchor, Anchor(body, at_m))
+def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
+    """Levers (bodies, 2) of feet and hip as the fields of a form."""
+    x, y = np.moveaxis(np.array(feet), 2, 0)
+    return {"foot_x": x, "foot_y": y, "hip_x": hip[:, 0], "hip_y": hip[:, 1]}
+
+
+def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
+    """Levers (bodies, 2) in m to the hip from the point that `to_foot` leads from to the first foot.
+
+    Where no legs are named the first foot stands for the hip.
+    """
+    if not all(assembly.legs):
+        return to_foot
+    upper, foot = assembly.legs[STANCE_FOOT][0], assembly.feet[0]
+    hip = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
+    return to_foot + levers(assembly, Anchor(foot.body, foot.centre_m), hip)
+
+
+def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
+    """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
+    for joint in assembly.joints:
+        if (joint.parent, joint.child) == (body, other):
+            return joint.parent_point_m
+        if (joint.parent, joint.child) == (other, body):
+            return joint.child_point_m
+    return (0.0, 0.0)
+
+
+def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
+    """Write the walker about a root into `form`, with these knees locked.
+
+    merges  whether a locked knee's thigh and shank are one body; else the shank follows at an angle of its own
+    """
+    knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
+    straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
+    one_with = straight if merges else {}
+    kept = [body for body in range(len(assembly.bodies)) if body not in one_with]
+    onto = [kept.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
+    S, n = np.eye(len(kept))[onto], len(kept)
+    E = np.eye(n)
+    for body, row in followers(assembly).items():
+        E[onto[body]] = row @ S
+    for shank, thigh in straight.items():
+        if shank not in one_with:
+            E[onto[shank]] = np.eye(n)[onto[thigh]]
+    rolling = np.zeros((2, len(onto)))
+    for k, foot in enumerate(assembly.feet):
+        rolling[k, assembly.index(foot.body)] = foot.radius_m
+    for name, value in root.numbers.items():
+        form[name] = value
+    form["A"][:n, :n], form["B"][:n, :n], form["mass"] = S.T @ root.tree.A @ S, S.T @ root.tree.B @ S, root.tree.mass
+    for name, value in (root.rows | {"rolling": rolling}).items():
+        form[name][..., :n] = value @ S
+    form["E"][:n, :n] = E
+    form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
+    form["onto"][: len(onto)], form["first"][:n] = onto, kept
+    if knees:
+        form["thighs"], form["shanks"] = ([onto[body] for body in bodies] for bodies in zip(*knees, strict=True))
+
+
+def followers(assembly: Assembly) -> dict[int, Floats]:
+    """Weights (bodies,) by which the bodies of couplings follow others."""
+    rows = {}
+    for coupling in assembly.couplings:
+        row = np.zeros(len(assembly.bodies))
+        for other, weight in zip(coupling.of, coupling.weights, strict=True):
+            row[assembly.index(other)] = weight
+        rows[assembly.index(coupling.body)] = row
+    return rows
+
+
+def legs_of(assembly: Assembly) -> NDArray[np.int64]:
+    """Bodies (2, bodies of a leg) of either leg; where none are named, those that carry the feet."""
+    named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
+    return np.array([[assembly.index(body) for body in leg] for leg in named])

@@ -1,57 +1,66 @@
 """Energies of the walker on compliant ground, and the power that its contacts turn into heat."""
 
+from typing import Any
+
+from walkerlab.ground.knees import knee_energy
+from walkerlab.ground.motion import mass_matrix
 from walkerlab.ground.normal_force import elastic_energy
-from walkerlab.ground.walker import ContactWalker, foot_force, foot_motion
-from walkerlab.kernels import inlined
-from walkerlab.mechanics.tree import mass_matrix, sines_cosines
-from walkerlab.solvers.system import State
+from walkerlab.ground.walker import OF_BODIES, Form, OnGround, foot_force, half_size, one_foot_motion, sines_cosines
+from walkerlab.kernels import inlined, matrix, vector
 
 
 @inlined
-def kinetic_energy(walker: ContactWalker, y: State) -> float:
+def kinetic_energy(form: Form, y: Any) -> float:
     """Kinetic energy (J)."""
-    tree = walker.tree
-    n = len(tree.arm_x)
-    s, c = sines_cosines(tree, y, 2, walker.slope)
-    M = mass_matrix(tree, s, c)
-    total = tree.mass * (y[2 + n] * y[2 + n] + y[3 + n] * y[3 + n])
-    for k in range(n):
-        for l in range(n):
-            total += M[k * n + l] * y[4 + n + k] * y[4 + n + l]
+    s, c, M = vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    mass_matrix(form, s, c, M)
+    half, total = half_size(form), 0.0
+    for i in range(form.places):
+        total += form.mass * (y[half + i] * y[half + i])
+    rates = half + form.places
+    for k in range(form.bodies):
+        for l in range(form.bodies):
+            total += M[k, l] * y[rates + k] * y[rates + l]
     return 0.5 * total
 
 
 @inlined
-def potential_energy(walker: ContactWalker, y: State) -> float:
+def potential_energy(form: Form, y: Any) -> float:
     """Potential energy of gravity (J) from the slope frame's origin."""
-    return walker.tree.mass * (walker.gravity_down * y[1] - walker.gravity_along * y[0])
-
-
-@inlined
-def foot_elastic_energy(walker: ContactWalker, foot: int, y: State) -> float:
-    """Elastic energy (J) in the ground under a foot that it carries."""
-    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    return elastic_energy(-foot_motion(walker, walker.feet[foot], s, c, y).height, walker.normal)
-
-
-@inlined
-def total_energy(walker: ContactWalker, has_ground: tuple[bool, bool], y: State) -> float:
-    """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
-    total = kinetic_energy(walker, y) + potential_energy(walker, y)
-    if has_ground[0]:
-        total += foot_elastic_energy(walker, 0, y)
-    if has_ground[1]:
-        total += foot_elastic_energy(walker, 1, y)
+    if form.places > 0:
+        return form.mass * (form.gravity_down * y[1] - form.gravity_along * y[0])
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    total = form.mass * (form.gravity_down * form.root_height - form.gravity_along * form.root_along)
+    for k in range(form.bodies):
+        total += form.gravity_down * (s[k] * form.arm_x[k] + c[k] * form.arm_y[k])
+        total -= form.gravity_along * (c[k] * form.arm_x[k] - s[k] * form.arm_y[k])
     return total
 
 
 @inlined
-def dissipated_power(walker: ContactWalker, foot: int, y: State) -> tuple[float, float, float]:
+def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
+    """Elastic energy (J) in the ground under a foot that it carries."""
+    return elastic_energy(-one_foot_motion(system.form, foot, y).height, system.normal)
+
+
+@inlined
+def total_energy(system: OnGround, y: Any) -> float:
+    """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
+    total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            total += foot_elastic_energy(system, foot, y)
+    return total + knee_energy(system, y)
+
+
+@inlined
+def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
     """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
-    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    motion = foot_motion(walker, walker.feet[foot], s, c, y)
+    motion = one_foot_motion(system.form, foot, y)
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
-    force = foot_force(walker, motion)
+    force = foot_force(system, motion)
     damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
     return damping, -force.along * motion.slip, force.normal.force

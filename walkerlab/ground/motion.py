@@ -1,155 +1,196 @@
 """Equations of motion of the walker on compliant ground, and their exact derivatives."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
-from walkerlab.ground.held import divide_by_held_mass, knee_gradients, knee_torques, turned_by
-from walkerlab.ground.walker import ContactWalker, Foot, foot_force, foot_motion
-from walkerlab.kernels import inlined
-from walkerlab.mechanics.tree import (
-    mass_matrix,
+from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
+from walkerlab.ground.walker import (
+    OF_BODIES,
+    Form,
+    OnGround,
+    foot_force,
+    foot_motion,
+    half_size,
     sines_cosines,
-    tree_gradients,
-    with_centrifugal,
 )
-from walkerlab.mechanics.tuples import Vector, put
-from walkerlab.solvers.in_tuples import blank, derivative, jacobian
-from walkerlab.solvers.system import State
+from walkerlab.kernels import inlined, matrix, vector
+from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
+from walkerlab.solvers.system import block, derivative, jacobian
 
 
-class OnGround(NamedTuple):
-    """The walker while each foot either finds ground under it or does not."""
-
-    walker: ContactWalker
-    has_ground: tuple[bool, bool]
-    held: tuple[bool, ...] = ()  # (n) which bodies follow others now; none for a walker whose bodies are independent
-    stops: tuple[bool, ...] = ()  # (2) which knees are in their stops; none for a walker without knees
-
-
-@blank.case(OnGround)
-def on_ground_blank(system: OnGround) -> State:
-    """Two positions and the angles, and their velocities."""
-    return system.walker.blank
+@block.case(OnGround)
+def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
+    """Two: there are as many velocities as coordinates."""
+    return (0.0, 0.0)
 
 
 @inlined
-def ground_wrench(
-    walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State, wrench: tuple[float, float, Vector]
-) -> tuple[float, float, Vector]:
-    """Add a foot's force along and normal to the slope (N) and its torques on the bodies (N m) to `wrench`."""
-    motion = foot_motion(walker, foot, s, c, y)
+def mass_matrix(form: Form, s: Any, c: Any, M: Any) -> None:
+    """M (n, n), kg m^2."""
+    for k in range(form.bodies):
+        M[k, k] = form.A[k, k]
+        for l in range(k):
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            M[k, l] = form.A[k, l] * cos_d + form.B[k, l] * sin_d
+            M[l, k] = M[k, l]
+
+
+@inlined
+def add_centrifugal(form: Form, s: Any, c: Any, y: Any, r: Any) -> None:
+    """Add the centrifugal terms (N m) to r (n,)."""
+    first = half_size(form) + form.places
+    for k in range(form.bodies):
+        for l in range(k):
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            r[k] += y[first + l] * y[first + l] * (form.A[k, l] * sin_d - form.B[k, l] * cos_d)
+            r[l] -= y[first + k] * y[first + k] * (form.A[l, k] * sin_d + form.B[l, k] * cos_d)
+
+
+@inlined
+def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
+    """Force along and normal to the slope (N) on a foot; its torques on the bodies (N m) are added to r (n,)."""
+    if system.has_ground[foot] == 0:
+        return 0.0, 0.0
+    form = system.form
+    motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
-        return wrench
-    force = foot_force(walker, motion)
-    torques = wrench[2]
-    for k in range(len(s)):
-        forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
-        upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
-        torque = force.along * (foot.rolling[k] - upward) + force.normal.force * forward
-        torques = put(torques, k, torques[k] + torque)
-    return wrench[0] + force.along, wrench[1] + force.normal.force, torques
+        return 0.0, 0.0
+    force = foot_force(system, motion)
+    for k in range(form.bodies):
+        forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
+        upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
+        r[k] += force.along * (form.rolling[foot, k] - upward) + force.normal.force * forward
+    return force.along, force.normal.force
 
 
 @inlined
-def all_wrenches(system: OnGround, s: Vector, c: Vector, y: State) -> tuple[float, float, Vector]:
-    """Force of the ground along and normal to the slope (N), and its torques on the bodies (N m)."""
-    walker = system.walker
-    wrench = (0.0, 0.0, walker.tree.arm_x)
-    if system.has_ground[0]:
-        wrench = ground_wrench(walker, walker.feet[0], s, c, y, wrench)
-    if system.has_ground[1]:
-        wrench = ground_wrench(walker, walker.feet[1], s, c, y, wrench)
-    return wrench
+def all_forces(system: OnGround, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
+    """Force of the ground along and normal to the slope (N); all torques on the bodies (N m) into r (n,).
+
+    They are those of the ground, of the centrifugal terms, of the knees' stops and, about a hinge, of gravity.
+    """
+    form = system.form
+    for k in range(form.bodies):
+        r[k] = 0.0
+        if form.places == 0:
+            r[k] -= form.gravity_along * (s[k] * form.arm_x[k] + c[k] * form.arm_y[k])
+            r[k] -= form.gravity_down * (c[k] * form.arm_x[k] - s[k] * form.arm_y[k])
+    one, other = ground_wrench(system, 0, s, c, y, r), ground_wrench(system, 1, s, c, y, r)
+    add_centrifugal(form, s, c, y, r)
+    add_stop_torques(system, y, r)
+    return one[0] + other[0], one[1] + other[1]
 
 
 @derivative.case(OnGround)
-def on_ground_derivative(system: OnGround, t: float, y: State) -> State:
-    """Newton for the centre of mass, and the tree's equations for the angles."""
-    walker = system.walker
-    tree = walker.tree
-    n = len(tree.arm_x)
-    s, c = sines_cosines(tree, y, 2, walker.slope)
-    wrench = all_wrenches(system, s, c, y)
-    torques = knee_torques(walker.knees, system.stops, y, 2, with_centrifugal(tree, s, c, y, 4 + n, wrench[2]))
-    alpha = turned_by(walker.held, system.held, mass_matrix(tree, s, c), torques)
-    rate = walker.blank
-    for i in range(2 + n):
-        rate = put(rate, i, y[2 + n + i])
-    rate = put(rate, 2 + n, walker.gravity_along + wrench[0] / tree.mass)
-    rate = put(rate, 3 + n, wrench[1] / tree.mass - walker.gravity_down)
+def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
+    """Newton for the centre of mass, unless the root is hinged, and the tree's equations for the angles."""
+    form = system.form
+    n, half, first = form.bodies, half_size(form), form.places
+    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    along, normal = all_forces(system, s, c, y, r)
+    mass_matrix(form, s, c, M)
+    factor_linked(form.E, n, M, r)
+    solve_linked(form.E, n, M, r)
+    for i in range(half):
+        f[i] = y[half + i]
+    if first > 0:
+        f[half] = form.gravity_along + along / form.mass
+        f[half + 1] = normal / form.mass - form.gravity_down
     for k in range(n):
-        rate = put(rate, 4 + n + k, alpha[k])
-    return rate
+        f[half + first + k] = r[k]
 
 
 @inlined
-def ground_gradients(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State, first: int, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them.
+def motion_gradient(form: Form, foot: int, s: Any, c: Any, y: Any, j: int) -> tuple[float, float, float]:
+    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state."""
+    p, half = form.places, half_size(form)
+    moves = j >= half
+    k = (j - half if moves else j) - p
+    if k < 0:
+        if k == -1:
+            return (0.0, -1.0, 0.0) if moves else (-1.0, 0.0, 0.0)
+        return 0.0, 0.0, 1.0 if moves else 0.0
+    forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
+    upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
+    if moves:
+        return 0.0, -forward, form.rolling[foot, k] - upward
+    omega = y[half + p + k]
+    return -forward, omega * upward, -omega * forward
 
-    first  where the angles begin in J's own state: after the root's two coordinates, or at once if the root is fixed
-    """
-    motion = foot_motion(walker, foot, s, c, y)
+
+@inlined
+def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
+    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
+    if system.has_ground[foot] == 0:
+        return
+    form = system.form
+    motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
         return
-    force = foot_force(walker, motion)
-    n, size = len(s), J.shape[0]
-    for j in range(size):
-        place = j + (2 - first if j < first + n else 4 - 2 * first)  # in the free walker's state
+    force = foot_force(system, motion)
+    p, half = form.places, half_size(form)
+    F, U = vector(OF_BODIES), vector(OF_BODIES)
+    for k in range(form.bodies):
+        F[k] = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
+        U[k] = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
+        J[half + p + k, p + k] -= force.along * F[k] + force.normal.force * U[k]
+    for j in range(2 * half):
         # how penetration, its rate and the slip change along coordinate or velocity j
-        deeper, deeper_rate, faster = motion_gradient(foot, s, c, y, place)
+        deeper, deeper_rate, faster = motion_gradient(form, foot, s, c, y, j)
         normal = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
         along = force.coefficient * normal + force.by_slip * faster
-        if first > 0:
-            J[2 + n, j] += along
-            J[3 + n, j] += normal
-        for k in range(n):
-            forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
-            upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
-            J[size - n + k, j] += along * (foot.rolling[k] - upward) + normal * forward
-            if place == 2 + k:
-                J[size - n + k, j] -= force.along * forward + force.normal.force * upward
+        if p > 0:
+            J[half, j] += along
+            J[half + 1, j] += normal
+        for k in range(form.bodies):
+            J[half + p + k, j] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
 
 
 @inlined
-def motion_gradient(foot: Foot, s: Vector, c: Vector, y: State, j: int) -> tuple[float, float, float]:
-    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state."""
-    n = len(s)
-    if j == 1:
-        return -1.0, 0.0, 0.0
-    if j == 2 + n:
-        return 0.0, 0.0, 1.0
-    if j == 3 + n:
-        return 0.0, -1.0, 0.0
-    if j < 2:
-        return 0.0, 0.0, 0.0
-    k = j - 2 if j < 2 + n else j - 4 - n
-    forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
-    upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
-    if j < 2 + n:
-        omega = y[4 + n + k]
-        return -forward, omega * upward, -omega * forward
-    return 0.0, -forward, foot.rolling[k] - upward
+def add_tree_gradients(form: Form, s: Any, c: Any, y: Any, alpha: Any, J: Any) -> None:
+    """Add the derivatives of (gravity and centrifugal terms - M alpha) at fixed alpha to the angles' rows of J."""
+    n, p, half = form.bodies, form.places, half_size(form)
+    for k in range(n):
+        row = half + p + k
+        if p == 0:
+            forward, upward = c[k] * form.arm_x[k] - s[k] * form.arm_y[k], s[k] * form.arm_x[k] + c[k] * form.arm_y[k]
+            J[row, k] += form.gravity_down * upward - form.gravity_along * forward
+        for l in range(n):
+            omega = y[half + p + l]
+            A, B = form.A[k, l], form.B[k, l]
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            between = omega * omega * (A * cos_d + B * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
+            J[row, p + l] += between
+            J[row, p + k] -= between
+            J[row, half + p + l] += 2.0 * omega * (A * sin_d - B * cos_d)
 
 
 @jacobian.case(OnGround)
-def on_ground_jacobian(system: OnGround, t: float, y: State, J: Any) -> None:
+def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     """Derivatives of the equations of motion, exact up to the switching points of the force law."""
-    walker = system.walker
-    tree = walker.tree
-    n = len(tree.arm_x)
-    for i in range(4 + 2 * n):
-        for j in range(4 + 2 * n):
-            J[i, j] = 1.0 if j == i + 2 + n else 0.0
-    s, c = sines_cosines(tree, y, 2, walker.slope)
-    if system.has_ground[0]:
-        ground_gradients(walker, walker.feet[0], s, c, y, 2, J)
-    if system.has_ground[1]:
-        ground_gradients(walker, walker.feet[1], s, c, y, 2, J)
-    M = mass_matrix(tree, s, c)
-    torques = with_centrifugal(tree, s, c, y, 4 + n, all_wrenches(system, s, c, y)[2])
-    torques = knee_torques(walker.knees, system.stops, y, 2, torques)
-    knee_gradients(walker.knees, system.stops, y, 2, J)
-    tree_gradients(tree, s, c, y, 2, turned_by(walker.held, system.held, M, torques), J)
-    divide_by_held_mass(walker.held, system.held, tree, M, J)
-    for j in range(4 + 2 * n):
-        J[2 + n, j] /= tree.mass
-        J[3 + n, j] /= tree.mass
+    form = system.form
+    n, p, half = form.bodies, form.places, half_size(form)
+    for i in range(2 * half):
+        for j in range(2 * half):
+            J[i, j] = 1.0 if j == i + half else 0.0
+    s, c, alpha, column, M = (
+        vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES),
+    )  # fmt: skip
+    sines_cosines(form, y, s, c)
+    all_forces(system, s, c, y, alpha)
+    mass_matrix(form, s, c, M)
+    factor_linked(form.E, n, M, alpha)
+    solve_linked(form.E, n, M, alpha)
+    add_ground_gradients(system, 0, s, c, y, J)
+    add_ground_gradients(system, 1, s, c, y, J)
+    add_stop_gradients(system, y, J)
+    add_tree_gradients(form, s, c, y, alpha, J)
+    for j in range(2 * half):
+        for k in range(n):
+            column[k] = J[half + p + k, j]
+        gathered(form.E, n, column)
+        solve_linked(form.E, n, M, column)
+        for k in range(n):
+            J[half + p + k, j] = column[k]
+        for i in range(p):
+            J[half + i, j] /= form.mass

@@ -6,48 +6,42 @@ neither that a foot must come from above nor that a walk can end. The walks of t
 
 from typing import Any, NamedTuple
 
-from walkerlab.ground.held import always_held, no_stops
-from walkerlab.ground.motion import OnGround
 from walkerlab.ground.terrain import cell_at, has_ground_in_cell
-from walkerlab.ground.walker import ContactWalker, foot_motion
+from walkerlab.ground.walker import OnGround, feet_motion
 from walkerlab.kernels import inlined
-from walkerlab.mechanics.tree import sines_cosines
-from walkerlab.solvers.in_tuples import blank, derivative, jacobian
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import block, derivative, jacobian
 
 
 class OnPads(NamedTuple):
     """A walker and the pads under it."""
 
-    walker: ContactWalker
+    walker: OnGround
     terrain: Any
 
 
 @inlined
-def over_pads(system: OnPads, y: State) -> OnGround:
-    """The walker with ground under the feet that are over a pad, at whatever height."""
-    walker, terrain = system.walker, system.terrain
-    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    first = foot_motion(walker, walker.feet[0], s, c, y).along
-    second = foot_motion(walker, walker.feet[1], s, c, y).along
-    over_first = has_ground_in_cell(cell_at(terrain, 0, first))
-    over_second = has_ground_in_cell(cell_at(terrain, 1, second))
-    return OnGround(walker, (over_first, over_second), always_held(walker.held), no_stops(walker.knees))
+def find_pads(system: OnPads, y: Any) -> None:
+    """Tell the walker of ground under the feet that are over a pad, at whatever height."""
+    feet = feet_motion(system.walker.form, y)
+    for foot in range(2):
+        system.walker.has_ground[foot] = has_ground_in_cell(cell_at(system.terrain, foot, feet[foot].along))
 
 
-@blank.case(OnPads)
-def on_pads_blank(system: OnPads) -> State:
+@block.case(OnPads)
+def on_pads_block(system: OnPads) -> Any:
     """As on the ground."""
-    return system.walker.blank
+    return block(system.walker)
 
 
 @derivative.case(OnPads)
-def on_pads_derivative(system: OnPads, t: float, y: State) -> State:
+def on_pads_derivative(system: OnPads, t: float, y: Any, f: Any) -> None:
     """The equations of motion on the ground that there is."""
-    return derivative(over_pads(system, y), t, y)
+    find_pads(system, y)
+    derivative(system.walker, t, y, f)
 
 
 @jacobian.case(OnPads)
-def on_pads_jacobian(system: OnPads, t: float, y: State, J: Any) -> None:
+def on_pads_jacobian(system: OnPads, t: float, y: Any, J: Any) -> None:
     """Their derivatives; the edges of the pads are not among them."""
-    jacobian(over_pads(system, y), t, y, J)
+    find_pads(system, y)
+    jacobian(system.walker, t, y, J)

@@ -1,43 +1,162 @@
-"""A walker on compliant ground: an assembled tree with ball feet, described about its centre of mass.
+"""A walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while it walks.
 
 Coordinates in the slope's frame: along the slope (positive downhill) and height over it, m; the bodies' absolute
-angles from the vertical, rad. State: (along, height, theta_1 .. theta_n, and the velocities of all these).
+angles from the vertical, rad. State: (along, height, theta_1 .. theta_n, and the velocities of all these), of the
+centre of mass. While a knee is locked by an ideal lock thigh and shank are one body, theta = S z with a column of S for
+the bodies that turn together: the constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and what
+walks is an ordinary walker of fewer bodies. While the first stance foot is hinged the root is the hinge, and the state
+is that of the angles alone.
 """
 
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.kernels import inlined
-from walkerlab.mechanics.tree import Tree
-from walkerlab.mechanics.tuples import Vector
+from walkerlab.kernels import inlined, vector
+from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import State
 
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+MAX_BODIES = 8
+OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
+OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
+NO_FOOT = -1
+# what a knee is doing
+RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
-class Foot(NamedTuple):
-    """A ball foot: where its centre is from the centre of mass, body by body."""
 
-    lever_x: Vector  # (n) m, in the bodies' frames
-    lever_y: Vector
-    rolling: Vector  # (n) m, the ball's radius for its own body, else zero
-    radius: float  # m
+class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
+
+    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used.
+    """
+
+    bodies: int  # [n]
+    places: int  # how many coordinates of the root come before the angles: 2, or none of a hinge
+    hinged: int  # the foot that is; NO_FOOT
+    kneed: bool
+    release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
+    A: Floats  # (n, n) kg m^2, of mechanics.assembly
+    B: Floats
+    E: Floats  # (n, n) the reduction; the row of a body that follows others has zero on the diagonal
+    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_y: Floats
+    foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
+    foot_y: Floats
+    rolling: Floats  # (2, n) m, the ball's radius for its own body, else zero
+    radius: Floats  # (2,) m
+    hip_x: Floats  # (n,) m, levers from the root to the hip
+    hip_y: Floats
+    thighs: Integers  # (2,) bodies of either leg; thigh and shank are the same one while they move as one
+    shanks: Integers
+    onto: Integers  # (all bodies,) which of these bodies each is
+    first: Integers  # (n,) the first of the bodies that each of these is
+    mass: float  # kg
+    root_along: float  # m, where the hinge is
+    root_height: float
+    gravity_along: float  # m/s^2
+    gravity_down: float  # m/s^2, towards the slope
+    slope: float  # rad
+
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    **dict.fromkeys(("A", "B", "E"), (MAX_BODIES, MAX_BODIES)),
+    **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
+    **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
+    **dict.fromkeys(("radius", "thighs", "shanks"), (2,)),
+}
+KINDS = {Integers: np.int64, int: np.int64, bool: np.bool_}
+FORM = np.dtype(
+    (Form, [(name, KINDS.get(of, np.float64), SHAPES.get(name, ())) for name, of in Form.__annotations__.items()])
+)
 
 
 class ContactWalker(NamedTuple):
     """Everything that stays the same while it walks."""
 
-    tree: Tree
-    feet: tuple[Foot, Foot]
+    forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    gravity_along: float  # m/s^2
-    gravity_down: float  # m/s^2, towards the slope
-    slope: float  # rad
-    held: Any  # Independent or Held: which bodies follow others
-    knees: Any  # NoKnees, Knees, OneBends or NoneBends
-    legs: tuple[tuple[int, ...], tuple[int, ...]]  # bodies of either leg of the whole walker, from the hip down
-    blank: State  # a state of zeros
-    merging: Any  # Unmerged, ByKnees or Merged: what it is while knees are locked
+    stop: Any  # of the knees: IdealLock or a NormalLaw
+    legs: Integers  # (2, bodies of a leg) from the hip down
+
+    @property
+    def whole(self) -> Form:
+        """With all its bodies, free, no knee locked."""
+        form: Form = self.forms[0, 0]
+        return form
+
+    @property
+    def size(self) -> int:
+        """How many numbers the state of the whole walker has."""
+        return int(4 + 2 * self.whole.bodies)
+
+    @property
+    def mass(self) -> float:
+        """kg."""
+        return float(self.whole.mass)
+
+    @property
+    def slope(self) -> float:
+        """rad."""
+        return float(self.whole.slope)
+
+    @property
+    def gravity_along(self) -> float:
+        """m/s^2, along the slope."""
+        return float(self.whole.gravity_along)
+
+    @property
+    def gravity_down(self) -> float:
+        """m/s^2, towards the slope."""
+        return float(self.whole.gravity_down)
+
+    @property
+    def kneed(self) -> bool:
+        """Whether it has knees."""
+        return bool(self.whole.kneed)
+
+
+def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
+    """The walker with other values of some fields of all its forms."""
+    forms = walker.forms.copy()
+    for name, value in fields.items():
+        forms[name] = value
+    return walker._replace(forms=forms)
+
+
+class OnGround(NamedTuple):
+    """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
+
+    form: Form
+    normal: NormalLaw
+    friction: Any
+    stop: Any
+    has_ground: Any  # (2,) whether there is ground under a foot
+    knee: Any  # (2,) what each knee is doing
+
+
+def on_ground(
+    walker: ContactWalker, has_ground: Any, knee: Any = (RELEASED, RELEASED), hinged: bool = False
+) -> OnGround:
+    """The walker in the form that its knees give it.
+
+    has_ground  (2,) whether there is ground under a foot
+    knee        (2,) what each knee is doing
+    """
+    memory = (np.asarray(each, np.int8) for each in (has_ground, knee))
+    form = walker.forms[int(hinged), locked_knees(knee)]
+    return OnGround(form, walker.normal, walker.friction, walker.stop, *memory)
+
+
+@inlined
+def locked_knees(knee: Any) -> int:
+    """The number of the form whose knees are locked as these, (2,) by what each is doing: 0 none, 1, 2, 3 both."""
+    return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
 
 
 class FootMotion(NamedTuple):
@@ -50,20 +169,51 @@ class FootMotion(NamedTuple):
 
 
 @inlined
-def foot_motion(walker: ContactWalker, foot: Foot, s: Vector, c: Vector, y: State) -> FootMotion:
+def half_size(form: Form) -> int:
+    """How many coordinates there are: where the velocities begin in the state."""
+    return form.places + form.bodies
+
+
+@inlined
+def sines_cosines(form: Form, y: Any, s: Any, c: Any) -> None:
+    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
+    for k in range(form.bodies):
+        s[k], c[k] = sine_cosine(y[form.places + k] + form.slope)
+
+
+@inlined
+def foot_motion(form: Form, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
-    n = len(s)
-    along, height = y[0], y[1] - foot.radius
-    slip, vertical_velocity = y[2 + n], y[3 + n]
-    for k in range(n):
-        omega = y[4 + n + k]
-        forward = c[k] * foot.lever_x[k] - s[k] * foot.lever_y[k]
-        upward = s[k] * foot.lever_x[k] + c[k] * foot.lever_y[k]
+    half = half_size(form)
+    along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
+    if form.places > 0:
+        along, height, slip, vertical_velocity = y[0], y[1], y[half], y[half + 1]
+    height -= form.radius[foot]
+    for k in range(form.bodies):
+        omega = y[half + form.places + k]
+        forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
+        upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
         along += forward
         height += upward
-        slip += omega * (foot.rolling[k] - upward)
+        slip += omega * (form.rolling[foot, k] - upward)
         vertical_velocity += omega * forward
     return FootMotion(along, height, slip, vertical_velocity)
+
+
+@inlined
+def one_foot_motion(form: Form, foot: int, y: Any) -> FootMotion:
+    """A foot in a state of a form."""
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    return foot_motion(form, foot, s, c, y)
+
+
+@inlined
+def feet_motion(form: Form, y: Any) -> tuple[FootMotion, FootMotion]:
+    """Both feet in a state of a form."""
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
 
 
 class FootForce(NamedTuple):
@@ -76,8 +226,58 @@ class FootForce(NamedTuple):
 
 
 @inlined
-def foot_force(walker: ContactWalker, motion: FootMotion) -> FootForce:
-    """Force of the ground on a foot that is inside it."""
-    normal = impact_normal_force(-motion.height, -motion.vertical_velocity, walker.normal)
-    mu, mu_slope = friction_coefficient(walker.friction, motion.slip)
+def foot_force(laws: Any, motion: FootMotion) -> FootForce:
+    """Force of the ground on a foot that is inside it; by the laws of a walker or of its system."""
+    normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
+    mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
+
+
+def folded(form: Form, x: Any) -> Floats:
+    """The form's state, or a column of its tangent, from that of all bodies about the same root.
+
+    Bodies that are one turn alike up to rounding; of each group the first tells.
+    """
+    return np.asarray(x)[places_in_whole(form, len(x))]
+
+
+def unfolded(form: Form, y: Any, size: int) -> Floats:
+    """State of all bodies (size,) about the same root: bodies that are one turn alike."""
+    p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
+    onto = form.onto[:every]
+    return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
+
+
+def places_in_whole(form: Form, size: int) -> list[int]:
+    """Where the numbers of a form's state stand in that of all bodies about the same root."""
+    p, half, first = int(form.places), size // 2, form.first[: form.bodies]
+    return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
+
+
+@inlined
+def store_whole(form: Form, y: Any, whole: Any) -> None:
+    """Write the state y of a form into `whole`, as that of the whole walker, free: the hinge tells the rest."""
+    n, p, half = form.bodies, form.places, half_size(form)
+    middle = whole.size // 2
+    for i in range(2, middle):
+        body = form.onto[i - 2]
+        whole[i], whole[middle + i] = y[p + body], y[half + p + body]
+    if p > 0:
+        whole[0], whole[1], whole[middle], whole[middle + 1] = y[0], y[1], y[half], y[half + 1]
+        return
+    along, height, speed, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
+    for k in range(n):
+        s, c = sine_cosine(y[k] + form.slope)
+        forward, upward = c * form.arm_x[k] - s * form.arm_y[k], s * form.arm_x[k] + c * form.arm_y[k]
+        along += forward / form.mass
+        height += upward / form.mass
+        speed -= y[half + k] * upward / form.mass
+        vertical_velocity += y[half + k] * forward / form.mass
+    whole[0], whole[1], whole[middle], whole[middle + 1] = along, height, speed, vertical_velocity
+
+
+def floating_state(form: Form, y: Any, size: int) -> State:
+    """The state (size,) of the whole walker, free, of a form's state y."""
+    whole = np.zeros(size)
+    store_whole(form, y, whole)
+    return tuple(whole.tolist())

@@ -6,28 +6,15 @@ others are switching points of the force law, where its derivatives jump: a step
 order.
 """
 
-import math
 from typing import Any, NamedTuple
 
 from walkerlab.ground.friction import sample_switching, switching_count
-from walkerlab.ground.held import (
-    BENT,
-    LOCKED,
-    STOPPING,
-    Knees,
-    NoneBends,
-    OneBends,
-    extension,
-    extension_rate,
-)
+from walkerlab.ground.knees import extension, extension_rate
 from walkerlab.ground.normal_force import grip
-from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.terrain import Terrain, cell_edges
-from walkerlab.ground.walker import ContactWalker, FootMotion, foot_motion
-from walkerlab.kernels import by_type_or_default, inlined
-from walkerlab.mechanics.tree import sines_cosines
+from walkerlab.ground.walker import BENT, OF_BODIES, STOPPING, FootMotion, Form, OnGround, foot_motion, sines_cosines
+from walkerlab.kernels import inlined, vector
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
-from walkerlab.solvers.system import State
 
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
@@ -51,90 +38,87 @@ class Frame(NamedTuple):
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)
-    hip_x: tuple[float, ...]  # m, lever of the hip from the centre of mass, body by body
-    hip_y: tuple[float, ...]
     locate_switching: bool  # end steps at the switching points of the force law
 
 
-@by_type_or_default
-def walker_state(system: Any, y: State) -> State:
-    """The state of the free walker."""
-    return y
+class JudgedGround(NamedTuple):
+    """What a walk happens on and is judged by."""
+
+    terrain: Terrain
+    frame: Frame
 
 
-@walker_state.case(Pinned)
-def hinged_state(system: Pinned, y: State) -> State:
-    """The hinge gives the rest."""
-    return floating_state(system, y)
+class WalkState(NamedTuple):
+    """What a walk remembers: read by its rules, and in part its result."""
+
+    touch_time: Any  # (steps,) s
+    touch_along: Any  # (steps,) m
+    slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
+    rolling: Any  # (steps,) m, how far it rolled
+    has_ground: Any  # (2,) whether there is ground under a foot
+    cells: Any  # (2,) which cell of its lane a foot is over
+    left_cells: Any  # (2,) the cell where it last stood
+    foothold: Any  # (2,) m, where it touched
+    touched: Any  # (2,) m, where its material was then
+    stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
+    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
+    knee: Any  # (2,) what each knee is doing
+    releasing: Any  # (1,) whether the trailing knee is still to be released
+    knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
+    sides: Any  # (event functions,) on which side of zero each event function is known to be
+    at_zero: Any  # (event functions,) which event functions the last event left at zero
+    times: Any  # (3,) see the indices below
+    feet: Any  # (2,) see the indices below
 
 
-@by_type_or_default
-def is_free(system: Any, foot: int) -> bool:
-    """Whether a foot may touch and lift."""
-    return True
-
-
-@is_free.case(Pinned)
-def free_other(system: Pinned, foot: int) -> bool:
-    """The hinged one may not."""
-    return foot != system.foot
+# indices into WalkState.times
+LAST_TOUCH, AIRBORNE_SINCE, NOW = 0, 1, 2
+# indices into WalkState.feet
+STANCE, STEPS = 0, 1
 
 
 @inlined
-def feet_motion(walker: ContactWalker, y: State) -> tuple[FootMotion, FootMotion]:
-    """Both feet of the free walker's state."""
-    s, c = sines_cosines(walker.tree, y, 2, walker.slope)
-    return foot_motion(walker, walker.feet[0], s, c, y), foot_motion(walker, walker.feet[1], s, c, y)
-
-
-@inlined
-def material_along(walker: ContactWalker, foot: int, along: float, y: State) -> float:
+def material_along(form: Form, foot: int, along: float, y: Any) -> float:
     """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
 
     The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
     velocity; so is its way the contact point's plus radius times the change of the angle.
     """
-    rolling = walker.feet[foot].rolling
-    for k in range(len(rolling)):
-        along += rolling[k] * y[2 + k]
+    for k in range(form.bodies):
+        along += form.rolling[foot, k] * y[form.places + k]
     return along
 
 
 @inlined
-def hip_height(walker: ContactWalker, frame: Frame, y: State) -> float:
+def hip_height(form: Form, s: Any, c: Any, y: Any) -> float:
     """Height of the hip over the slope (m)."""
-    height = y[1]
-    for k in range(len(frame.hip_x)):
-        angle = y[2 + k] + walker.slope
-        height += math.sin(angle) * frame.hip_x[k] + math.cos(angle) * frame.hip_y[k]
+    height = y[1] if form.places > 0 else form.root_height
+    for k in range(form.bodies):
+        height += s[k] * form.hip_x[k] + c[k] * form.hip_y[k]
     return height
 
 
 @inlined
 def sample_event_functions(
-    system: Any,
-    walker: ContactWalker,
-    terrain: Terrain,
-    frame: Frame,
-    cells: Any,
-    stance: int,
-    touched: float,
-    state: State,
-    node: int,
-    finder: CrossingFinder,
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
 ) -> None:
-    """Values of all event functions at one node of a step, where the system's state is `state`."""
-    y = walker_state(system, state)
-    feet = feet_motion(walker, y)
+    """Values of all event functions at one node of a step, where the state is y."""
+    form, terrain, values = system.form, ground.terrain, finder.values
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    values[PASSING, node] = 0.0
     for foot in range(2):
-        first = foot * PER_FOOT
-        sample_foot(walker, feet[foot], cell_edges(terrain, foot, cells[foot]), first, node, finder)
-        finder.values[first + MATERIAL, node] = material_along(walker, foot, feet[foot].along, y)
-    finder.values[PASSING, node] = feet[1].along - feet[0].along
-    finder.values[FALL, node] = hip_height(walker, frame, y) - FALLEN_HIP * frame.leg_length
-    away = finder.values[stance * PER_FOOT + MATERIAL, node] - touched
-    finder.values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
-    sample_knees(walker.knees, y, node, finder)
+        first, motion = foot * PER_FOOT, foot_motion(form, foot, s, c, y)
+        sample_foot(system, motion, cell_edges(terrain, foot, walk_state.cells[foot]), first, node, finder)
+        values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
+        values[PASSING, node] += motion.along if foot == 1 else -motion.along
+    values[FALL, node] = hip_height(form, s, c, y) - FALLEN_HIP * ground.frame.leg_length
+    stance = walk_state.feet[STANCE]
+    away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
+    values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+    for knee in range(2):
+        values[EXTENSION + knee, node] = extension(form, knee, y)
+        values[EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
 
 
 @inlined
@@ -145,7 +129,7 @@ def farthest_slide(terrain: Terrain) -> float:
 
 @inlined
 def sample_foot(
-    walker: ContactWalker, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
+    system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
     """One foot's event functions at node j."""
     values = finder.values
@@ -153,113 +137,47 @@ def sample_foot(
     values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
-    values[first + RELEASE, j] = grip(-motion.height, -motion.vertical_velocity, walker.normal)
-    values[first + FULL_DAMPING, j] = motion.height + walker.normal.full_damping_penetration
-    sample_switching(walker.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
-
-
-@by_type_or_default
-def sample_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
-    """The knees' event functions at node j."""
-
-
-@sample_knees.case(Knees)
-@sample_knees.case(OneBends)
-def sample_both_knees(knees: Any, y: State, j: int, finder: CrossingFinder) -> None:
-    """Extension and its rate."""
-    for knee in range(2):
-        finder.values[EXTENSION + knee, j] = extension(knees, knee, y, 2)
-        finder.values[EXTENSION_RATE + knee, j] = extension_rate(knees, knee, y, 2)
-
-
-@by_type_or_default
-def knee_crossing(
-    knees: Any, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
-) -> tuple[float, int]:
-    """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
-
-    knee       (2,) what each knee is doing
-    releasing  whether the trailing knee is released when the stance foot stops sinking in
-    """
-    return NO_CROSSING, -1
-
-
-@knee_crossing.case(Knees)
-def first_knee_crossing(
-    knees: Knees, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
-) -> tuple[float, int]:
-    """A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in."""
-    best, event = NO_CROSSING, -1
-    for k in range(2):
-        at, index = NO_CROSSING, EXTENSION + k
-        if knee[k] == BENT:
-            at = leaves_side(finder, index, -1, at_zero[index] != 0)
-        elif knee[k] == STOPPING:
-            index = EXTENSION_RATE + k
-            at = leaves_side(finder, index, 1, at_zero[index] != 0)
-        if at < best:
-            best, event = at, index
-    at, index = end_of_sinking(releasing, stance, at_zero, finder)
-    return (at, index) if at < best else (best, event)
-
-
-@knee_crossing.case(OneBends)
-def only_crossing(
-    knees: OneBends, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
-) -> tuple[float, int]:
-    """The bent knee gets straight."""
-    index = EXTENSION if knee[0] != LOCKED else EXTENSION + 1
-    if knee[index - EXTENSION] != BENT:
-        return NO_CROSSING, -1
-    return leaves_side(finder, index, -1, at_zero[index] != 0), index
-
-
-@knee_crossing.case(NoneBends)
-def crossing_of_the_foot(
-    knees: NoneBends, knee: Any, releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder
-) -> tuple[float, int]:
-    """The stance foot stops sinking in."""
-    return end_of_sinking(releasing, stance, at_zero, finder)
+    values[first + RELEASE, j] = grip(-motion.height, -motion.vertical_velocity, system.normal)
+    values[first + FULL_DAMPING, j] = motion.height + system.normal.full_damping_penetration
+    sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 
 @inlined
-def end_of_sinking(releasing: bool, stance: int, at_zero: Any, finder: CrossingFinder) -> tuple[float, int]:
-    """Fraction of the step at which the stance foot stops sinking in, if a knee is to be released then."""
-    index = stance * PER_FOOT + VERTICAL_VELOCITY
-    if not releasing:
-        return NO_CROSSING, index
-    return leaves_side(finder, index, -1, at_zero[index] != 0), index
+def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
+    """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
+
+    A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in.
+    """
+    best, event = NO_CROSSING, -1
+    for knee in range(2):
+        at, index = NO_CROSSING, EXTENSION + knee
+        if walk_state.knee[knee] == BENT:
+            at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        elif walk_state.knee[knee] == STOPPING:
+            index = EXTENSION_RATE + knee
+            at = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
+        if at < best:
+            best, event = at, index
+    if walk_state.releasing[0] != 0:
+        index = walk_state.feet[STANCE] * PER_FOOT + VERTICAL_VELOCITY
+        at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        if at < best:
+            best, event = at, index
+    return best, event
 
 
 @inlined
 def earliest_crossing(
-    system: Any,
-    walker: ContactWalker,
-    frame: Frame,
-    watch_order: bool,
-    has_ground: Any,
-    stance: int,
-    sides: Any,
-    at_zero: Any,
-    pads: bool,
-    knee: Any,
-    releasing: bool,
-    finder: CrossingFinder,
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
     """Fraction of the sampled step at which the first event lies, and which event function's; NO_CROSSING if none.
 
     watch_order  whether it matters that the feet pass each other
-    has_ground      (2,) whether there is ground under each foot
-    stance       the stance foot, which may slide
-    sides        (event functions,) on which side of zero each event function is known to be: 1, -1, or NO_SIDE
-    at_zero      (event functions,) which event functions the last event left at zero
-    pads         whether the ground has edges
-    knee         (2,) what each knee is doing
-    releasing    whether the trailing knee is released when the stance foot stops sinking in
     """
+    sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
     for foot in range(2):
-        if not is_free(system, foot):
+        if foot == system.form.hinged:
             continue
         first = foot * PER_FOOT
         # a foot that an event left on the surface is inside or outside by rounding there
@@ -268,15 +186,15 @@ def earliest_crossing(
             lowest = min(lowest, finder.values[first + HEIGHT, j])
         inside = has_ground[foot] != 0 and lowest < 0.0
         last = RELEASE
-        if inside and frame.locate_switching:
-            last = FRICTION_SWITCHES + switching_count(walker.friction)
+        if inside and ground.frame.locate_switching:
+            last = FRICTION_SWITCHES + switching_count(system.friction)
         for index in range(first, first + last):
-            if not pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
+            if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
                 continue
             at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
             if at < best:
                 best, event = at, index
-        if foot == stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
+        if foot == walk_state.feet[STANCE] and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
             at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if at < best:
                 best, event = at, SLIDE
@@ -284,7 +202,7 @@ def earliest_crossing(
         at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if at < best:
             best, event = at, PASSING
-    at, index = knee_crossing(walker.knees, knee, releasing, stance, at_zero, finder)
+    at, index = knee_crossing(walk_state, finder)
     if at < best:
         best, event = at, index
     at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)

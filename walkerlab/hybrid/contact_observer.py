@@ -2,25 +2,25 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
-from walkerlab.ground.held import Knees, knee_energy, knee_power
-from walkerlab.ground.merged import store_whole
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, VERTICAL_VELOCITY, feet_motion, walker_state
+from walkerlab.ground.knees import knee_power
+from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, store_whole
+from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_type_or_default, inlined
+from walkerlab.kernels import by_type_or_default, inlined, kernel, matrix, vector
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
-from walkerlab.solvers.in_tuples import end_state, interpolate
-from walkerlab.solvers.stepping import T_OLD, T
-from walkerlab.solvers.system import State
+from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
 # indices into `dissipated`
 DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, CHANNEL_COUNT = 0, 1, 2, 3, 4, 5
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
-# nodes and weights of the Radau quadrature on a step: exact to the order of the method of that name
-NODES = (0.15505102572168219, 0.6449489742783178, 1.0)
-WEIGHTS = (0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
+# the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
+NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
+WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
 
 
 class ContactObserver(NamedTuple):
@@ -39,149 +39,151 @@ class ContactObserver(NamedTuple):
     # fixed origin, and from the slope below
     extremes: Any
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
-    merged: Any  # tangents of the walker with one and with both knees locked; () if it keeps its bodies
 
 
 @inlined
 def observe(
-    observer: ContactObserver,
-    method: Any,
-    system: Any,
-    walker: ContactWalker,
-    finder: CrossingFinder,
-    has_ground: Any,
-    knee: Any,
-    stance: int,
+    observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
     """Take note of the last step, which stands and whose event functions are sampled."""
-    mode = (has_ground[0] != 0, has_ground[1] != 0)
-    record_samples(observer, method, system, walker, mode, knee, stance)
+    record_samples(observer, method, system, walk_state)
     if observer.track_energy:
-        add_dissipation(observer, method, system, walker, mode)
+        add_dissipation(observer, method, system)
         for foot in range(2):
-            if mode[foot]:
-                note_depth(observer, method, system, walker, finder, foot)
+            if system.has_ground[foot] != 0:
+                note_depth(observer, method, system, finder, foot)
     if observer.tangent.Phi.shape[1] > 0:
         carry_tangent(observer.tangent, method, system)
 
 
 @inlined
-def record_samples(
-    observer: ContactObserver,
-    method: Any,
-    system: Any,
-    walker: ContactWalker,
-    mode: tuple[bool, bool],
-    knee: Any,
-    stance: int,
-) -> None:
+def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     index = observer.recorded[0]
+    y = vector(OF_STATES)[: method.y.size]
     while index < observer.times.size and observer.times[index] <= method.clock[T]:
         fraction = (observer.times[index] - t) / h
-        y = walker_state(system, interpolate(method, system, fraction))
-        store_whole(walker.merging, y, observer.states[index])
-        damping, friction, stops = work_until(method, system, walker, mode, fraction)
+        interpolate(method, system, fraction, y)
+        store_whole(system.form, y, observer.states[index])
+        damping, friction, stops = work_until(method, system, fraction)
         for channel in range(CHANNEL_COUNT):
             observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
         observer.sampled_dissipation[index, DAMPING] += damping
         observer.sampled_dissipation[index, FRICTION] += friction
         observer.sampled_dissipation[index, KNEE_STOP] += stops
-        observer.knees[index, 0], observer.knees[index, 1] = knee[0], knee[1]
-        observer.has_ground[index, 0], observer.has_ground[index, 1] = mode
-        observer.stance[index] = stance
+        for k in range(2):
+            observer.knees[index, k] = walk_state.knee[k]
+            observer.has_ground[index, k] = walk_state.has_ground[k]
+        observer.stance[index] = walk_state.feet[STANCE]
         index += 1
     observer.recorded[0] = index
 
 
 @inlined
-def add_dissipation(
-    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, mode: tuple[bool, bool]
-) -> None:
+def add_dissipation(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """What the last step dissipated, and how well the energy balances at its end."""
-    damping, friction, stops = work_until(method, system, walker, mode, 1.0)
+    damping, friction, stops = work_until(method, system, 1.0)
     observer.dissipated[DAMPING] += damping
     observer.dissipated[FRICTION] += friction
     observer.dissipated[KNEE_STOP] += stops
-    end = walker_state(system, end_state(method, system))
     lost = 0.0
     for channel in range(CHANNEL_COUNT):
         lost += observer.dissipated[channel]
-    held = total_energy(walker, mode, end) + knee_energy(walker.knees, system.stops, end, 2)
-    residual = held + lost - observer.extremes[START_ENERGY]
+    residual = end_energy(method, system) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
 
 
 @inlined
-def note_depth(
-    observer: ContactObserver, method: Any, system: Any, walker: ContactWalker, finder: CrossingFinder, foot: int
-) -> None:
+def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
     """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
-        lowest = feet_motion(walker, walker_state(system, interpolate(method, system, min(at, 1.0))))
-        deepest = max(deepest, -lowest[foot].height)
+        y = vector(OF_STATES)[: method.y.size]
+        interpolate(method, system, min(at, 1.0), y)
+        deepest = max(deepest, -one_foot_motion(system.form, foot, y).height)
     observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
 
 
 @inlined
-def observe_edge(observer: ContactObserver, walker: ContactWalker, foot: int, has_ground: bool, y: State) -> None:
+def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
     """A foot left its pad: the spring under it is gone, and what it held with it."""
-    if has_ground and observer.track_energy:
-        observer.dissipated[EDGES] += foot_elastic_energy(walker, foot, y)
-
-
-@inlined
-def work_until(
-    method: Any, system: Any, walker: ContactWalker, has_ground: tuple[bool, bool], fraction: float
-) -> tuple[float, float, float]:
-    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step."""
-    damping, friction = 0.0, 0.0
-    for foot in range(2):
-        if has_ground[foot]:
-            lost = foot_work(method, system, walker, foot, fraction)
-            damping += lost[0]
-            friction += lost[1]
-    return damping, friction, stop_work(walker.knees, method, system, fraction)
+    if system.has_ground[foot] != 0 and observer.track_energy:
+        observer.dissipated[EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @by_type_or_default
-def stop_work(knees: Any, method: Any, system: Any, fraction: float) -> float:
-    """Work (J) lost in the knees' stops."""
-    return 0.0
+def end_energy(method: Any, system: OnGround) -> float:
+    """Mechanical energy (J) at the end of the last step."""
+    return total_energy(system, method.y)
 
 
-@stop_work.case(Knees)
-def work_in_stops(knees: Knees, method: Any, system: Any, fraction: float) -> float:
-    """That of their damping."""
-    span, work = fraction * (method.clock[T] - method.clock[T_OLD]), 0.0
-    if system.stops[0] or system.stops[1]:
-        for i in range(3):
-            y = walker_state(system, interpolate(method, system, fraction * NODES[i]))
-            work += span * WEIGHTS[i] * knee_power(knees, system.stops, y, 2)
-    return work
+@by_type_or_default
+def work_until(method: Any, system: OnGround, fraction: float) -> tuple[float, float, float]:
+    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step."""
+    states = matrix(OF_STATES)
+    for i in range(len(NODES)):
+        interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
+    return lost_work(system, states, fraction * (method.clock[T] - method.clock[T_OLD]))
 
 
 @inlined
-def foot_work(method: Any, system: Any, walker: ContactWalker, foot: int, fraction: float) -> tuple[float, float]:
+def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float, float]:
+    """`work_until` of a time `span` (s), with the states at its NODES."""
+    damping, friction, stops = 0.0, 0.0, 0.0
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            lost = foot_work(system, states, foot, span)
+            damping += lost[0]
+            friction += lost[1]
+    if system.knee[0] == STOPPING or system.knee[1] == STOPPING:
+        for i in range(1, len(NODES)):
+            stops += span * WEIGHTS[i] * knee_power(system, states[i])
+    return damping, friction, stops
+
+
+@inlined
+def foot_work(system: OnGround, states: Any, foot: int, span: float) -> tuple[float, float]:
     """Work (J) lost under a foot that there is ground for.
 
     Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
     quadrature likes; steps end where it lets go.
     """
-    span = fraction * (method.clock[T] - method.clock[T_OLD])
-    damping, friction, let_go = 0.0, 0.0, True
-    for i in range(3):
-        y = walker_state(system, interpolate(method, system, fraction * NODES[i]))
-        power = dissipated_power(walker, foot, y)
+    damping, friction, let_go, last = 0.0, 0.0, True, len(NODES) - 1
+    for i in range(1, len(NODES)):
+        power = dissipated_power(system, foot, states[i])
         damping += span * WEIGHTS[i] * power[0]
         friction += span * WEIGHTS[i] * power[1]
-        let_go = let_go and (i == 2 or power[2] == 0.0)
+        let_go = let_go and (i == last or power[2] == 0.0)
     if let_go:
-        start, end = interpolate(method, system, 0.0), interpolate(method, system, fraction)
-        damping = foot_elastic_energy(walker, foot, walker_state(system, start))
-        damping -= foot_elastic_energy(walker, foot, walker_state(system, end))
+        damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])
     return damping, friction
+
+
+@kernel
+def energy_of(system: OnGround, y: Any) -> float:
+    """Mechanical energy (J) of a state."""
+    return total_energy(system, y)
+
+
+@kernel
+def lost_work_of(system: OnGround, states: Any, span: float) -> tuple[float, float, float]:
+    """As `lost_work`."""
+    return lost_work(system, states, span)
+
+
+@end_energy.case(ScipyMethod)
+def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
+    """A walk in Python hands its states to compiled code at once."""
+    return energy_of(system, method.y)
+
+
+@work_until.case(ScipyMethod)
+def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> tuple[float, float, float]:
+    """Likewise."""
+    damping, friction, stops = lost_work_of(
+        system, method.states_at(fraction * np.array(NODES)), fraction * (method.clock[T] - method.clock[T_OLD])
+    )
+    return damping, friction, stops

@@ -1,40 +1,31 @@
 """What a walk on compliant ground remembers, and what an event changes in it: the rules of steps, pads and falls."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
-from walkerlab.ground.held import (
-    BENT,
-    FLEXED,
-    LOCKED,
-    RELEASED,
-    STOPPING,
-    IdealLock,
-    Knees,
-    NoneBends,
-    OneBends,
-    extension,
-)
+from walkerlab.ground.knees import FLEXED, IdealLock, extension
 from walkerlab.ground.terrain import Terrain, has_ground_in_air, has_ground_in_cell
-from walkerlab.ground.walker import ContactWalker, FootMotion
+from walkerlab.ground.walker import BENT, LOCKED, RELEASED, STOPPING, FootMotion, Form, OnGround, feet_motion
 from walkerlab.hybrid.contact_events import (
     EXTENSION,
     EXTENSION_RATE,
     FALL,
     HEIGHT,
+    LAST_TOUCH,
     LEFT_EDGE,
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
     SLIDE,
+    STANCE,
+    STEPS,
     VERTICAL_VELOCITY,
+    WalkState,
     farthest_slide,
-    feet_motion,
     material_along,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type_or_default, inlined
-from walkerlab.solvers.system import State
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
@@ -43,44 +34,10 @@ FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
 BENT_KNEE = int(Outcome.BENT_KNEE)
 GOES_ON = -1
 
-# indices into WalkState.times
-LAST_TOUCH, AIRBORNE_SINCE = 0, 1
-# indices into WalkState.feet
-STANCE, STEPS = 0, 1
-
-
-class WalkState(NamedTuple):
-    """What a walk remembers: read by its rules, and in part its result."""
-
-    touch_time: Any  # (steps,) s
-    touch_along: Any  # (steps,) m
-    slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
-    rolling: Any  # (steps,) m, how far it rolled
-    has_ground: Any  # (2,) whether there is ground under a foot
-    cells: Any  # (2,) which cell of its lane a foot is over
-    left_cells: Any  # (2,) the cell where it last stood
-    foothold: Any  # (2,) m, where it touched
-    touched: Any  # (2,) m, where its material was then
-    stood: Any  # (2, 2) m, slip and rolling of each foot from its touch to its latest lift
-    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
-    knee: Any  # (2,) what each knee is doing
-    releasing: Any  # (1,) whether the trailing knee is still to be released
-    knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
-    sides: Any  # (event functions,) on which side of zero each event function is known to be
-    at_zero: Any  # (event functions,) which event functions the last event left at zero
-    times: Any  # (2,) see the indices above
-    feet: Any  # (2,) see the indices above
-
 
 @inlined
 def happen(
-    walker: ContactWalker,
-    terrain: Terrain,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    event: int,
-    t: float,
-    y: State,
+    system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
     """Let an event change the walk state; returns an outcome if it ends the walk."""
     if event == FALL:
@@ -89,9 +46,9 @@ def happen(
         return SLID
     walk_state.at_zero[event] = 1
     if event >= EXTENSION:
-        knee_stops(walker.knees, walk_state, event, t)
+        knee_stops(system.stop, walk_state, event, t)
         return GOES_ON
-    feet = feet_motion(walker, y)
+    feet = feet_motion(system.form, y)
     if event == PASSING:
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         for foot in range(2):
@@ -105,15 +62,15 @@ def happen(
     if kind == HEIGHT:
         walk_state.sides[event] = -walk_state.sides[event]
         if is_above(walk_state, foot):
-            lift(walker, terrain, walk_state, feet, foot, y)
+            lift(system.form, terrain, walk_state, feet, foot, y)
         else:
-            return touch(walker, terrain, walk_state, feet, foot, t, y)
+            return touch(system.form, terrain, walk_state, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
         walk_state.at_zero[event] = 0
         walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
         walk_state.cells[foot] += 1 if kind == RIGHT_EDGE else -1
         if not has_ground_in_cell(walk_state.cells[foot]):
-            observe_edge(observer, walker, foot, walk_state.has_ground[foot] != 0, y)
+            observe_edge(observer, system, foot, y)
             walk_state.has_ground[foot] = 0
         elif is_above(walk_state, foot):
             walk_state.has_ground[foot] = 1
@@ -121,7 +78,7 @@ def happen(
             return OFF_PAD
     elif kind == VERTICAL_VELOCITY:
         walk_state.at_zero[event] = 0
-        release(walker.knees, walk_state, 1 - foot)
+        release(walk_state, 1 - foot)
     return GOES_ON
 
 
@@ -159,17 +116,17 @@ def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool)
 
 @inlined
 def lift(
-    walker: ContactWalker,
+    form: Form,
     terrain: Terrain,
     walk_state: WalkState,
     feet: tuple[FootMotion, FootMotion],
     foot: int,
-    y: State,
+    y: Any,
 ) -> None:
     """A foot rose above the ground: from its stance, or out of a scuff."""
     stands = foot == walk_state.feet[STANCE]
     if stands or walk_state.leaving[foot] != 0:
-        note_slip(walker, walk_state, feet, foot, y)
+        note_slip(form, walk_state, feet, foot, y)
         if not stands:
             step = walk_state.feet[STEPS] - 1
             walk_state.slip[step], walk_state.rolling[step] = walk_state.stood[foot, 0], walk_state.stood[foot, 1]
@@ -178,24 +135,22 @@ def lift(
 
 
 @inlined
-def note_slip(
-    walker: ContactWalker, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: State
-) -> None:
+def note_slip(form: Form, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
     """How far a foot has slipped and rolled since it touched."""
-    slip = material_along(walker, foot, feet[foot].along, y) - walk_state.touched[foot]
+    slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
     walk_state.stood[foot, 0] = slip
     walk_state.stood[foot, 1] = feet[foot].along - walk_state.foothold[foot] - slip
 
 
 @inlined
 def touch(
-    walker: ContactWalker,
+    form: Form,
     terrain: Terrain,
     walk_state: WalkState,
     feet: tuple[FootMotion, FootMotion],
     foot: int,
     t: float,
-    y: State,
+    y: Any,
 ) -> int:
     """A foot came down on ground.
 
@@ -205,7 +160,7 @@ def touch(
     stance = walk_state.feet[STANCE]
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
-    material = material_along(walker, foot, feet[foot].along, y)
+    material = material_along(form, foot, feet[foot].along, y)
     if foot == stance:
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
     measure = terrain.stride_measure
@@ -214,13 +169,13 @@ def touch(
         return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
         return GOES_ON
-    if not is_straight(walker.knees, walk_state, foot):
+    if not is_straight(form, walk_state, foot):
         return BENT_KNEE
     step = walk_state.feet[STEPS]
     walk_state.touch_time[step] = t
     walk_state.touch_along[step] = feet[foot].along
     if not is_above(walk_state, stance):
-        note_slip(walker, walk_state, feet, stance, y)
+        note_slip(form, walk_state, feet, stance, y)
         walk_state.leaving[stance] = 1
     walk_state.slip[step], walk_state.rolling[step] = walk_state.stood[stance, 0], walk_state.stood[stance, 1]
     walk_state.foothold[foot] = feet[foot].along
@@ -231,34 +186,8 @@ def touch(
     walk_state.feet[STANCE] = foot
     walk_state.feet[STEPS] = step + 1
     find_ground(terrain, walk_state, stance, is_above(walk_state, stance))
-    follow_strike(walker.knees, walk_state, stance)
+    follow_strike(form, walk_state, stance)
     return GOES_ON
-
-
-@by_type_or_default
-def knee_stops(knees: Any, walk_state: WalkState, event: int, t: float) -> None:
-    """A knee got straight, or turned back in its stop."""
-
-
-@by_type_or_default
-def release(knees: Any, walk_state: WalkState, knee: int) -> None:
-    """A knee is free again."""
-
-
-@by_type_or_default
-def is_straight(knees: Any, walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot may come down: its knee is locked."""
-    return True
-
-
-@by_type_or_default
-def follow_strike(knees: Any, walk_state: WalkState, trailing: int) -> None:
-    """The other foot has touched: the trailing knee is released, or is to be."""
-
-
-@by_type_or_default
-def note_flexion(knees: Any, walk_state: WalkState, y: State) -> None:
-    """A released knee that has bent is caught when it straightens."""
 
 
 @by_type_or_default
@@ -273,60 +202,43 @@ def lock_catches(stop: IdealLock) -> bool:
     return True
 
 
-@knee_stops.case(Knees)
-def knee_locks(knees: Knees, walk_state: WalkState, event: int, t: float) -> None:
-    """It locks, or meets its stop, where it latches when it turns back."""
-    if event < EXTENSION_RATE and not catches(knees.stop):
+@inlined
+def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
+    """A knee got straight: it locks, or meets its stop, where it latches when it turns back."""
+    if event < EXTENSION_RATE and not catches(stop):
         walk_state.knee[(event - EXTENSION) % 2] = STOPPING
         return
-    note_lock(walk_state, event, t)
-
-
-@knee_stops.case(OneBends)
-def bent_knee_locks(knees: OneBends, walk_state: WalkState, event: int, t: float) -> None:
-    """At once."""
-    note_lock(walk_state, event, t)
-
-
-@inlined
-def note_lock(walk_state: WalkState, event: int, t: float) -> None:
-    """The knee of the step's swing leg is locked from now on."""
     walk_state.at_zero[event] = 0
     walk_state.knee[(event - EXTENSION) % 2] = LOCKED
     walk_state.knee_strike[walk_state.feet[STEPS]] = t
 
 
-@release.case(Knees)
-@release.case(OneBends)
-@release.case(NoneBends)
-def knee_is_released(knees: Any, walk_state: WalkState, knee: int) -> None:
-    """Its shank turns on its own."""
+@inlined
+def release(walk_state: WalkState, knee: int) -> None:
+    """A knee is free again: its shank turns on its own."""
     walk_state.releasing[0] = 0
     walk_state.knee[knee] = RELEASED
 
 
-@is_straight.case(Knees)
-@is_straight.case(OneBends)
-def knee_is_straight(knees: Any, walk_state: WalkState, foot: int) -> bool:
-    """Its knee is locked."""
-    return walk_state.knee[foot] == LOCKED
+@inlined
+def is_straight(form: Form, walk_state: WalkState, foot: int) -> bool:
+    """Whether a foot may come down: its knee is locked, if it has one."""
+    return not form.kneed or walk_state.knee[foot] == LOCKED
 
 
-@follow_strike.case(Knees)
-@follow_strike.case(OneBends)
-@follow_strike.case(NoneBends)
-def knee_follows(knees: Any, walk_state: WalkState, trailing: int) -> None:
-    """At once, or when the leading foot stops sinking in."""
-    if knees.release_at_touch:
-        release(knees, walk_state, trailing)
-    else:
-        walk_state.releasing[0] = 1
+@inlined
+def follow_strike(form: Form, walk_state: WalkState, trailing: int) -> None:
+    """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
+    if form.kneed:
+        if form.release_at_touch:
+            release(walk_state, trailing)
+        else:
+            walk_state.releasing[0] = 1
 
 
-@note_flexion.case(Knees)
-@note_flexion.case(OneBends)
-def knees_flex(knees: Any, walk_state: WalkState, y: State) -> None:
-    """Those that can bend."""
+@inlined
+def note_flexion(form: Form, walk_state: WalkState, y: Any) -> None:
+    """A released knee that has bent is caught when it straightens."""
     for knee in range(2):
-        if walk_state.knee[knee] == RELEASED and extension(knees, knee, y, 2) < -FLEXED:
+        if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -FLEXED:
             walk_state.knee[knee] = BENT

@@ -2,43 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
-from walkerlab.ground.held import (
-    BENT,
-    FLEXED,
-    LOCKED,
-    RELEASED,
-    Knees,
-    extension,
-    knee_energy,
-    stop_flags,
-)
-from walkerlab.ground.merged import ByKnees
-from walkerlab.ground.pinned import Pinned, floating_state
+from walkerlab.ground.knees import FLEXED, extension
 from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
-from walkerlab.ground.walker import ContactWalker, FootMotion, foot_force
+from walkerlab.ground.walker import (
+    BENT,
+    LOCKED,
+    OF_BODIES,
+    RELEASED,
+    ContactWalker,
+    FootMotion,
+    OnGround,
+    feet_motion,
+    floating_state,
+    folded,
+    foot_force,
+    on_ground,
+    sines_cosines,
+    unfolded,
+)
 from walkerlab.hybrid.contact_events import (
+    AIRBORNE_SINCE,
     EVENT_FUNCTIONS,
     FALL,
     FALLEN_HIP,
     HEIGHT,
     LEFT_EDGE,
+    NOW,
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
     SLIDE,
-    Frame,
-    feet_motion,
+    STEPS,
+    JudgedGround,
+    WalkState,
     hip_height,
     material_along,
 )
+from walkerlab.hybrid.contact_knee import change_form
 from walkerlab.hybrid.contact_observer import (
     AT_HAND,
     CHANNEL_COUNT,
@@ -47,23 +54,19 @@ from walkerlab.hybrid.contact_observer import (
     START_ENERGY,
     ContactObserver,
 )
-from walkerlab.hybrid.contact_phases import method_by_knees, walk_by_knees
-from walkerlab.hybrid.contact_rules import AIRBORNE_SINCE, STEPS, WalkState, steps_with_lift
-from walkerlab.hybrid.contact_tangent import Tangent, new_tangent
-from walkerlab.hybrid.contact_walk import AT_LIFT, walk_part
+from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
+from walkerlab.hybrid.contact_tangent import new_tangent
+from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import kernel, uncompiled
-from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.registry import Tolerances, finder_for
-from walkerlab.solvers.stepping import T
+from walkerlab.kernels import kernel, uncompiled, vector
+from walkerlab.solvers.registry import Tolerances, finder_for, sharing
+from walkerlab.solvers.stepping import RHS, T
 from walkerlab.solvers.system import State
-from walkerlab.solvers.vectors import load
 
 Floats = NDArray[np.float64]
 CHANNELS = ("damping", "friction", "edges", "knee_strikes", "knee_stop")
 OF_STRAIGHT_LEGS = 3  # channels
 
-NEVER = -1
 ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 # Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
@@ -75,76 +78,30 @@ FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its toleranc
 
 @dataclass(frozen=True)
 class Stopped:
-    """Where and at what cost a walk stopped."""
+    """How, where and at what cost a walk stopped."""
 
+    outcome: Outcome
     time_s: float
-    state: State
+    state: State  # of the whole walker, free
     work: NDArray[np.int64]
-
-
-class JudgedGround(NamedTuple):
-    """What a walk happens on and is judged by."""
-
-    terrain: Terrain
-    frame: Frame
-
-
-@kernel
-def walk_free(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    method: Any,
-    finder: CrossingFinder,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    t: float,
-    y: State,
-    stop_passing_after: int,
-) -> int:
-    """Walk with both feet free from state y at t (s) until the walk state is full or the walk ends.
-
-    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other; with
-    AT_LIFT a walk whose walk state is full goes on until the foot that carried its last step has lifted.
-    """
-    terrain, frame = ground.terrain, ground.frame
-    return walk_by_knees(
-        walker.merging, walker, terrain, frame, method, finder, observer, walk_state, t, y, stop_passing_after
-    )
-
-
-@kernel
-def walk_hinged(
-    pinned: Pinned,
-    ground: JudgedGround,
-    method: Any,
-    finder: CrossingFinder,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    y: State,
-) -> int:
-    """Walk with the first stance foot hinged, from the angles and velocities y, until the first step or the end."""
-    return walk_part(
-        pinned, pinned.walker, ground.terrain, ground.frame, method, finder, observer, walk_state, 0.0, y, NEVER
-    )
 
 
 @kernel
 def sampled_energies(walker: ContactWalker, states: Any, has_ground: Any, knees: Any, energies: Any) -> None:
     """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3)."""
+    form = walker.forms[0, 0]
     for i in range(states.shape[0]):
-        y = load(states, i, walker.blank)
-        energies[i, 0] = kinetic_energy(walker, y)
-        energies[i, 1] = potential_energy(walker, y)
-        energies[i, 2] = total_energy(walker, (has_ground[i, 0] != 0, has_ground[i, 1] != 0), y)
-        energies[i, 2] += knee_energy(walker.knees, stop_flags(walker.knees, knees[i]), y, 2)
+        energies[i, 0] = kinetic_energy(form, states[i])
+        energies[i, 1] = potential_energy(form, states[i])
+        system = OnGround(form, walker.normal, walker.friction, walker.stop, has_ground[i], knees[i])
+        energies[i, 2] = total_energy(system, states[i])
 
 
 @kernel
 def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, feet: Any) -> None:
     """Position along, height (m), normal force, friction (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
     for i in range(states.shape[0]):
-        y = load(states, i, walker.blank)
-        motions = feet_motion(walker, y)
+        motions = feet_motion(walker.forms[0, 0], states[i])
         for foot in range(2):
             motion = motions[foot]
             feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = motion.along, motion.height, motion.slip
@@ -209,7 +166,7 @@ class ContactWalkResult:
 
 def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
     """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
-    feet = feet_motion(walker, y)
+    feet = feet_motion(walker.whole, y)
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
     for foot in range(2):
@@ -225,7 +182,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
         cells=cells,
         left_cells=cells.copy(),
         foothold=np.array([motion.along for motion in feet]),
-        touched=np.array([material_along(walker, foot, feet[foot].along, y) for foot in range(2)]),
+        touched=np.array([material_along(walker.whole, foot, feet[foot].along, y) for foot in range(2)]),
         stood=np.zeros((2, 2)),
         knee=knees_at_start(walker, stance, y),
         releasing=np.zeros(1, np.int8),
@@ -233,7 +190,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
         leaving=np.zeros(2, np.int8),
         sides=sides,
         at_zero=at_zero,
-        times=np.zeros(2),
+        times=np.zeros(3),
         feet=np.array([stance, 0]),
     )
 
@@ -241,9 +198,9 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
 def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
     """What each knee is doing (2,): that of the stance leg is locked, the other is not."""
     knee = np.full(2, RELEASED, np.int8)
-    if isinstance(walker.knees, Knees):
+    if walker.kneed:
         knee[stance] = LOCKED
-        if extension(walker.knees, 1 - stance, y, 2) < -FLEXED:
+        if extension(walker.whole, 1 - stance, y) < -FLEXED:
             knee[1 - stance] = BENT
     return knee
 
@@ -258,15 +215,15 @@ def known_sides(
     """
     sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE]] = 1
-    n = len(walker.tree.arm_x)
-    size = max(abs(float(x)) for x in (*walker.feet[0].lever_x, *walker.feet[0].lever_y))
+    n, whole = int(walker.whole.bodies), walker.whole
+    size = float(max(np.abs(whole.foot_x[0]).max(), np.abs(whole.foot_y[0]).max()))
     speed = max(abs(float(x)) for x in y[2 + n :])
     for foot in range(2):
         first = foot * PER_FOOT
         sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
         signs = (feet[foot].height, feet[foot].vertical_velocity)
         sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
-    rates = [feet[k].slip - sum(r * w for r, w in zip(walker.feet[k].rolling, y[4 + n :], strict=True)) for k in (0, 1)]
+    rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
     order = (feet[1].along - feet[0].along, rates[1] - rates[0])
     sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
     return sides, at_zero
@@ -297,12 +254,13 @@ def new_observer(
     times = np.zeros(0) if times is None else times
     samples = times.size
     extremes = np.zeros(4)
-    extremes[START_ENERGY] = total_energy(walker, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1])), y)
-    extremes[AT_HAND] = extremes[START_ENERGY] + walker.tree.mass * walker.gravity_along * y[0]
+    system = on_ground(walker, walk_state.has_ground)
+    extremes[START_ENERGY] = total_energy(system, y)
+    extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
         times,
-        np.zeros((samples, len(walker.blank))),
+        np.zeros((samples, walker.size)),
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
@@ -310,101 +268,8 @@ def new_observer(
         np.zeros(1, np.int64),
         np.zeros(CHANNEL_COUNT),
         extremes,
-        new_tangent(len(walker.blank), directions),
-        merged_tangents(walker, directions),
+        new_tangent(walker.size, directions),
     )
-
-
-def merged_tangents(walker: ContactWalker, directions: int) -> tuple[Tangent, ...]:
-    """Memory for the tangent while one knee is locked and while both are; none for a walker that keeps its bodies."""
-    if not isinstance(walker.merging, ByKnees):
-        return ()
-    merging = walker.merging
-    return tuple(new_tangent(len(fewer.blank), directions) for fewer in (merging.one[0], merging.both))
-
-
-def walk_contact(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    pinned: Pinned | None,
-    stance: int,
-    start: State,
-    tolerances: Tolerances,
-    steps: int,
-    sampling: float | Floats | None,
-    track_energy: bool = True,
-) -> ContactWalkResult:
-    """Walk up to `steps` steps.
-
-    pinned        the hinged first step, or None
-    stance        the foot that carries the first step
-    start         state of the free walker (4 + 2 n); its angles and angular velocities start the hinged one
-    tolerances    how to integrate
-    sampling      time between samples, their times (samples,), rising, in s, or None for none
-    track_energy  whether to keep the energy balance, by which the walk is judged; ladders of methods do without
-
-    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
-    """
-    frame = ground.frame
-    if hip_height(walker, frame, start) < FALLEN_HIP * frame.leg_length:
-        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
-        here = Stopped(0.0, start, np.zeros(4, np.int64))
-        return gather(Outcome.REJECTED, here, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
-    room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
-    while True:
-        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
-        times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
-        observer = new_observer(walker, walk_state, start, times, track_energy)
-        outcome, stopped = run_parts(walker, ground, pinned, start, tolerances, observer, walk_state)
-        if room == 0 or observer.recorded[0] < room:
-            return gather(outcome, stopped, walk_state, observer, walker, tolerances)
-        room *= 2
-
-
-def run_parts(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    pinned: Pinned | None,
-    start: State,
-    tolerances: Tolerances,
-    observer: ContactObserver,
-    walk_state: WalkState,
-) -> tuple[Outcome, Stopped]:
-    """The hinged step, if there is one, then the free walk; returns the outcome and where it stopped.
-
-    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
-    """
-    t, y = 0.0, start
-    spent = np.zeros(4, np.int64)
-    if pinned is not None:
-        method = tolerances.new(len(pinned.blank))
-        angles = len(pinned.tree.arm_x)
-        hinged = (*start[2 : 2 + angles], *start[4 + angles :])
-        hinged_walk = walk_hinged if tolerances.compiled else uncompiled(walk_hinged)
-        outcome = Outcome(
-            hinged_walk(pinned, ground, method, finder_for(method, EVENT_FUNCTIONS), observer, walk_state, hinged)
-        )
-        t, y = float(method.clock[T]), floating_state(pinned, tuple(method.y.tolist()))
-        spent += method.counts[:4]
-        release_hinge(walker, pinned.foot, walk_state, y)
-        if outcome is not Outcome.WALKED:
-            return outcome, Stopped(t, y, spent)
-    walk_state.times[AIRBORNE_SINCE] = t
-    free_walk, method, finder = free_walk_by(tolerances, walker)
-    outcome = Outcome(free_walk(walker, ground, method, finder, observer, walk_state, t, y, NEVER))
-    stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), spent + method.counts[:4])
-    if outcome is Outcome.WALKED:
-        unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
-        free_walk(walker, ground, method, finder, unseen, walk_state, stopped.time_s, stopped.state, AT_LIFT)
-    return outcome, stopped
-
-
-def free_walk_by(tolerances: Tolerances, walker: ContactWalker) -> tuple[Callable[..., int], Any, CrossingFinder]:
-    """`walk_free`, in Python for a library's method; that method, for as few bodies as the knees allow; its finder."""
-    n = len(walker.blank)
-    merging = walker.merging
-    method = method_by_knees(merging, n, tolerances.new) if isinstance(merging, ByKnees) else tolerances.new(n)
-    return walk_free if tolerances.compiled else uncompiled(walk_free), method, finder_for(method, EVENT_FUNCTIONS)
 
 
 def walk_on(
@@ -414,30 +279,122 @@ def walk_on(
     walk_state: WalkState,
     observer: ContactObserver,
     start: State,
-    stop_passing_after: int = NEVER,
-) -> tuple[Outcome, Stopped]:
-    """Walk with both feet free from a walk state that is at hand; the outcome, with its energy balance, and the end.
+    until: int = NEVER,
+    hinged: bool = False,
+) -> Stopped:
+    """Walk on from a walk state that is at hand, in one form after another as knees lock and are released.
 
-    start               state (4 + 2 n) at time 0
-    stop_passing_after  see `walk_free`
+    start   state of the whole walker, free
+    until   that of `walk_in_form`
+    hinged  whether the stance foot is, until the first step is taken: then the walk ends
+
+    Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
-    free_walk, method, finder = free_walk_by(tolerances, walker)
-    ended = free_walk(walker, ground, method, finder, observer, walk_state, 0.0, start, stop_passing_after)
-    stopped = Stopped(float(method.clock[T]), tuple(method.y.tolist()), method.counts[:4].copy())
-    return balanced(ended, observer, tolerances), stopped
+    walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
+    system, tangent = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged), observer.tangent.Phi
+    half, root = len(start) // 2, 2 if hinged else 0
+    y = folded(system.form, (*start[root:half], *start[half + root :]))
+    if tangent.shape[1] > 0:
+        tangent[: y.size] = folded(system.form, tangent)
+    lead = tolerances.new(y.size)
+    lead.clock[T] = walk_state.times[NOW]
+    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS)
+    while True:
+        if y.size not in by_size:
+            by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
+        method = by_size[y.size]
+        method.y[:] = y
+        ended, event = walk(system, ground, method, finder, observer, walk_state, until)
+        if ended != GOES_ON:
+            break
+        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged)
+        y = change_form(walker, before, system, event, observer, method.y)
+    if tangent.shape[1] > 0:
+        tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
+    end = floating_state(system.form, method.y, walker.size)
+    walk_state.times[NOW] = lead.clock[T]
+    return Stopped(balanced(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
+
+
+def walk_contact(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    hinged: bool,
+    stance: int,
+    start: State,
+    tolerances: Tolerances,
+    steps: int,
+    sampling: float | Floats | None,
+    track_energy: bool = True,
+) -> ContactWalkResult:
+    """Walk up to `steps` steps.
+
+    hinged        whether the stance foot of the first step is
+    stance        the foot that carries the first step
+    start         state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
+    tolerances    how to integrate
+    sampling      time between samples, their times (samples,), rising, in s, or None for none
+    track_energy  whether to keep the energy balance, by which the walk is judged; ladders of methods do without
+
+    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
+    """
+    frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(walker.whole, start, s, c)
+    if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        here = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
+        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
+    room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
+    while True:
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
+        observer = new_observer(walker, walk_state, start, times, track_energy)
+        stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
+        if room == 0 or observer.recorded[0] < room:
+            return gather(stopped, walk_state, observer, walker, tolerances)
+        room *= 2
+
+
+def run_parts(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    hinged: bool,
+    start: State,
+    tolerances: Tolerances,
+    observer: ContactObserver,
+    walk_state: WalkState,
+) -> Stopped:
+    """The hinged step, if there is one, then the free walk.
+
+    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
+    """
+    y, spent = start, np.zeros(4, np.int64)
+    if hinged:
+        first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
+        y, spent = first.state, first.work
+        release_hinge(walker, walk_state, y)
+        if first.outcome is not Outcome.WALKED:
+            return first
+        walk_state.times[AIRBORNE_SINCE] = first.time_s
+    stopped = walk_on(walker, ground, tolerances, walk_state, observer, y)
+    if stopped.outcome is Outcome.WALKED:
+        unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
+        left = replace(tolerances, budget=tolerances.budget - int(stopped.work[RHS]))
+        walk_on(walker, ground, left, walk_state, unseen, stopped.state, AT_LIFT)
+    return replace(stopped, work=spent + stopped.work)
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     """What was dissipated (J), by name; the knees' channels only where there are knees."""
-    count = len(CHANNELS) if isinstance(walker.knees, Knees) else OF_STRAIGHT_LEGS
+    count = len(CHANNELS) if walker.kneed else OF_STRAIGHT_LEGS
     return dict(zip(CHANNELS[:count], dissipated[:count].tolist(), strict=True))
 
 
-def release_hinge(walker: ContactWalker, foot: int, walk_state: WalkState, y: State) -> None:
+def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
-    steps = walk_state.feet[STEPS]
+    foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.feet[STEPS]
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
-    walk_state.touched[foot] = material_along(walker, foot, feet_motion(walker, y)[foot].along, y)
+    walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
     walk_state.stood[foot] = 0.0
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
@@ -462,7 +419,6 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
 
 
 def gather(
-    outcome: Outcome,
     stopped: Stopped,
     walk_state: WalkState,
     observer: ContactObserver,
@@ -482,7 +438,7 @@ def gather(
             observer.sampled_dissipation[:seen],
         )
     return ContactWalkResult(
-        balanced(outcome, observer, tolerances),
+        stopped.outcome,
         walk_state.touch_time[:done],
         walk_state.touch_along[:done],
         walk_state.slip[:lifted],
@@ -493,7 +449,7 @@ def gather(
         float(observer.extremes[RESIDUAL]),
         explained_residual(observer, tolerances),
         observer.dissipated.copy(),
-        walk_state.knee_strike[:done] if isinstance(walker.knees, Knees) else np.zeros(0),
+        walk_state.knee_strike[:done] if walker.kneed else np.zeros(0),
         stopped.work,
         samples,
     )

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import inlined
-from walkerlab.solvers.in_tuples import interpolate, jacobian
+from walkerlab.ground.walker import OF_STATES
+from walkerlab.kernels import inlined, vector
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.radau5_tableau import C
-from walkerlab.solvers.stepping import T_OLD, T
+from walkerlab.solvers.stepping import T_OLD, T, interpolate
+from walkerlab.solvers.system import jacobian
 
 THIS_SIDE = 4e-12  # s, some times as much as the time of an event is uncertain by
 ROOT6 = 6.0**0.5
@@ -29,7 +30,10 @@ A = np.array(
 
 
 class Tangent(NamedTuple):
-    """The derivative Phi and the memory to carry it along."""
+    """The derivative Phi and the memory to carry it along, with room for the whole walker's state of n numbers.
+
+    While the walker moves as one of fewer bodies the first rows are in use.
+    """
 
     Phi: Any  # (n, directions); no directions if the tangent is not wanted
     stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
@@ -51,13 +55,20 @@ def new_tangent(n: int, directions: int) -> Tangent:
 
 
 @inlined
+def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
+    """The Jacobian at a fraction of the last step into J."""
+    y = vector(OF_STATES)[: method.y.size]
+    interpolate(method, system, fraction, y)
+    jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
+
+
+@inlined
 def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
     """Carry Phi over the last step of `method`."""
-    n = tangent.Phi.shape[0]
-    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
     for i in range(2):
-        jacobian(system, t + C[i] * h, interpolate(method, system, C[i]), tangent.stages[i])
-    jacobian_at_end(tangent, method, system, t, h)
+        jacobian_at(method, system, C[i], tangent.stages[i])
+    jacobian_at_end(tangent, method, system)
     for i in range(3):
         for j in range(3):
             for row in range(n):
@@ -66,29 +77,27 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
                     tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
     factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
-        carry_direction(tangent, direction, h)
+        carry_direction(tangent, n, direction, h)
 
 
 @inlined
-def jacobian_at_end(tangent: Tangent, method: Any, system: Any, t: float, h: float) -> None:
+def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
     """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
 
     A step that ends at a switching point of the force law ends on either side of it, and the Jacobian jumps there.
     """
-    near = min(0.25, THIS_SIDE / h)
+    near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
-        before = 1.0 - (1 + i) * near
-        jacobian(system, t + before * h, interpolate(method, system, before), tangent.stages[2 + i])
-    n = tangent.Phi.shape[0]
+        jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])
+    n = method.y.size
     for row in range(n):
         for column in range(n):
             tangent.stages[2, row, column] += tangent.stages[2, row, column] - tangent.stages[3, row, column]
 
 
 @inlined
-def carry_direction(tangent: Tangent, direction: int, h: float) -> None:
-    """One column of Phi: stage derivatives K = J (Phi + h A K), then the step's sum."""
-    n = tangent.Phi.shape[0]
+def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
+    """One column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
     for i in range(3):
         for row in range(n):
             total = 0.0
@@ -99,30 +108,3 @@ def carry_direction(tangent: Tangent, direction: int, h: float) -> None:
     for row in range(n):
         change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
         tangent.Phi[row, direction] += h * change
-
-
-@inlined
-def jump(tangent: Tangent) -> None:
-    """Carry Phi over an event: R Phi + (f+ - R f-) (g Phi) / (g f-).
-
-    R is in stages[3]; f- and f+, the rates before and after, and g, the derivative of the event function, in `rates`.
-    """
-    n = tangent.Phi.shape[0]
-    reset, rates = tangent.stages[3], tangent.rates
-    speed = 0.0
-    for i in range(n):
-        speed += rates[2 * n + i] * rates[i]
-    for i in range(n):
-        for k in range(n):
-            rates[n + i] -= reset[i, k] * rates[k]
-    for direction in range(tangent.Phi.shape[1]):
-        later = 0.0
-        for k in range(n):
-            later += rates[2 * n + k] * tangent.Phi[k, direction]
-        for i in range(n):
-            total = rates[n + i] * later / speed
-            for k in range(n):
-                total += reset[i, k] * tangent.Phi[k, direction]
-            rates[i] = total
-        for i in range(n):
-            tangent.Phi[i, direction] = rates[i]

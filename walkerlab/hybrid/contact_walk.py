@@ -5,34 +5,39 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
-from walkerlab.ground.held import bends_otherwise, held_flags, stop_flags
-from walkerlab.ground.motion import OnGround
-from walkerlab.ground.pinned import Pinned
-from walkerlab.ground.terrain import Terrain
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, Frame, is_switching, walker_state
-from walkerlab.hybrid.contact_knee import cross_knee
-from walkerlab.hybrid.contact_observer import ContactObserver, observe
-from walkerlab.hybrid.contact_rules import (
+from walkerlab.ground.walker import OF_STATES, OnGround, locked_knees
+from walkerlab.hybrid.contact_events import (
     AIRBORNE_SINCE,
-    GOES_ON,
     LAST_TOUCH,
-    STANCE,
+    PASSING,
     STEPS,
+    Frame,
+    JudgedGround,
     WalkState,
-    happen,
-    is_above,
-    is_to_lift,
-    note_flexion,
+    earliest_crossing,
+    is_switching,
+    sample_event_functions,
 )
-from walkerlab.hybrid.contact_scan import Feet, Scene, scan
+from walkerlab.hybrid.contact_observer import ContactObserver, observe
+from walkerlab.hybrid.contact_rules import GOES_ON, happen, is_above, is_to_lift, note_flexion
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.kernels import by_type, by_type_or_default, inlined
+from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.in_tuples import begin, end_state
-from walkerlab.solvers.stepping import H_NEXT, OUT_OF_BUDGET, STEP_DONE, T_OLD, T, advance, prepare_dense, rewind
-from walkerlab.solvers.system import State
+from walkerlab.solvers.scipy_methods import ScipyMethod
+from walkerlab.solvers.stepping import (
+    H_NEXT,
+    OUT_OF_BUDGET,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
 
+NEVER = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
@@ -45,84 +50,85 @@ WALKED, LIFTED_OFF, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.LIFTED_OFF
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
 
 
-@by_type
-def in_mode(system: Any, walk_state: WalkState) -> Any:
-    """The system for the ground that there is now."""
-
-
-@in_mode.case(OnGround)
-def free_mode(system: OnGround, walk_state: WalkState) -> OnGround:
-    """Each foot finds ground or not."""
-    walker, has_ground = system.walker, (walk_state.has_ground[0] != 0, walk_state.has_ground[1] != 0)
-    held = held_flags(walker.held, walker.knees, walk_state.knee)
-    return OnGround(walker, has_ground, held, stop_flags(walker.knees, walk_state.knee))
-
-
-@in_mode.case(Pinned)
-def hinged_mode(system: Pinned, walk_state: WalkState) -> Pinned:
-    """The other foot finds ground or not."""
-    walker, has_ground = system.walker, walk_state.has_ground[1 - system.foot] != 0
-    held, stops = held_flags(walker.held, walker.knees, walk_state.knee), stop_flags(walker.knees, walk_state.knee)
-    return Pinned(walker, system.tree, system.foot, system.along, system.blank, held, stops, has_ground)
-
-
 @by_type_or_default
-def is_hinged(system: Any) -> bool:
-    """Whether a hinge carries the walker, until its first step releases it."""
-    return False
+def scan(
+    method: Any,
+    system: OnGround,
+    ground: JudgedGround,
+    walk_state: WalkState,
+    watch_order: bool,
+    finder: CrossingFinder,
+) -> tuple[float, int]:
+    """Fraction of a method's last step at which the first event lies, and which it is; its dense output is ready.
+
+    The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
+    """
+    y = vector(OF_STATES)[: method.y.size]
+    for node in range(finder.nodes.size):
+        interpolate(method, system, finder.nodes[node], y)
+        sample_event_functions(system, ground, walk_state, y, node, finder)
+    return earliest_crossing(system, ground, walk_state, watch_order, finder)
 
 
-@is_hinged.case(Pinned)
-def pinned_is(system: Pinned) -> bool:
-    """Yes."""
-    return True
+@kernel
+def scan_states(
+    states: Any,
+    system: OnGround,
+    ground: JudgedGround,
+    walk_state: WalkState,
+    watch_order: bool,
+    finder: CrossingFinder,
+) -> tuple[float, int]:
+    """The same for a step whose states at the nodes are the rows of `states`."""
+    for node in range(finder.nodes.size):
+        sample_event_functions(system, ground, walk_state, states[node], node, finder)
+    return earliest_crossing(system, ground, walk_state, watch_order, finder)
 
 
-@inlined
-def walk_part(
-    system: Any,
-    walker: ContactWalker,
-    terrain: Terrain,
-    frame: Frame,
+@scan.case(ScipyMethod)
+def scan_in_python(
+    method: ScipyMethod,
+    system: OnGround,
+    ground: JudgedGround,
+    walk_state: WalkState,
+    watch_order: bool,
+    finder: CrossingFinder,
+) -> tuple[float, int]:
+    """A walk in Python hands the step's states to compiled code at once."""
+    states = method.states_at(finder.nodes)
+    fraction, event = scan_states(states, system, ground, walk_state, watch_order, finder)
+    return fraction, event
+
+
+@kernel
+def walk_in_form(
+    system: OnGround,
+    ground: JudgedGround,
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
     walk_state: WalkState,
-    t: float,
-    y: State,
-    stop_passing_after: int,
-) -> int:
-    """Walk from state y at time t (s) until the walk state is full, the hinge is released, or the walk ends.
+    until: int,
+) -> tuple[int, int]:
+    """Walk from where the method stands until the walk state is full, the hinge is released, or the walk ends.
 
-    With `stop_passing_after` at least zero it also stops when, after that many steps, the feet pass each other; with
-    AT_LIFT a walk whose walk state is full goes on until the foot that carried its last step has lifted.
+    until  how many steps after which it also stops when the feet pass each other, or NEVER; or AT_LIFT: a walk whose
+           walk state is full goes on until the foot that carried its last step has lifted
 
-    Returns the outcome's number, or GOES_ON if the walker has to go on with other bodies; the method stands at the end.
+    Returns the outcome's number, or GOES_ON if the walker has to go on in another form, and the last event that it met.
     """
-    mode = in_mode(system, walk_state)
-    begin(method, mode, t, y, method.clock[H_NEXT])
+    begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     arriving, refinements, rewinds, event = False, 0, 0, -1
-    target = deadline(frame, walk_state)
+    target = deadline(ground.frame, walk_state)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
-    scene = Scene(walker, terrain, frame, terrain.order_matters or stop_passing_after >= 0)
-    feet = Feet(
-        walk_state.has_ground,
-        walk_state.cells,
-        walk_state.sides,
-        walk_state.at_zero,
-        walk_state.touched,
-        walk_state.feet,
-        walk_state.knee,
-        walk_state.releasing,
-    )
-    while walk_state.feet[STEPS] < walk_state.touch_time.size or (
-        stop_passing_after == AT_LIFT and is_to_lift(walk_state)
-    ):
-        status = advance(method, mode, target)
+    watch_order = ground.terrain.order_matters or until >= 0
+    locked = locked_knees(walk_state.knee)
+    while walk_state.feet[STEPS] < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state)):
+        status = advance(method, system, target)
         if status != STEP_DONE:
-            return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
-        prepare_dense(method, mode)
-        fraction, found = scan(method, mode, scene, feet, finder)
+            return (BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED), event
+        prepare_dense(method, system)
+        fraction, found = scan(method, system, ground, walk_state, watch_order, finder)
         happens = fraction <= 1.0
         if happens:
             if not arriving:
@@ -136,7 +142,7 @@ def walk_part(
                 target = method.clock[T_OLD] + wait
                 refinements += 1
                 rewinds += 1
-                rewind(method, mode)
+                rewind(method, system)
                 continue
         elif arriving and method.clock[T] >= target:
             wait = time_to_zero(method, finder, event)
@@ -146,36 +152,39 @@ def walk_part(
                 target += wait
                 refinements += 1
                 rewinds += 1
-                rewind(method, mode)
+                rewind(method, system)
                 continue
         rewinds = 0
-        observe(observer, method, mode, walker, finder, walk_state.has_ground, walk_state.knee, walk_state.feet[STANCE])
-        note_flexion(walker.knees, walk_state, walker_state(mode, end_state(method, mode)))
-        outcome = judge(mode, scene, method, walk_state)
+        observe(observer, method, system, finder, walk_state)
+        note_flexion(system.form, walk_state, method.y)
+        outcome = judge(system, ground.frame, method.clock[T], walk_state)
         if outcome != GOES_ON:
-            return outcome
+            return outcome, event
         if method.clock[T] - method.clock[T_OLD] > 2.0 * EVENT_TIME:
             # of events at one and the same time each is found once
             for i in range(walk_state.at_zero.size):
                 walk_state.at_zero[i] = 0
         arriving = False
         if happens:
-            end = walker_state(mode, end_state(method, mode))
             steps = walk_state.feet[STEPS]
-            outcome = happen(walker, terrain, observer, walk_state, event, method.clock[T], end)
+            outcome = happen(system, ground.terrain, observer, walk_state, event, method.clock[T], method.y)
             if outcome != GOES_ON:
-                return outcome
+                return outcome, event
             released = is_hinged(system) and walk_state.feet[STEPS] > steps
-            if released or (event == PASSING and 0 <= stop_passing_after <= walk_state.feet[STEPS]):
-                return WALKED
-            if bends_otherwise(walker.knees, walk_state.knee):
-                return GOES_ON
+            if released or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
+                return WALKED, event
+            if locked_knees(walk_state.knee) != locked:
+                return GOES_ON, event
             if not is_switching(event):
-                before, mode = mode, in_mode(system, walk_state)
-                y = cross_knee(walker.knees, observer, method, before, mode, event)
-                begin(method, mode, method.clock[T], y, method.clock[H_NEXT])
-        target = deadline(frame, walk_state)
-    return WALKED
+                begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
+        target = deadline(ground.frame, walk_state)
+    return WALKED, event
+
+
+@inlined
+def is_hinged(system: OnGround) -> bool:
+    """Whether a hinge carries the walker, until its first step releases it."""
+    return system.form.places == 0
 
 
 @inlined
@@ -200,19 +209,18 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 
 @inlined
-def judge(mode: Any, scene: Scene, method: Any, walk_state: WalkState) -> int:
-    """End the walk if it has flown or taken too long; note until when a foot was on the ground.
+def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
+    """End the walk if it has flown or taken too long at time t (s); note until when a foot was on the ground.
 
     The event at the step's end has not changed the walk state yet: a foot that leaves there was on the ground before.
     """
-    t, pendulum_time = method.clock[T], scene.frame.pendulum_time
-    grounded = is_hinged(mode)
+    grounded = is_hinged(system)
     for foot in range(2):
         grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))
     if grounded:
         walk_state.times[AIRBORNE_SINCE] = t
-    if t >= walk_state.times[LAST_TOUCH] + LONGEST_STEP * pendulum_time:
+    if t >= walk_state.times[LAST_TOUCH] + LONGEST_STEP * frame.pendulum_time:
         return NO_HEEL_STRIKE
-    if t >= walk_state.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * pendulum_time:
+    if t >= walk_state.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * frame.pendulum_time:
         return LIFTED_OFF
     return GOES_ON

@@ -19,8 +19,7 @@ from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
-from walkerlab.solvers.in_tuples import derivative
-from walkerlab.solvers.lane_steps import ERROR_3, ERROR_5, combine, error_sums, stages_of
+from walkerlab.solvers.lane_steps import ERROR_3, ERROR_5, combine, derivative, error_sums, stages_of
 from walkerlab.solvers.lanes import WIDTH, Lanes, any_positive, choose, load_lanes, store_lanes, teach_arithmetic
 from walkerlab.solvers.system import State
 

@@ -5,19 +5,33 @@ levers d_k are constants of the assembly and theta_k the bodies' absolute angles
 
     A_kl = sum m d_k . d_l (+ inertia on the diagonal),   B_kl = sum m d_k . (rotated d_l),   c_k = sum m d_k
 
-over all masses m. With the centre of mass as root c vanishes, and translation and rotation part.
+over all masses m. With the centre of mass as root c vanishes, and translation and rotation part. With Delta =
+theta_l - theta_k the equations of motion about a root at rest are
+
+    M_kl = A_kl cos Delta + B_kl sin Delta
+    M alpha = torques + sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta)
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.mechanics.parts import Assembly, Position
-from walkerlab.mechanics.tree import Tree
 
 Floats = NDArray[np.float64]
+
+
+class Tree(NamedTuple):
+    """Constants of a tree of n bodies about its root."""
+
+    mass: float  # kg
+    A: Floats  # (n, n) kg m^2
+    B: Floats
+    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_y: Floats
 
 
 @dataclass(frozen=True)
@@ -106,10 +120,4 @@ def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree
         A = A + mass * d @ d.T
         B = B + mass * d @ rotated.T
         c = c + mass * d
-    return Tree(
-        mass=float(total_mass(assembly)),
-        cosine=tuple(float(x) for x in A.ravel()),
-        sine=tuple(float(x) for x in B.ravel()),
-        arm_x=tuple(float(x) for x in c[:, 0]),
-        arm_y=tuple(float(x) for x in c[:, 1]),
-    )
+    return Tree(total_mass(assembly), A, B, c[:, 0], c[:, 1])

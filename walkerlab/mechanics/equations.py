@@ -1,6 +1,6 @@
 """The equations of motion of a tree with all its coordinates, as matrices to look at and to check by.
 
-What is integrated (tree.py) has the root's motion solved for; this routine has not, and runs in plain NumPy.
+What is integrated has the root's motion solved for; this routine has not, and runs in plain NumPy.
 """
 
 from collections.abc import Sequence
@@ -37,8 +37,7 @@ def mass_matrix_and_bias(
     """
     tree = tree_about_centre(assembly)[0] if root is None else tree_about(assembly, root)
     n = len(assembly.bodies)
-    A, B = np.array(tree.cosine).reshape(n, n), np.array(tree.sine).reshape(n, n)
-    arm_x, arm_y = np.array(tree.arm_x), np.array(tree.arm_y)
+    A, B, arm_x, arm_y = tree.A, tree.B, tree.arm_x, tree.arm_y
     theta, squares = np.array(angles, float), np.array(velocities, float) ** 2
     delta = theta[None, :] - theta[:, None]
     s, c = np.sin(theta), np.cos(theta)

@@ -52,7 +52,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     n = len(places.names)
     free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
     tree, members = tree_about(assembly, root), places.members
-    A, B = (members.T @ np.reshape(pairs, (len(members),) * 2) @ members for pairs in (tree.cosine, tree.sine))
+    A, B = (members.T @ pairs @ members for pairs in (tree.A, tree.B))
     picked = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**torso, **knees}
     reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
@@ -63,8 +63,8 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
         B=B,
         A_centrifugal=A,
         B_centrifugal=B,
-        arm_x=np.array(tree.arm_x) @ members,
-        arm_y=np.array(tree.arm_y) @ members,
+        arm_x=tree.arm_x @ members,
+        arm_y=tree.arm_y @ members,
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,

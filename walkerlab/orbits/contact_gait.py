@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING
-from walkerlab.hybrid.contact_rules import STANCE, STEPS
-from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround
+from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
 from walkerlab.solvers.registry import Tolerances
@@ -90,8 +89,8 @@ def section_points(
         walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
         enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
-        outcome, stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
-        if outcome == Outcome.WALKED and walk_state.at_zero[PASSING]:
+        stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
+        if stopped.outcome is Outcome.WALKED and walk_state.at_zero[PASSING]:
             yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.feet[STANCE]))
         elif walk_state.feet[STEPS] > steps:
             return

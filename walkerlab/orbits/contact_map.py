@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import JudgedGround
+from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_section import Floats, SectionStep, angled_bodies, step_from_section, turning_bodies
 from walkerlab.orbits.step_maps import (

@@ -19,17 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.held import Held, IdealLock, Knees, held_flags, stop_flags
-from walkerlab.ground.motion import OnGround
+from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.terrain import checkerboard, has_ground_in_air
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, feet_motion, material_along
+from walkerlab.ground.walker import ContactWalker, feet_motion, folded, on_ground
+from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, material_along
+from walkerlab.hybrid.contact_knee import rate_of
 from walkerlab.hybrid.contact_observer import ContactObserver
-from walkerlab.hybrid.contact_rules import WalkState
-from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.scipy_methods import right_hand_side
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -59,43 +57,39 @@ class SectionStep:
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
-    locked = walker.knees.shanks[stance] if isinstance(walker.knees, Knees) else None
+    locked = walker.whole.shanks[stance] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
     free = turning_bodies(walker, stance)[1:]
-    if isinstance(walker.knees, Knees) and not isinstance(walker.knees.stop, IdealLock):
-        return (*free, walker.knees.shanks[stance])
+    if walker.kneed and not isinstance(walker.stop, IdealLock):
+        return (*free, int(walker.whole.shanks[stance]))
     return free
 
 
 def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
     """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
-    if not isinstance(walker.held, Held):
-        return angles
-    weights = np.array(walker.held.weights).reshape(angles.size, angles.size)
-    followers = [body for body, always in enumerate(walker.held.always) if always]
-    if isinstance(walker.knees, Knees):
-        followers = [walker.knees.shanks[stance], *followers]
-    for body in followers:
-        if body not in given:
-            angles[body] = weights[body] @ angles
+    whole, n = walker.whole, angles.size
+    if walker.kneed and whole.shanks[stance] not in given:
+        angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
+    for body in range(n):
+        if whole.E[body, body] == 0.0 and body not in given:
+            angles[body] = whole.E[body, :n] @ angles
     return angles
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
     """How far foot 0 is ahead of foot 1 (m), and its derivatives by the bodies' angles (n)."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
-    x = np.array(walker.feet[0].lever_x) - np.array(walker.feet[1].lever_x)
-    y = np.array(walker.feet[0].lever_y) - np.array(walker.feet[1].lever_y)
+    x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
 
 
 def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
     """The walker's state of section coordinates, with `stance` the standing leg, at along = 0."""
-    n = len(walker.tree.arm_x)
+    n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     state = np.zeros(4 + 2 * n)
     state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
@@ -125,7 +119,7 @@ def feet_abreast(walker: ContactWalker, stance: int, angles: Floats) -> Floats:
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
     """Section coordinates of a state whose standing leg is `stance`."""
-    n = len(walker.tree.arm_x)
+    n = int(walker.whole.bodies)
     angles = [ANGLES + body for body in angled_bodies(walker, stance)]
     rates = [4 + n + body for body in turning_bodies(walker, stance)]
     return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
@@ -133,7 +127,7 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 
 def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
     """Derivative (4 + 2 n, coordinates) of `state_on_section`, at the state it gave."""
-    n = len(walker.tree.arm_x)
+    n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
     _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
@@ -153,7 +147,7 @@ def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: 
     """The ground with its pads laid for steps of `pitch_m`, the standing foot in the middle of one."""
     if not ground.terrain.has_pads:
         return ground
-    foothold = feet_motion(walker, state)[stance].along
+    foothold = feet_motion(walker.whole, state)[stance].along
     ahead = foothold + pitch_m
     lanes = (ahead, foothold) if stance == 1 else (foothold, ahead)
     return JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
@@ -174,14 +168,14 @@ def step_from_section(
     stand_on_section(walk_state, walker, laid, start, stance)
     observer = new_observer(walker, walk_state, start, directions=z.size)
     observer.tangent.Phi[:, :] = directions(walker, start, stance)
-    outcome, stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
     end = np.array(stopped.state)
     slipped, rolled = since_touch(walker, walk_state, stopped.state, 1 - stance)
     DP = section_derivative(walker, walk_state, observer, end, 1 - stance)
-    lost = walker.tree.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
-    lost -= walker.tree.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
+    lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
+    lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
-        outcome,
+        stopped.outcome,
         coordinates_of(walker, end, 1 - stance),
         DP,
         stopped.time_s,
@@ -198,8 +192,8 @@ def step_from_section(
 
 def since_touch(walker: ContactWalker, walk_state: WalkState, y: State, foot: int) -> tuple[float, float]:
     """How far a foot has slipped and rolled since its touch (m)."""
-    along = feet_motion(walker, y)[foot].along
-    slipped = material_along(walker, foot, along, y) - float(walk_state.touched[foot])
+    along = feet_motion(walker.whole, y)[foot].along
+    slipped = material_along(walker.whole, foot, along, y) - float(walk_state.touched[foot])
     return slipped, along - float(walk_state.foothold[foot]) - slipped
 
 
@@ -208,7 +202,7 @@ def stand_on_section(
 ) -> None:
     """Correct a walk state made for a start with both feet down: here one stands and the other swings past it."""
     swing = 1 - stance
-    feet = feet_motion(walker, start)
+    feet = feet_motion(walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
@@ -224,12 +218,9 @@ def section_derivative(
     walker: ContactWalker, walk_state: WalkState, observer: ContactObserver, end: Floats, stance: int
 ) -> Floats:
     """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
-    has_ground = (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1]))
-    held = held_flags(walker.held, walker.knees, walk_state.knee)
-    system = OnGround(walker, has_ground, held, stop_flags(walker.knees, walk_state.knee))
-    rate = np.zeros(end.size)
-    right_hand_side(system, 0.0, end, rate)
-    gradient, n = np.zeros(end.size), len(walker.tree.arm_x)
+    system = on_ground(walker, walk_state.has_ground, walk_state.knee)
+    rate = rate_of(system, folded(system.form, end), end.size)
+    gradient, n = np.zeros(end.size), int(walker.whole.bodies)
     gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
     Phi = observer.tangent.Phi
     on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)

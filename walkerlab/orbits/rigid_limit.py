@@ -25,7 +25,8 @@ from walkerlab.hybrid.comparison import (
     difference_in_time,
     sampled_at_strikes,
 )
-from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, walk_contact
+from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
 from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
@@ -199,7 +200,7 @@ class Limit:
 
     def walk(self, walker: ContactWalker, start: State, tolerance: float, sampling: float | None) -> ContactWalkResult:
         """The walk from the rigid start."""
-        return walk_contact(walker, self.ground, None, STANCE_FOOT, start, settings(tolerance), self.steps, sampling)
+        return walk_contact(walker, self.ground, False, STANCE_FOOT, start, settings(tolerance), self.steps, sampling)
 
     def timed(self, walker: ContactWalker, start: State) -> float:
         """Processor time of the walk (s), which other programs do not lengthen."""
@@ -210,9 +211,8 @@ class Limit:
 
 def motion_of_legs(states: NDArray[np.float64], walker: ContactWalker) -> tuple[NDArray[np.float64], ...]:
     """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
-    n = len(walker.tree.arm_x)
-    upper = np.array([leg[0] for leg in walker.legs])
-    return states[:, 2 + upper], states[:, 4 + n + upper]
+    upper, half = walker.legs[:, 0], states.shape[1] // 2
+    return states[:, 2 + upper], states[:, half + 2 + upper]
 
 
 def settings(tolerance: float) -> Tolerances:

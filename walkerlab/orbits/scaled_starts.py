@@ -15,7 +15,8 @@ import numpy as np
 
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import ContactWalkResult, JudgedGround, walk_contact
+from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import RHS
@@ -69,7 +70,7 @@ class ScaledStarts:
 
     def walked_from(self, start: State) -> ContactWalkResult:
         """Walk from a state of the free walker."""
-        return walk_contact(self.walker, self.ground, None, STANCE_FOOT, start, self.tolerances, self.steps, None)
+        return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settled_after(self, walk: ContactWalkResult) -> int | None:
         """Steps after which all periods and lengths are the gait's; None if the last step's are not, or without one."""

@@ -53,8 +53,8 @@ def lift(walker: Standing, z: Any, both: float, y: Any, at: int) -> None:
     theta[STANCE], theta[SWING] = z[0], both - z[0]
     for i in range(1, len(z)):
         omega[walker.section[i] - n] = z[i]
-    spread(walker, STRAIGHT, theta)
-    spread(walker, AT_STRIKE, omega)
+    spread(walker.E[STRAIGHT], n, theta)
+    spread(walker.E[AT_STRIKE], n, omega)
     for k in range(n):
         y[at + k], y[at + n + k] = theta[k], omega[k]
 

@@ -13,19 +13,16 @@ from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.ground.compliant import (
     STANCE_FOOT,
     KneeRules,
-    centre_to,
     contact_walker,
-    pinned_walker,
 )
 from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.pinned import Pinned, floating_state
 from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import Frame
-from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, JudgedGround, walk_contact
-from walkerlab.mechanics.parts import Assembly, Position
+from walkerlab.ground.walker import ContactWalker, floating_state
+from walkerlab.hybrid.contact_events import Frame, JudgedGround
+from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, walk_contact
+from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.scene.parts import AnyWalker, assembly_of
@@ -34,7 +31,7 @@ from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact
-    from walkerlab.config.reads import ContactConfig, RigidConfig
+    from walkerlab.config.reads import ContactConfig
 
 GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
@@ -47,7 +44,7 @@ class ContactScene:
     walker: ContactWalker
     terrain: Terrain
     frame: Frame
-    pinned: Pinned | None  # the hinged first step, if the config wants one
+    pinned: bool  # whether the stance foot of the first step is hinged
     pitch_m: float
     assembly: Assembly
 
@@ -118,27 +115,9 @@ def assembled_scene(
     knee_rules  how knees lock and are released
     """
     walker = contact_walker(assembly, normal_law(contact), friction_law(contact), gravity, slope, knee_rules)
-    upper = assembly.legs[STANCE_FOOT][0]
-    hip = centre_to(assembly, upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
-    frame = Frame(
-        leg_length=leg_length_m,
-        pendulum_time=math.sqrt(leg_length_m / gravity),
-        hip_x=tuple(float(x) for x in hip[:, 0]),
-        hip_y=tuple(float(x) for x in hip[:, 1]),
-        locate_switching=True,
-    )
-    pinned = pinned_walker(assembly, walker, STANCE_FOOT, 0.0) if contact.stance == "pinned" else None
-    return ContactScene(walker, TERRAINS[contact.terrain](pitch_m), frame, pinned, pitch_m, assembly)
-
-
-def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
-    """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
-    for joint in assembly.joints:
-        if (joint.parent, joint.child) == (body, other):
-            return joint.parent_point_m
-        if (joint.parent, joint.child) == (other, body):
-            return joint.child_point_m
-    return (0.0, 0.0)
+    frame = Frame(leg_length_m, math.sqrt(leg_length_m / gravity), locate_switching=True)
+    terrain = TERRAINS[contact.terrain](pitch_m)
+    return ContactScene(walker, terrain, frame, contact.stance == "pinned", pitch_m, assembly)
 
 
 TERRAINS: dict[str, Callable[[float], Terrain]] = {
@@ -155,17 +134,12 @@ def with_contact(config: ContactConfig) -> Contact:
     return config.contact
 
 
-def hinged_walker(config: RigidConfig, walker: ContactWalker) -> Pinned:
-    """The walker with a revolute joint at its first stance foot."""
-    return pinned_walker(assembly_of(config.walker), walker, STANCE_FOOT, 0.0)
-
-
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """The contact model's own gait on pads of its own step length, searched for from a rigid start state.
 
     rigid_step_length_m  what the pads are laid for to begin with
     """
-    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
+    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
 
 
@@ -206,23 +180,22 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     about its centre.
     """
     walker = scene.walker
-    n = len(walker.tree.arm_x)
     members = places_of(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
-    rigid_state = tuple(float(x) for x in (parts @ members.T).ravel())
-    pinned = scene.pinned or Pinned(walker, walker.tree, STANCE_FOOT, 0.0, (0.0,) * (2 * n))
-    hinged = floating_state(pinned, rigid_state)
-    if scene.pinned is not None:
+    turned = parts @ members.T
+    hinged = floating_state(walker.forms[1, 0], turned.ravel(), walker.size)
+    if scene.pinned:
         return hinged
-    rolled = sum(r * omega for r, omega in zip(walker.feet[STANCE_FOOT].rolling, rigid_state[n:], strict=True))
+    n = turned.shape[1]
+    rolled = float(walker.whole.rolling[STANCE_FOOT, :n] @ turned[1])
     return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
 
 
 def resting(scene: ContactScene) -> RestingFoot:
     """How the walker stands on one foot."""
     walker, law = scene.walker, scene.walker.normal
-    weight = walker.tree.mass * math.hypot(walker.gravity_along, walker.gravity_down)
-    return resting_foot(weight, walker.tree.mass, law.stiffness, law.exponent, law.damping)
+    weight = walker.mass * math.hypot(walker.gravity_along, walker.gravity_down)
+    return resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def walkers_on_ground(
         changed = parameter.config_at(config, value)
         if changed is None:
             return None
-        scene = replace(contact_scene(changed, step_length_m, step_length_m), pinned=None)
+        scene = replace(contact_scene(changed, step_length_m, step_length_m), pinned=False)
         return WalkerOnGround(scene.walker, scene.ground)
 
     return walker_at

@@ -82,8 +82,7 @@ def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     """What the adjustment of another walker than the paper's compass does without."""
     found = []
     if not of_the_compass(config.walker):
-        saved = "compiling the hinged walker and two walks"
-        found.append(left_out("the first step with a hinged stance foot", PAPERS, saved))
+        found.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
     if not of_the_paper(config.walker):
         found.append(left_out("the paper's start of its ADAMS model", "it is of the paper's own compass", "a walk"))
     return tuple(found)

@@ -5,10 +5,9 @@ from typing import Any
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_type, inlined
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.dop853_tableau import nonzero
-from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.lanes import VECTOR, multiply_add, spread_over
 from walkerlab.solvers.system import State
 
@@ -18,6 +17,11 @@ A_5, A_6, A_7 = nonzero(tableau.A_5), nonzero(tableau.A_6), nonzero(tableau.A_7)
 A_8, A_9, A_10 = nonzero(tableau.A_8), nonzero(tableau.A_9), nonzero(tableau.A_10)
 A_11, A_12, A_13 = nonzero(tableau.A_11), nonzero(tableau.A_12), nonzero(tableau.A_13)
 ERROR_5, ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
+
+
+@by_type
+def derivative(system: Any, t: float, y: State) -> State:
+    """dy/dt of `system` at time t (s) and state y, both tuples of numbers or of lanes."""
 
 
 def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:

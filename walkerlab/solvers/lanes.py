@@ -185,17 +185,6 @@ def choose(context: Any, sign: Any, one: Any, other: Any) -> Any:
 
 
 @intrinsic
-def in_lanes(context: Any, vector: Any) -> Any:
-    """A tuple of numbers, each of them in every lane."""
-
-    def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        numbers = [spread_over(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
-        return context.make_tuple(builder, sig.return_type, numbers)
-
-    return types.UniTuple(LANES, vector.count)(vector), generate
-
-
-@intrinsic
 def any_positive(context: Any, x: Any) -> Any:
     """Whether a lane is positive."""
 

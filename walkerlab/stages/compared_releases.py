@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from walkerlab.config.reads import ContactConfig, RigidConfig
-from walkerlab.ground.held import Knees
+from walkerlab.ground.walker import changed_forms
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
@@ -43,7 +43,7 @@ class KneedStart(NamedTuple):
 def compare_releases(config: ContactConfig, start: KneedStart) -> dict[str, Any] | None:
     """Up to 20 steps with each instant of release; None for a walker without knees."""
     scene = contact_scene(config, start.pitch_m, start.pitch_m)
-    if not isinstance(scene.walker.knees, Knees):
+    if not scene.walker.kneed:
         return None
     return {
         name: {
@@ -64,9 +64,8 @@ def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str
 
 def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResult:
     """A walk from a state of the rigid model; at_touch: released at the leading foot's first touch."""
-    walker = scene.walker._replace(knees=scene.walker.knees._replace(release_at_touch=at_touch))
-    pinned = None if scene.pinned is None else scene.pinned._replace(walker=walker)
-    return replace(scene, walker=walker, pinned=pinned).walk(start_state(scene, state), STEPS, CONTACT)
+    walker = changed_forms(scene.walker, release_at_touch=at_touch)
+    return replace(scene, walker=walker).walk(start_state(scene, state), STEPS, CONTACT)
 
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:

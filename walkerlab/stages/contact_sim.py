@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, SceneConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.held import Knees
+from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.terrain import Terrain
 from walkerlab.hybrid.contact_run import (
     ContactSamples,
@@ -26,7 +26,6 @@ from walkerlab.scene.contact import (
     ContactScene,
     contact_gait,
     contact_scene,
-    hinge_of,
     scene_measures,
     start_state,
     wants_own_pitch,
@@ -85,15 +84,13 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
 
 def compile_kernels(config: ContactSimConfig) -> None:
-    """Have everything compiled that `run` calls, by walks that may evaluate next to nothing: hinged and free."""
+    """Have everything compiled that `run` calls, by a walk that may evaluate next to nothing."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
     y = start_state(scene, standing(scene))
     settings = config.solver.contact
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, 1)
     interval = scene.frame.pendulum_time if config.outputs else None
-    for pinned in dict.fromkeys((scene.pinned, None)):
-        result = replace(scene, pinned=pinned).walk(y, 1, tolerances, interval)
-        groups(config, scene, result)
+    groups(config, scene, scene.walk(y, 1, tolerances, interval))
 
 
 def standing(scene: ContactScene) -> tuple[float, ...]:
@@ -165,7 +162,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
 def advice(config: ContactConfig, scene: ContactScene, result: ContactWalkResult) -> str:
     """What the outcome means and what to try next; straight legs on a plane have a reason of their own to end."""
     on_plane = config.contact is not None and config.contact.terrain == "plane"
-    if on_plane and result.outcome.stumbled and not isinstance(scene.walker.knees, Knees):
+    if on_plane and result.outcome.stumbled and not scene.walker.kneed:
         return SCUFFED
     return result.advice
 
@@ -177,7 +174,7 @@ def mean_of(values: Floats) -> float | None:
 
 def knee_strikes(scene: ContactScene, result: ContactWalkResult) -> Floats | None:
     """When the swing leg's knee locked in each step (s), nan where it did not; None without knees."""
-    if not isinstance(scene.walker.knees, Knees):
+    if not scene.walker.kneed:
         return None
     return np.where(result.knee_strike_s < 0.0, np.nan, result.knee_strike_s)
 
@@ -246,11 +243,11 @@ def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: Con
 
 def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Angles and velocities of the legs, and where hip and feet are."""
-    y, frame = samples.states, scene.frame
-    n = len(frame.hip_x)
+    y, whole = samples.states, scene.walker.whole
+    n = int(whole.bodies)
     upper = [leg[0] for leg in scene.walker.legs]
     tilted = y[:, 2 : 2 + n] + scene.walker.slope
-    hip_x, hip_y = np.array(frame.hip_x), np.array(frame.hip_y)
+    hip_x, hip_y = whole.hip_x[:n], whole.hip_y[:n]
     along = y[:, 0] + np.cos(tilted) @ hip_x - np.sin(tilted) @ hip_y
     height = y[:, 1] + np.sin(tilted) @ hip_x + np.cos(tilted) @ hip_y
     of_legs = over_time(
@@ -266,14 +263,13 @@ def state_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> 
 
 def knee_variables(scene: ContactScene, y: Floats, hip_along: Floats, hip_height: Floats) -> dict[str, Variable]:
     """Angles and velocities of the shanks, and where the knees are; nothing for straight legs."""
-    knees = scene.walker.knees
-    if not isinstance(knees, Knees):
+    if not scene.walker.kneed:
         return {}
-    n, names = len(scene.frame.hip_x), [body.name for body in scene.assembly.bodies]
-    shanks = list(knees.shanks)
+    names = [body.name for body in scene.assembly.bodies]
+    n, thighs, shanks = len(names), scene.walker.whole.thighs.tolist(), scene.walker.whole.shanks.tolist()
     along, height = np.zeros((y.shape[0], 2)), np.zeros((y.shape[0], 2))
-    for leg, (thigh, shank) in enumerate(zip(knees.thighs, knees.shanks, strict=True)):
-        hip = hinge_of(scene.assembly, names[thigh], names[knees.thighs[1 - leg]])
+    for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
+        hip = hinge_of(scene.assembly, names[thigh], names[thighs[1 - leg]])
         knee = hinge_of(scene.assembly, names[thigh], names[shank])
         ahead, up = knee[0] - hip[0], knee[1] - hip[1]
         s, c = np.sin(y[:, 2 + thigh] + scene.walker.slope), np.cos(y[:, 2 + thigh] + scene.walker.slope)
@@ -298,7 +294,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) ->
     walker = scene.walker
     row = np.arange(samples.time_s.size)
     foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]
-    of_foot = walker.tree.mass * (walker.gravity_down * foot_height - walker.gravity_along * foot_along)
+    of_foot = walker.mass * (walker.gravity_down * foot_height - walker.gravity_along * foot_along)
     potential = energies[:, 1] - of_foot
     lost = samples.dissipated_J
     residual = energies[:, 2] + lost.sum(axis=1) - energies[:1, 2]

@@ -12,7 +12,6 @@ import numpy as np
 from walkerlab.config.reads import ContactConfig, TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.pinned import Pinned
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
@@ -31,7 +30,7 @@ from walkerlab.orbits.scaled_starts import (
 )
 from walkerlab.orbits.start_map import StartMap, as_map, contact_row, rigid_map
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, hinged_walker, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
@@ -112,7 +111,7 @@ def free_scene(config: ContactConfig, rigid_step: float, gait: GaitAnswer) -> Co
     if wants_own and gait.gait is None:
         raise NoAnswer(f"tune: no contact gait to lay the pads for: {gait.reason}", gait.advice)
     own = None if gait.gait is None else gait.gait.step.length_m
-    return replace(contact_scene(config, rigid_step, own if own is not None else rigid_step), pinned=None)
+    return replace(contact_scene(config, rigid_step, own if own is not None else rigid_step), pinned=False)
 
 
 def rigid_limit(
@@ -142,8 +141,7 @@ class TuneRun:
         cells = settings.cells or (COMPASS_CELLS if self.compass else CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        hinge = hinged_walker(self.config, self.scene.walker) if self.compass else None
-        hinged = None if hinge is None else self.walk(self.rigid_state, hinge)
+        hinged = self.walk(self.rigid_state, pinned=True) if self.compass else None
         released = self.walk(self.rigid_state)
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
@@ -162,7 +160,7 @@ class TuneRun:
         adjusted = None if state is None else self.walk(state)
         errors = {"released": self.error(released, self.rigid_state)}
         if hinged is not None:
-            errors["hinged"] = self.error(hinged, self.rigid_state, hinge)
+            errors["hinged"] = self.error(hinged, self.rigid_state, pinned=True)
         if state is not None and adjusted is not None:
             errors["adjusted"] = self.error(adjusted, state)
         return TuneFindings(
@@ -237,15 +235,13 @@ class TuneRun:
         settings = self.config.solver.contact
         return Tolerances(settings.method, settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP)
 
-    def walk(
-        self, state: State, pinned: Pinned | None = None, tolerances: Tolerances | None = None
-    ) -> ContactWalkResult:
+    def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
-    def error(self, walk: ContactWalkResult, state: State, pinned: Pinned | None = None) -> dict[str, Any]:
+    def error(self, walk: ContactWalkResult, state: State, pinned: bool = False) -> dict[str, Any]:
         """The numerical error of such a walk, under its key; nothing for one without an answer."""
         if not walk.outcome.answered:
             return {}

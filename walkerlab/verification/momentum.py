@@ -57,7 +57,7 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
 
     Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
     """
-    if scene.pinned is not None:
+    if scene.pinned:
         return NotMeasured(MEASURE, "the hinge pushes too")
     found = momentum_balance(config, scene, start, case)
     unknown = found.unsure + found.unresolved

@@ -22,6 +22,7 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
+from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RecordedWalk
 from walkerlab.paper.appendix_a import RigidWalker
@@ -79,7 +80,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
     start = prepared(config, case)
-    if not isinstance(start, ContactStart) or start.scene.pinned is not None or start.scene.terrain.order_matters:
+    if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.terrain.order_matters:
         return ()
     name, rtol, atol = REFERENCE
     arrival = arrival_of(
@@ -164,7 +165,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     """A method of SciPy's solve_ivp with nothing but its name given."""
     from scipy.integrate import solve_ivp
 
-    system = OnPads(ready.scene.walker, ready.scene.terrain)
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.terrain)
     start = np.array(ready.start)
     code = entry_point(right_hand_side, system, 0.0, start, start)
     count = 0
@@ -189,7 +190,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:
     """Semi-implicit Euler with a fixed step, at most `cap` of them."""
-    system = OnPads(ready.scene.walker, ready.scene.terrain)
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
     taken = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))

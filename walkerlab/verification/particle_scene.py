@@ -16,10 +16,9 @@ from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import checkerboard
-from walkerlab.ground.walker import ContactWalker, FootMotion
-from walkerlab.hybrid.contact_events import Frame, feet_motion
-from walkerlab.hybrid.contact_rules import LAST_TOUCH
-from walkerlab.hybrid.contact_run import JudgedGround, new_observer, new_walk_state, walk_on
+from walkerlab.ground.walker import ContactWalker, FootMotion, one_foot_motion
+from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
+from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
@@ -68,7 +67,7 @@ def rig(
         feet=(BallFoot("first", "body", feet[0], 0.0), BallFoot("second", "body", feet[1], 0.0)),
     )
     walker = contact_walker(assembly, normal, friction, gravity, slope)
-    frame = Frame(-ENDLESS, 1.0, (0.0, 0.0), (0.0, 0.0), True)
+    frame = Frame(-ENDLESS, 1.0, True)
     return Rig(walker, JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame))
 
 
@@ -85,9 +84,9 @@ def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol
     walk_state.at_zero[:] = 0
     walk_state.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
     observer = new_observer(of.walker, walk_state, start, np.arange(SAMPLES, dtype=np.float64) * duration_s / SAMPLES)
-    outcome, stopped = walk_on(of.walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
-    if outcome is not Outcome.NO_HEEL_STRIKE:
-        raise ArithmeticError(f"ended as {outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
+    stopped = walk_on(of.walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
+    if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
+        raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
     return ParticleRun(
         observer.times[:seen].copy(),
@@ -100,7 +99,7 @@ def run_until(of: Rig, start: State, duration_s: float, rtol: float = 1e-9, atol
 
 def first_foot(of: Rig, y: Array) -> FootMotion:
     """Where the first foot is."""
-    return feet_motion(of.walker, tuple(float(x) for x in y))[0]
+    return one_foot_motion(of.walker.whole, 0, y)
 
 
 def next_landing(height: float, vertical_velocity: float, gravity: float) -> float:

@@ -208,7 +208,7 @@ def on_ground(config: WalksConfig, rigid_state: State, length: float, lowered: f
     speed = float(np.max(np.abs([*y[rates : rates + 2], *(leg * rate for rate in y[rates + 2 :])])))
     law = scene.walker.normal
     stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
-    energy = scene.walker.tree.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
+    energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
     return ContactStart(config, scene, y, energy)
 
 

@@ -18,15 +18,14 @@ from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.benchmarks.engines.registry import Engine
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import EngineScene
+from walkerlab.ground.energy import kinetic_energy, potential_energy
 from walkerlab.ground.friction import friction_coefficient
-from walkerlab.ground.held import held_flags, no_stops
 from walkerlab.ground.resting import resting_foot
+from walkerlab.ground.walker import folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.mechanics.assembly import Anchor, tree_about
-from walkerlab.mechanics.tree import mass_matrix
-from walkerlab.solvers.in_tuples import derivative
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import derivative
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +72,7 @@ def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: fl
     """Our walk; with `until_s` also the state then."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS)
     return walk_contact(
-        scene.ours, scene.ground, None, scene.stance, scene.start, tolerances, steps, until_s, track_energy=False
+        scene.ours, scene.ground, False, scene.stance, scene.start, tolerances, steps, until_s, track_energy=False
     )
 
 
@@ -228,7 +227,7 @@ def target_of(scene: EngineScene) -> EngineContact | None:
     law, friction = walker.normal, walker.friction
     if friction.largest == 0.0:
         return None
-    mass, g = walker.tree.mass, walker.gravity_down
+    mass, g = walker.mass, walker.gravity_down
     foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
     creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
@@ -337,29 +336,21 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
-    from walkerlab.ground.pinned import Pinned
-
-    n = len(scene.chain)
-    foot = scene.assembly.feet[scene.stance]
-    tree = tree_about(scene.assembly, Anchor(foot.body, foot.centre_m))
-    walker = scene.ours
-    held = held_flags(walker.held, walker.knees, knees_at_start(walker, scene.stance, scene.start))
-    system = Pinned(walker, tree, scene.stance, 0.0, (0.0,) * (2 * n), held, no_stops(walker.knees))
+    knee = knees_at_start(scene.ours, scene.stance, scene.start)
+    system = on_ground(scene.ours, (False, False), knee, hinged=True)
+    whole = scene.ours.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:
-        return derivative(system, t, tuple(y))
+        f = np.zeros(y.size)
+        derivative(system, t, y, f)
+        return f
 
     def energy(y: Floats) -> float:
-        angles = y[:n] + scene.ours.slope
-        s, c = np.sin(angles), np.cos(angles)
-        M = np.array(mass_matrix(tree, tuple(s), tuple(c))).reshape(n, n)
-        arm_x, arm_y = np.array(tree.arm_x), np.array(tree.arm_y)
-        forward, upward = (c * arm_x - s * arm_y).sum(), (s * arm_x + c * arm_y).sum()
-        gravity = scene.ours.gravity_down * upward - scene.ours.gravity_along * forward
-        return float(0.5 * y[n:] @ M @ y[n:] + gravity)
+        return float(kinetic_energy(whole, y) + potential_energy(whole, y))
 
-    done = solve_ivp(rate, (0.0, until_s), start, method="DOP853", rtol=1e-13, atol=1e-14)
-    return np.asarray(done.y[:, -1]), energy
+    y = folded(system.form, start)
+    done = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
+    return unfolded(system.form, done.y[:, -1], start.size), energy
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:

@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
-from walkerlab.ground.external import feet_and_forces, in_arrays
-from walkerlab.ground.held import BENT, FLEXED, LOCKED, RELEASED, held_flags, stop_flags
-from walkerlab.ground.motion import OnGround
+from walkerlab.ground.external import feet_and_forces
+from walkerlab.ground.knees import FLEXED, lock
 from walkerlab.ground.terrain import Terrain, cell_at, cell_edges, has_ground_in_cell
-from walkerlab.ground.walker import FootMotion
+from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
 from walkerlab.hybrid import contact_events, contact_rules
-from walkerlab.hybrid.contact_knee import locked
 from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.hybrid.outcome import Outcome
@@ -50,7 +48,7 @@ class RuleFollower:
 
     scene: EngineScene
     look: FeetAndForces
-    walk_state: contact_rules.WalkState
+    walk_state: contact_events.WalkState
     feet: Feet
     bends: Bends
     edges: list[tuple[float, float]]
@@ -89,7 +87,7 @@ class RuleFollower:
 
     def _let_happen(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
         """Let everything happen that lies between two states."""
-        walk_state, terrain, walker = self.walk_state, self.scene.ground.terrain, self.scene.ours
+        walk_state, terrain, form = self.walk_state, self.scene.ground.terrain, self.scene.ours.whole
         self._cross_edges(now)
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
             walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
@@ -105,10 +103,10 @@ class RuleFollower:
             there = between(before, now, share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             if above:
-                contact_rules.lift(walker, terrain, walk_state, there, foot, y)
+                contact_rules.lift(form, terrain, walk_state, there, foot, y)
             else:
-                self._end(contact_rules.touch(walker, terrain, walk_state, there, foot, self.time_s + share * h, y))
-        if walk_state.feet[contact_rules.STEPS] == walk_state.touch_time.size and not contact_rules.is_to_lift(
+                self._end(contact_rules.touch(form, terrain, walk_state, there, foot, self.time_s + share * h, y))
+        if walk_state.feet[contact_events.STEPS] == walk_state.touch_time.size and not contact_rules.is_to_lift(
             walk_state
         ):
             self._end(int(Outcome.WALKED))
@@ -116,7 +114,7 @@ class RuleFollower:
     def _turning(self, h: float, now: Feet, bends: Bends) -> Turn | None:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
         walk_state, found = self.walk_state, []
-        stance = walk_state.feet[contact_rules.STANCE]
+        stance = walk_state.feet[contact_events.STANCE]
         if walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0:
             sinking = max(0.0, -self.feet[stance].vertical_velocity)
             share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
@@ -131,22 +129,14 @@ class RuleFollower:
     def turn_knee(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Let the knee lock or be released in this state; coordinates and velocities of the walker from there on."""
         assert self.turn is not None, "a knee turns"
-        knees, event, walk_state, y = (
-            self.scene.ours.knees,
-            self.turn.event,
-            self.walk_state,
-            self.scene.about_centre(q, v),
-        )
-        state = tuple(y.tolist())
-        if event >= contact_events.EXTENSION:
-            contact_rules.knee_stops(knees, walk_state, event, self.time_s)
-            walker, has_ground = self.scene.ours, (bool(walk_state.has_ground[0]), bool(walk_state.has_ground[1]))
-            held = held_flags(walker.held, walker.knees, walk_state.knee)
-            state, _ = locked(OnGround(walker, has_ground, held, stop_flags(knees, walk_state.knee)), state)
+        walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
+        if self.turn.event >= contact_events.EXTENSION:
+            contact_rules.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
+            y = lock(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
         else:
-            contact_rules.release(knees, walk_state, 1 - int(walk_state.feet[contact_rules.STANCE]))
+            contact_rules.release(walk_state, 1 - int(walk_state.feet[contact_events.STANCE]))
         self.turn = None
-        return self._in_next_model(state)
+        return self._in_next_model(tuple(y.tolist()))
 
     @property
     def is_outdated(self) -> bool:
@@ -192,18 +182,18 @@ class RuleFollower:
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t
-            stance = self.walk_state.feet[contact_rules.STANCE]
+            stance = self.walk_state.feet[contact_events.STANCE]
             far = contact_events.farthest_slide(ground.terrain)
             if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
-                material = contact_events.material_along(self.scene.ours, stance, now[stance].along, y)
+                material = contact_events.material_along(self.scene.ours.whole, stance, now[stance].along, y)
                 if abs(material - self.walk_state.touched[stance]) > far:
                     self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
         if q[1] < contact_events.FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
-        elif t - self.walk_state.times[contact_rules.LAST_TOUCH] > LONGEST_STEP * tau:
+        elif t - self.walk_state.times[contact_events.LAST_TOUCH] > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))
 
 
@@ -225,9 +215,7 @@ class FeetAndForces:
 
     def __init__(self, scene: EngineScene, has_ground: Any) -> None:
         """Make room for its results; `carried` is the walk state's own array and changes with it."""
-        n = len(scene.chain)
-        like = ((0.0,) * (4 + 2 * n), (0.0,) * n)
-        self._fixed = (*in_arrays(scene.walker), *like, scene.chain, has_ground)
+        self._fixed = (on_ground(scene.walker, has_ground), scene.chain)
         self._feet, self._forces, self._none = np.zeros((2, 4)), np.zeros(scene.model.size), np.zeros(0)
         q = np.zeros(scene.model.size)
         self._call = entry_point(feet_and_forces, *self._fixed, q, q, self._feet, self._forces)

@@ -15,7 +15,8 @@ from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simu
 from walkerlab.benchmarks.engines.follow import RuleFollower, follower
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
-from walkerlab.hybrid.contact_rules import STEPS, steps_with_lift
+from walkerlab.hybrid.contact_events import STEPS
+from walkerlab.hybrid.contact_rules import steps_with_lift
 from walkerlab.hybrid.outcome import Outcome
 
 Floats = NDArray[np.float64]

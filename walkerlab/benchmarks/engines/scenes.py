@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, levers_from, planar_model, skeleton
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.held import LOCKED, IdealLock
-from walkerlab.ground.merged import Unmerged
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import JudgedGround, knees_at_start
+from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
+from walkerlab.ground.knees import IdealLock
+from walkerlab.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
+from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.hybrid.contact_run import knees_at_start
 from walkerlab.mechanics.assembly import masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee, Position
 from walkerlab.mechanics.standing import swing_foot
-from walkerlab.scene.contact import contact_scene, hinge_of, knee_rules, start_state
+from walkerlab.scene.contact import contact_scene, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State
@@ -124,17 +124,15 @@ class EngineScene:
 
 def scene_of(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
     """The config's walker on its own ground, free from its start."""
-    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=None)
+    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     assembly = scene.assembly
     start = start_state(scene, rigid_state)
     base = assembly.legs[STANCE_FOOT][0]
     hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
-    levers = [levers_from(assembly, base, hip, part.body, part.centre_m).T.tolist() for part in assembly.feet]
-    first, second = (
-        foot._replace(lever_x=tuple(x), lever_y=tuple(y))
-        for foot, (x, y) in zip(scene.walker.feet, levers, strict=True)
-    )
-    walker = scene.walker._replace(feet=(first, second), merging=Unmerged())
+    d = np.zeros((2, MAX_BODIES, 2))
+    for foot, part in enumerate(assembly.feet):
+        d[foot, : len(assembly.bodies)] = levers_from(assembly, base, hip, part.body, part.centre_m)
+    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1])
     name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
     free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
     return free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start))

@@ -1,0 +1,157 @@
+"""Knees on compliant ground: what each is doing, the stop that it meets, and what its lock does to the motion.
+
+With absolute angles a shank below a locked knee has the angular velocity of its thigh, omega = Z z with constant Z, and
+a lock is a plastic impact: Z'MZ z = Z'M omega.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
+from walkerlab.ground.walker import STOPPING, Form, OnGround, half_size
+from walkerlab.kernels import by_type_or_default, inlined
+
+Floats = NDArray[np.float64]
+FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
+
+
+class IdealLock(NamedTuple):
+    """The knee is straight and locks at once: a plastic impact."""
+
+
+@inlined
+def extension(form: Form, knee: int, y: Any) -> float:
+    """How far a knee is beyond straight (rad): negative while it is bent, zero where there is none."""
+    return y[form.places + form.shanks[knee]] - y[form.places + form.thighs[knee]]
+
+
+@inlined
+def extension_rate(form: Form, knee: int, y: Any) -> float:
+    """How fast a knee straightens (rad/s)."""
+    rates = half_size(form) + form.places
+    return y[rates + form.shanks[knee]] - y[rates + form.thighs[knee]]
+
+
+class StopTorque(NamedTuple):
+    """Torque against the extension, and its derivatives."""
+
+    torque: float  # N m
+    spring: float  # N m, the elastic part
+    by_angle: float  # N m
+    by_rate: float  # N m s
+
+
+@by_type_or_default
+def stop_torque(stop: Any, angle: float, rate: float) -> StopTorque:
+    """Torque of a stop at an extension (rad) and its rate: none of an ideal lock, which acts in no time."""
+    return StopTorque(0.0, 0.0, 0.0, 0.0)
+
+
+@stop_torque.case(NormalLaw)
+def impact_torque(stop: NormalLaw, angle: float, rate: float) -> StopTorque:
+    """The IMPACT law, in N m and rad."""
+    if angle <= 0.0:
+        return StopTorque(0.0, 0.0, 0.0, 0.0)
+    torque = impact_normal_force(angle, rate, stop)
+    return StopTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
+
+
+@by_type_or_default
+def stop_energy(stop: Any, angle: float) -> float:
+    """Elastic energy (J) of a stop: none of an ideal lock."""
+    return 0.0
+
+
+@stop_energy.case(NormalLaw)
+def spring_energy(stop: NormalLaw, angle: float) -> float:
+    """That of its spring."""
+    return elastic_energy(angle, stop)
+
+
+@inlined
+def torque_now(system: OnGround, knee: int, y: Any) -> StopTorque:
+    """The torque of a knee's stop in a state."""
+    return stop_torque(system.stop, extension(system.form, knee, y), extension_rate(system.form, knee, y))
+
+
+@inlined
+def add_stop_torques(system: OnGround, y: Any, r: Any) -> None:
+    """Add the torques (N m) of the stops to r (n,): each pushes the shank back and the thigh forward."""
+    for knee in range(2):
+        if system.knee[knee] == STOPPING:
+            torque = torque_now(system, knee, y).torque
+            r[system.form.shanks[knee]] -= torque
+            r[system.form.thighs[knee]] += torque
+
+
+@inlined
+def add_stop_gradients(system: OnGround, y: Any, J: Any) -> None:
+    """Add the derivatives of those torques to the rows of the angles in J."""
+    form = system.form
+    p, rates = form.places, half_size(form) + form.places
+    for knee in range(2):
+        if system.knee[knee] == STOPPING:
+            now, shank, thigh = torque_now(system, knee, y), form.shanks[knee], form.thighs[knee]
+            for row, sign in ((rates + thigh, 1.0), (rates + shank, -1.0)):
+                J[row, p + shank] += sign * now.by_angle
+                J[row, p + thigh] -= sign * now.by_angle
+                J[row, rates + shank] += sign * now.by_rate
+                J[row, rates + thigh] -= sign * now.by_rate
+
+
+@inlined
+def knee_energy(system: OnGround, y: Any) -> float:
+    """Elastic energy (J) in the stops."""
+    total = 0.0
+    for knee in range(2):
+        if system.knee[knee] == STOPPING:
+            total += stop_energy(system.stop, extension(system.form, knee, y))
+    return total
+
+
+@inlined
+def knee_power(system: OnGround, y: Any) -> float:
+    """Power (W) that the stops dissipate."""
+    total = 0.0
+    for knee in range(2):
+        if system.knee[knee] == STOPPING:
+            now = torque_now(system, knee, y)
+            total += (now.torque - now.spring) * extension_rate(system.form, knee, y)
+    return total
+
+
+class Lock(NamedTuple):
+    """What a lock does to the state of all bodies about its root, whether that is hinged or not."""
+
+    state: Floats  # after it
+    lost: float  # J
+    derivative: Floats  # of the state after by the state before
+
+
+def lock(whole: Form, form: Form, x: Any) -> Lock:
+    """Project the angular velocities in the metric of M on what a form allows: E'ME z = E'M omega; the root rests.
+
+    whole  the form of all bodies, about the root
+    form   as whose bodies they move from then on
+    x      state of all bodies
+    """
+    x = np.array(x, float)
+    n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)
+    free = [k for k in range(form.bodies) if form.E[k, k] != 0.0]
+    Z = form.E[form.onto[:n]][:, free]
+    angles, omega = x[p : p + n] + whole.slope, x[rates:]
+    delta = angles[None, :] - angles[:, None]
+    A, B = whole.A[:n, :n], whole.B[:n, :n]
+    M = A * np.cos(delta) + B * np.sin(delta)
+    spread = Z @ np.linalg.inv(Z.T @ M @ Z) @ Z.T
+    new = x.copy()
+    new[rates:] = spread @ (M @ omega)
+    change = omega - new[rates:]
+    # dM (omega- - omega+) = (dM/d delta * (d theta_l - d theta_k)) change
+    turned = (B * np.cos(delta) - A * np.sin(delta)) * change
+    by_state = np.eye(x.size)
+    by_state[rates:, rates:] = spread @ M
+    by_state[rates:, p : p + n] = spread @ (turned - np.diag(turned.sum(axis=1)))
+    return Lock(new, float(0.5 * (M @ omega) @ change), by_state)
