@@ -82,7 +82,7 @@ def test_the_player_shows_knees_in_both_models(run):
     results, _ = run
     (player,) = (block for block in motion.section(results).blocks if isinstance(block, Player))
     assert [walker.name for walker in player.walkers] == ["Rigid model", "Contact model"]
-    assert all({"kx0", "ky0", "kx1", "ky1"} <= set(walker.channels) for walker in player.walkers)
+    assert all({"kx0", "ky0", "kx1", "ky1"} <= set(walker.track.channels) for walker in player.walkers)
     assert player.pads == ()
 
 

@@ -337,8 +337,8 @@ def test_provenance_names_key_digest_commit_and_command_of_each_result():
 
 def channels(walker):
     """The numbers of a player's walker, by their names."""
-    floats = np.frombuffer(base64.b64decode(walker.floats), "<f4").reshape(len(walker.channels), walker.samples)
-    return dict(zip(walker.channels, floats.astype(float), strict=True))
+    floats = np.frombuffer(base64.b64decode(walker.track.packed()), "<f4").reshape(len(walker.track.channels), -1)
+    return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 
 
 def test_stick_figures_stand_where_the_walker_stood():

@@ -271,23 +271,9 @@ def tell_periods(scene: str, results: Results) -> tuple[Any, ...]:
     return results[ENGINES_STAGE].summary["conclusions"][scene][OWN_LAW], failed
 
 
-@dataclass(frozen=True)
-class SceneNeed(Need):
-    """Rows of one scene."""
-
-    scene: str = ""
-
-    def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Why the need is not met, in words; None if it is."""
-        missing = super().missing_in(results, absent)
-        if missing is None and self.scene not in results[self.stage].summary["reference"]:
-            return f"{self.stage}: {self.or_else}"
-        return missing
-
-
 def engines_on(scene: str) -> tuple[Illustration, Illustration]:
     """The figures of one scene."""
-    need = SceneNeed(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
+    need = Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
 
     def one(about: str, plot: Any, tell: Any) -> Illustration:
         made = partial(plot, scene), partial(tell, scene)

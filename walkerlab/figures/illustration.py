@@ -22,12 +22,16 @@ Results = Mapping[str, Stored]
 
 @dataclass(frozen=True)
 class Need:
-    """Variables of a group of a stage's result; `or_else` is why a result may be without them, in words."""
+    """Variables of a group of a stage's result, and in its summary the reference of a scene if one is named.
+
+    or_else  why a result may be without them, in words
+    """
 
     stage: str
     group: str
     variables: tuple[str, ...]
     or_else: str
+    scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
         """Why the need is not met, in words; None if it is.
@@ -37,8 +41,10 @@ class Need:
         if self.stage not in results:
             why = absent.get(self.stage)
             return f"it needs {self.stage}" + (f": {why}" if why else "")
-        group = results[self.stage].groups.get(self.group)
+        result = results[self.stage]
+        group = result.groups.get(self.group)
         there = group is not None and all(name in group.variables for name in self.variables)
+        there = there and (not self.scene or self.scene in result.summary["reference"])
         return None if there else f"{self.stage}: {self.or_else}"
 
 

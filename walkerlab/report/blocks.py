@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, Protocol
 from markupsafe import Markup
 
 from walkerlab.report.tables import Tone
+from walkerlab.report.tracks import Track
 
 MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
 """The pages: the report itself, and what is one link away."""
@@ -142,18 +143,14 @@ Pad = tuple[float, float, int]
 class Walker:
     """How one walker of a player moves, and how it is drawn.
 
-    channels  what its numbers are, see `tracks.Track`
-    samples   of each channel
-    floats    all channels, float32 in base64
+    track     its motion, thinned
     strikes   times of its heel strikes, s
     stills    postures, each a line through its joints in mm along and below the slope
     """
 
     name: str
     style: str
-    channels: tuple[str, ...]
-    samples: int
-    floats: str
+    track: Track
     strikes: tuple[float, ...]
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
@@ -161,7 +158,10 @@ class Walker:
     @property
     def meta(self) -> dict[str, object]:
         """What a script has to know to read the numbers."""
-        return {name: getattr(self, name) for name in ("name", "style", "channels", "samples", "strikes")}
+        channels, samples = tuple(self.track.channels), int(self.track["t"].size)
+        return {
+            "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,12 @@ from typing import Annotated, Final
 
 import numpy as np
 
+from walkerlab.config.contact import Contact
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import resting_foot
 from walkerlab.labels import Label
+from walkerlab.scene.contact import normal_law
 from walkerlab.verification import references
 from walkerlab.verification.particle_scene import (
     ALONG_RATE,
@@ -32,7 +34,7 @@ from walkerlab.verification.particle_scene import (
 
 GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
-PAPER_LAW: Final = NormalLaw(1.0e5 * 1000.0**2.2, 2.2, 9.0e4, 1.0e-4)
+PAPER_LAW: Final = normal_law(Contact())
 PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 

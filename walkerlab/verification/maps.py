@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.contact import Contact
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
@@ -22,7 +23,7 @@ from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed,
 from walkerlab.verification.starts import ContactStart, JudgedWalk, configured, prepared
 from walkerlab.verification.verdict import finite
 
-PAPER_STIFFNESS: Final = 1.0e5 * 1000.0**2.2  # N/m^e
+PAPER_STIFFNESS: Final = Contact().in_si().stiffness_N_per_m_e
 STIFFNESS: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_VELOCITY: Final = (1e-7, 10.0)  # m/s
 NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite

@@ -106,9 +106,8 @@ class RuleFollower:
                 contact_rules.lift(form, terrain, walk_state, there, foot, y)
             else:
                 self._end(contact_rules.touch(form, terrain, walk_state, there, foot, self.time_s + share * h, y))
-        if walk_state.feet[contact_events.STEPS] == walk_state.touch_time.size and not contact_rules.is_to_lift(
-            walk_state
-        ):
+        taken = walk_state.feet[contact_events.STEPS] == walk_state.touch_time.size
+        if taken and not contact_rules.is_to_lift(walk_state):
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: Bends) -> Turn | None:

@@ -179,14 +179,11 @@ def gaits(results: Results, across: DiagramAxis, up: DiagramAxis) -> Iterator[Ga
             if moving is None or track is None:
                 continue
             steps, stable = int(moving.attrs["steps"]), bool(branch["stable"][place])
-            thin = track.thinned(GAP * sampling_gap(results.config))
             said = f"{count(steps, 'step')} at {quantity(value, unit, 4)}, {'stable' if stable else 'unstable'}"
             walker = Walker(
                 name=f"Gait of {said}",
                 style=MODEL,
-                channels=tuple(thin.channels),
-                samples=int(thin["t"].size),
-                floats=thin.packed(),
+                track=track.thinned(GAP * sampling_gap(results.config)),
                 strikes=tuple(moving["time"][1:][np.diff(moving["step"]) > 0].round(6).tolist()),
                 stills=(),
             )

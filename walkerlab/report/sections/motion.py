@@ -60,15 +60,12 @@ def first_steps(results: Results) -> float:
 def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
     """A model's motion and how it ended."""
     summary = results.stored[stage].summary
-    thin = track.thinned(gap)
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     ended = "" if summary["outcome"] == WALKED else ends(summary["outcome"])
     return Walker(
         name=MODELS[stage],
         style=STYLES[stage],
-        channels=tuple(thin.channels),
-        samples=int(thin["t"].size),
-        floats=thin.packed(),
+        track=track.thinned(gap),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
         ends=ended,
