@@ -3,10 +3,12 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+from walkerlab.cli.clean import listed
 from walkerlab.cli.runs import lines, percent
 from walkerlab.report.headlines import MOST
 from walkerlab.stages.runs import Pair, difference
@@ -74,6 +76,21 @@ def test_clean_takes_sweeps_away(swept, tmp_path):
     removed = json.loads(done.stdout)["removed"]
     assert any("sweep-chunks/drop-" in name for name in removed)
     assert any(name.endswith("sweep.html") for name in removed)
+
+
+def test_clean_says_of_a_sweep_s_chunks_how_many_there_are_and_not_which(swept):
+    toy, _ = swept
+    chunks = [line for line in toy("clean", "--all", "--dry-run").stdout.splitlines() if "sweep-chunks" in line]
+    assert len(chunks) == 1
+    assert re.search(r"sweep-chunks/drop-\w+-\*", chunks[0]) or chunks[0].endswith(".h5")
+
+
+def test_many_files_of_a_kind_are_told_in_one_line_with_their_size():
+    files = [Path(f"runs/a/sweep-chunks/drop-1234-{n}.h5") for n in range(300)] + [Path("runs/a/drop.h5")]
+    assert listed(files, dict.fromkeys(files, 10_000)) == [
+        "runs/a/sweep-chunks/drop-1234-* (300 files, 3.0 MB)",
+        "runs/a/drop.h5",
+    ]
 
 
 def test_diff_says_what_of_config_and_numbers_differs(toy):

@@ -1,5 +1,9 @@
-"""JSON values as text for people."""
+"""JSON values as text for people, and how far a stage is."""
 
+import pytest
+
+from walkerlab.cli import console
+from walkerlab.cli.console import Console, StageLine
 from walkerlab.cli.text import described_summary, table
 from walkerlab.report.tables import LONGEST_CELL
 
@@ -17,3 +21,29 @@ def test_a_column_of_sentences_is_named_below_the_table_and_not_in_it():
 
 def test_a_table_of_sentences_alone_is_shown():
     assert table([{"caption": SENTENCES}])[1] == SENTENCES.rstrip()
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that is set by hand, from 0 s."""
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    return now
+
+
+def test_no_time_is_estimated_until_a_tenth_is_done_in_some_seconds(clock):
+    line = StageLine(Console(quiet=True), "tune", "", None)
+    line.start("tune: cells", 100)
+    told = []
+    for clock[0], done in ((1.0, 5), (2.0, 15), (4.0, 20), (8.0, 40), (12.0, 60)):
+        line.done = done
+        told.append(line.seconds_left())
+    assert told == [None, None, 16.0, 12.0, 8.0]
+
+
+def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once(clock):
+    line = StageLine(Console(quiet=True), "fixedpoint", "", expected_s=5.0)
+    clock[0] = 3.0
+    assert line.pace() == "3 s, about 2 s left"
+    clock[0] = 9.0
+    assert line.pace() == "9 s"

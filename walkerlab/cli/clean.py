@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import typer
 
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
-from walkerlab.store.clean import files_of, remove, remove_if_empty
+from walkerlab.store.clean import CHUNKS, FIGURES, files_of, remove, remove_if_empty
 from walkerlab.store.runfolder import RunFolder
 
 
@@ -27,6 +27,7 @@ def clean_folders(request: Request, folders: Sequence[RunFolder], stages: Sequen
     """
     found = {folder: files_of(folder, stages) for folder in folders}
     files = [path for paths in found.values() for path in paths]
+    sizes = {path: path.lstat().st_size for path in files}
     where = folders[0].path if len(folders) == 1 else request.runs
     if files and not (yes or request.dry_run) and not agreed(where, files):
         found, files = {}, []
@@ -36,12 +37,23 @@ def clean_folders(request: Request, folders: Sequence[RunFolder], stages: Sequen
                 with folder.locked(not request.no_wait, request.console.note):
                     remove(folder, paths)
                 remove_if_empty(folder)
-    names = [str(path) for path in files]
     if request.as_json:
-        print_json({"run_dir": str(where), "removed": names, "dry_run": request.dry_run})
+        print_json({"run_dir": str(where), "removed": [str(path) for path in files], "dry_run": request.dry_run})
     else:
         said = "would be removed" if request.dry_run else "removed"
-        print("\n".join([f"{said}: {name}" for name in names] or [f"{where}: nothing {said}"]))
+        print("\n".join([f"{said}: {one}" for one in listed(files, sizes)] or [f"{where}: nothing {said}"]))
+
+
+def listed(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
+    """Files for people: a line for each, one for all figures of a run, and one for the chunks of each sweep."""
+    lines: dict[str, list[Path]] = {}
+    for path in files:
+        stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES: "*"}.get(path.parent.name, path.name)
+        lines.setdefault(str(path.parent / stem), []).append(path)
+    return [
+        line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
+        for line, paths in lines.items()
+    ]
 
 
 def agreed(folder: Path, files: Sequence[Path]) -> bool:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 SILENCE_S = 8.0
 """Off a terminal, something is said of what runs at least as often."""
 
+ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
+"""Share of the parts and time after which their rate tells the time that is left: the first parts are no sample."""
+
 
 class Console:
     """The reporter of the command line; see `stages.progress`."""
@@ -191,22 +194,21 @@ class StageLine:
     def pace(self) -> str:
         """How far it is, and how long it will take."""
         elapsed = time.monotonic() - self.began
-        parts = [f"{self.done} of {self.total}"] if self.total is not None else []
+        parts = [f"{self.done} of {self.total}"] if self.total is not None and self.total > 1 else []
         left = self.seconds_left()
         parts.append(f"{elapsed:.0f} s")
         parts += [] if left is None else [f"about {left:.0f} s left"]
         return ", ".join(parts)
 
     def seconds_left(self) -> float | None:
-        """By the rate of the piece of work, or by how long the stage took the last time; None if nobody knows."""
+        """By the rate of the piece of work, or by how long the stage took the last time; None until enough is known."""
         now = time.monotonic()
         compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
         computed = now - self.work_began - compiled
-        if self.total and self.done:
+        if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             return computed / self.done * (self.total - self.done)
-        if self.expected_s is not None:
-            return max(0.0, self.expected_s - (now - self.began))
-        return None
+        left = 0.0 if self.expected_s is None else self.expected_s - (now - self.began)
+        return left if left > 0.0 else None
 
     def said(self) -> str:
         """All of it on one line."""

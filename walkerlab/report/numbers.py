@@ -77,8 +77,8 @@ def length(value_m: float | None, digits: int = 4) -> str:
 
 
 def whole(value: int | None) -> str:
-    """An integer with its thousands set apart, as in 27 087; a dash for none."""
-    return NONE if value is None else f"{value:,}".replace(",", "\u202f")
+    """An integer with its thousands set apart, as in 27,087; a dash for none."""
+    return NONE if value is None else f"{value:,}"
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:

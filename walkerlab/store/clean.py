@@ -13,7 +13,8 @@ from walkerlab.store.runfolder import RECORD, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """What the drawing stages write, for the case that the index of it is gone."""
-SWEPT = ("sweep-*.h5", "sweep-*.csv", "sweep-chunks/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
+CHUNKS, FIGURES = "sweep-chunks", "figures"
+SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
@@ -44,7 +45,7 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
     for path in (*files, folder.path / RECORD):
         with storing(path):
             path.unlink(missing_ok=True)
-    for emptied in (folder.figures, folder.path / "sweep-chunks"):
+    for emptied in (folder.figures, folder.path / CHUNKS):
         with contextlib.suppress(OSError):
             emptied.rmdir()
 
