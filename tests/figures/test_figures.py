@@ -16,7 +16,7 @@ from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, 
 
 from walkerlab.figures import stick_diagram, walk_figures
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.illustration import Illustration
+from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.figures.style import CONTACT, RIGID
 from walkerlab.store.content import Group, Variable
@@ -110,6 +110,13 @@ def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
 
 def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
     assert Illustration("run-time", (), str, tuple).called == "figure run-time"
+
+
+def test_every_figure_has_its_words_and_every_word_a_figure():
+    assert [figure.name for figure in ALL_FIGURES if not figure.title or figure.title.endswith(".")] == []
+    shared = {"cycle", "counted"}
+    files = {path.stem for path in WORDS.folder.glob("*.j2")}
+    assert files - shared == {figure.words or figure.name for figure in ALL_FIGURES}
 
 
 @functools.cache

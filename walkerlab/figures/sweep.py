@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from walkerlab.figures.canvas import as_file, blank, entry, legend_above, settle, styled
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
-from walkerlab.store.content import Group, Variable
+from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
@@ -89,7 +89,7 @@ def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], name
     """What is seen, in a sentence or two."""
     outcomes, counts = np.unique(group["outcome"].astype(str), return_counts=True)
     said = ", ".join(f"{count} {name}" for name, count in zip(outcomes, counts, strict=True))
-    what = ", ".join(words(group.variables[name]) for name in names)
+    what = ", ".join(group.variables[name].long_name.replace("_", " ") for name in names)
     gaps = bool(np.any(group["status"] != "answered"))
     a_map = len(dims) == 2 and not in_lines(group, dims)
     end = " Where there is no answer the map is grey." if gaps and a_map else ""
@@ -99,11 +99,6 @@ def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], name
         end += " The map ends where the outermost values were sampled; small ticks are at the others."
     one = " The line is a largest multiplier of one: beyond it the gait is unstable." if RADIUS in names else ""
     return f"{what[:1].upper()}{what[1:]} over {', '.join(parameters)}: {said}.{end}{one}"
-
-
-def words(variable: Variable) -> str:
-    """What a variable is, short."""
-    return variable.long_name.replace("_", " ")
 
 
 def label(group: Group, name: str) -> str:
@@ -131,14 +126,12 @@ def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names
 
 def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
     """A parameter's value at every point, flat."""
-    variable = group.variables[parameter]
-    values = variable.values if variable.values.dtype.kind != "O" else np.arange(variable.values.size)
-    if variable.dims == dims:
-        return values.astype(float).ravel()
-    shape = group["outcome"].shape
+    values = numbers(group, parameter)
+    if group.variables[parameter].dims == dims:
+        return values.ravel()
     along = [1] * len(dims)
     along[dims.index(parameter)] = -1
-    return np.broadcast_to(values.astype(float).reshape(along), shape).ravel()
+    return np.broadcast_to(values.reshape(along), group["outcome"].shape).ravel()
 
 
 def draw_panel(axes: Axes, group: Group, x: NDArray[Any], parameter: str, name: str, joined: bool) -> None:

@@ -112,8 +112,7 @@ class StepColumn:
         """Walk it sharply, then with each step."""
         case, config = on_ground(self.stiffness, None, STEPS, REFERENCE_BUDGET)
         start = prepared_on_ground(config, case)
-        name, rtol, atol = REFERENCE
-        walk = start.walk(case, Tolerances(name, rtol, atol, case.budget))
+        walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
         if not walk.outcome.answered:
             return [float(VERDICTS.index("no reference")), NONE] * self.cells
         arrival = arrival_of("map", walk.record, natural_units(config))

@@ -82,10 +82,8 @@ def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     start = prepared(config, case)
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.terrain.order_matters:
         return ()
-    name, rtol, atol = REFERENCE
-    arrival = arrival_of(
-        case.name, start.walk(case, Tolerances(name, rtol, atol, case.budget)).record, natural_units(config)
-    )
+    walk = start.walk(case, Tolerances(*REFERENCE, case.budget)).record
+    arrival = arrival_of(case.name, walk, natural_units(config))
     if arrival.time_s == 0.0:
         return ()
     found = [library(arrival, start, name) for name in LIBRARY]
@@ -97,8 +95,7 @@ def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     start = prepared(config, case)
     if not isinstance(start, RigidStart) or start.compass is None:
         return ()
-    name, rtol, atol = RIGID_REFERENCE
-    walk = start.walk(case, Tolerances(name, rtol, atol, case.budget)).record
+    walk = start.walk(case, Tolerances(*RIGID_REFERENCE, case.budget)).record
     if not walk.steps:
         return ()
     units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
