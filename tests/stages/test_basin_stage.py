@@ -9,6 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.stages import basin
 from walkerlab.stages.basin_pieces import RigidQuestion, WalkEnds, unpacked
 from walkerlab.stages.graph import PIPELINE
@@ -55,7 +56,7 @@ def whole(tmp_path_factory):
 @pytest.fixture
 def in_bits(monkeypatch):
     """Many pieces instead of one."""
-    monkeypatch.setattr(RigidQuestion.__init__, "__defaults__", (50, 20, 0))
+    monkeypatch.setattr(RigidQuestion.__init__, "__defaults__", (50, 20, 0, (RTOL, ATOL)))
 
 
 def test_the_summary_counts_what_the_grid_shows(whole):
@@ -69,6 +70,12 @@ def test_the_summary_counts_what_the_grid_shows(whole):
     assert summary["attractors"][0]["state"] == pytest.approx(GAIT["state"], abs=1e-6)
     assert summary["held"] == {"dtheta_1": GAIT["state"][2]}
     assert 0.0 < summary["margin"] < 0.1
+    again = summary["numerical_error"]
+    assert (again["walked_again"], again["of"]) == (100, 16 * 12)
+    # of cells at edges the smallest error decides
+    assert again["ended_otherwise"] <= 5
+    ended = {row["outcome"]: row["walks"] for row in summary["endings"]}
+    assert ended == {name: many for name, many in summary["outcomes"].items() if name != "walked"}
 
 
 def test_cells_at_edges_are_shares_of_their_parts(whole):

@@ -13,7 +13,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import regions
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
-from walkerlab.stages.continuation_results import attractor_summary, first_doubling
+from walkerlab.stages.continuation_results import attractor_summary, ending_rows, first_doubling
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -59,6 +59,41 @@ def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_de
         assert 3.0 <= one["value"] <= 5.0
     for one in said["lyapunov"]:
         assert set(one) >= {"value", "exponent", "uncertainty"}
+
+
+def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
+    error = in_degrees.summary["numerical_error"]["rigid"]
+    assert (error["walked_again"], error["ended_otherwise"]) == (16, 0)
+    assert error["of"] == sum(branch["points"] for branch in in_degrees.summary["branches"])
+    # steps are integrated at 1e-13, of which a gait that is unstable makes more
+    assert 0.0 < error["step_period_s"] < 1e-11
+    assert 0.0 < error["step_length_m"] < 1e-11
+    assert error["by"] == "ten times tighter tolerances"
+
+
+def test_the_end_of_a_branch_that_the_walker_makes_is_told_in_words():
+    end = SimpleNamespace(value=5.0, reason="slid: the stance foot slides away")
+    branch = SimpleNamespace(period=1, ends=(SimpleNamespace(value=0.2, reason="end of the span"), end), crossings=())
+    followed = SimpleNamespace(model="contact", branches=(branch,))
+    (row,) = ending_rows(followed, SimpleNamespace(unit="deg"), config())
+    assert (row["model"], row["period"], row["value"], row["outcome"]) == ("contact", 1, 5.0, "slid")
+    assert row["said"].startswith(
+        "At 5 deg the contact model's gait of 1 step ends (slid: the stance foot slides away)."
+    )
+    assert "contact.static_friction" in row["said"]
+
+
+@pytest.mark.parametrize(("tripped", "side"), [((0.0, 1.0), "Above"), ((1.0, 0.0), "Below")])
+def test_pads_that_trip_a_gait_are_told_from_its_own_limits(tripped, side):
+    monitor = SimpleNamespace(name="tripped", limit=0.5)
+    points = [SimpleNamespace(value=value, monitors=[one]) for value, one in zip((4.0, 4.2), tripped, strict=True)]
+    crossing = SimpleNamespace(monitor=monitor, value=4.1)
+    branch = SimpleNamespace(period=1, ends=(), crossings=(crossing,), points=points)
+    step_map = SimpleNamespace(monitors=(monitor,))
+    followed = SimpleNamespace(model="contact", branches=(branch,), step_map=step_map)
+    (row,) = ending_rows(followed, SimpleNamespace(unit="deg"), config())
+    assert row["said"].startswith(f"{side} about 4.1 deg the contact model's gait of 1 step trips over pads")
+    assert "the pads end walks there, not the gait" in row["said"]
 
 
 def test_the_summary_has_where_the_gait_that_walks_first_doubles_its_period(in_degrees):

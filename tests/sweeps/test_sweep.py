@@ -15,6 +15,7 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.stages.numerical_error import SAMPLE
 from walkerlab.stages.plan import Planner
 from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
@@ -86,7 +87,7 @@ def plain(sentences):
 def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
     swept = toy.run("roll", "strides=1:40:40", sets=WALKED_AGAIN)
     again = np.isfinite(swept.content[""]["numerical_error.end_time_s"])
-    assert again.sum() == sweeps.SAMPLE
+    assert again.sum() == SAMPLE
     assert again[[0, -1]].all()
     assert np.diff(np.flatnonzero(again)).max() <= 3  # of forty points sixteen: one of two or three
     told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,6 +23,7 @@ from walkerlab.orbits.step_maps import (
     Monitor,
     difference_formula,
     no_step,
+    walk_steps,
 )
 from walkerlab.solvers.registry import Tolerances
 
@@ -67,7 +69,7 @@ class ContactMap:
         """
         self._at = lru_cache(REMEMBERED)(walker_at)
         self._near = lru_cache(REMEMBERED)(self._formula)
-        self._scale, self._tolerances, self._measure, self._on_pads = scale, tolerances, step_length_m, on_pads
+        self._scale, self.tolerances, self._measure, self._on_pads = scale, tolerances, step_length_m, on_pads
         self._units: Floats | None = None
         angled, turning = angled_bodies(like, STANCE_FOOT), turning_bodies(like, STANCE_FOOT)
         self._angles, self._rates = len(angled), len(turning)
@@ -94,7 +96,7 @@ class ContactMap:
         units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
         measure = terrain.stride_measure if terrain.has_pads else self._measure
         return step_from_section(
-            here.walker, JudgedGround(terrain, here.ground.frame), self._tolerances, z * units, measure
+            here.walker, JudgedGround(terrain, here.ground.frame), self.tolerances, z * units, measure
         )
 
     def _terrain(self, here: WalkerOnGround) -> Terrain:
@@ -144,6 +146,17 @@ class ContactMap:
                 on_pads = self._walk(here, z, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
+
+    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
+        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise."""
+        other = copy(self)
+        other.tolerances = tolerances
+        cycle = walk_steps(other, z, p, steps)
+        if cycle.outcome is not Outcome.WALKED:
+            return None
+        strikes = np.array([step.strike_s for step in cycle.steps])
+        waits = np.array([step.period_s for step in cycle.steps]) - strikes
+        return np.roll(waits, 1) + strikes, np.array([step.length_m for step in cycle.steps])
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """A walk from section to section, step by step."""

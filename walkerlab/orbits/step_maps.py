@@ -107,6 +107,13 @@ class StepMap(Protocol):
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """(monitors,) the worst of each over some steps."""
 
+    @property
+    def tolerances(self) -> Tolerances:
+        """Of its steps."""
+
+    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
+        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise; None: it fell."""
+
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
 
@@ -141,6 +148,7 @@ class RigidMap:
         Monitor("max_friction_ratio", "1", "largest ratio of tangential to normal force"),
         Monitor("max_scuff_depth_m", "m", "depth of the swing foot below the slope"),
     )
+    tolerances = TOLERANCES
 
     def __init__(self, walker_at: Callable[[float], Standing | None], scale: float, like: Standing) -> None:
         """A family of walkers.
@@ -216,6 +224,14 @@ class RigidMap:
                 taken.max_scuff_depth * units.length,
             ]
         )
+
+    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
+        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise."""
+        unit = self._unit_at(p)
+        assert unit is not None, "a gait was walked"
+        walker, units = unit
+        taken = take_walk(walker, tolerances, on_section(walker, z), steps)
+        return None if taken.steps < steps else (taken.periods * units.time, taken.lengths * units.length)
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """A walk, in one go; of ordinary accuracy, since errors grow on a chaotic attractor whatever they are."""

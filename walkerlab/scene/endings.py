@@ -83,15 +83,13 @@ def causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None
     if pads is not None:
         steps = "" if pads.step_m is None else f"; their last steps were {metres(pads.step_m)} long"
         told.append(f"The pads' pitch is {metres(pads.pitch_m)}{LAID.get(pads.laid, '')}{steps}.")
-    return [*told, f"Try {' or '.join(other_grounds(config))}."]
+    own = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
+    return [*told, f"Try {without_pads(config)}{own}."]
 
 
-def other_grounds(config: ContactConfig) -> list[str]:
-    """Grounds on which no pad ends a walk, and pads that fit the walk: legs with knees clear a plane."""
-    contact = config.contact
-    terrain = "plane" if isinstance(config.walker, Kneed) else "after-mid-swing"
-    own = contact is not None and contact.pad_pitch != "own"
-    return [f"contact.terrain={terrain}", *(["contact.pad_pitch=own"] if own else [])]
+def without_pads(config: ContactConfig) -> str:
+    """The setting for ground on which no pad ends a walk: legs with knees clear a plane."""
+    return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 
 def metres(lengths: Range) -> str:

@@ -35,12 +35,14 @@ from walkerlab.stages.basin_pieces import (
     edges_of,
     unpacked,
 )
+from walkerlab.stages.numerical_error import evenly_spread
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 from walkerlab.workers import in_order
 
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
+SAMPLE = 100  # cells that are walked again
 DRAWN = 4_000  # starts from which attractors are sought
 SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
 FAILED = NONE - 1  # class of a cell that does not walk
@@ -84,9 +86,18 @@ def run(
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
     said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
+    said["numerical_error"] = sample_again(question, window, found)
     said["endings"] = endings(said["outcomes"], config, config.basin.model == "contact", pads_of(question, config))
     said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
     return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
+
+
+def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[str, int]:
+    """Of some cells, evenly spread, how many end otherwise if they are walked again at tighter tolerances."""
+    cells = np.array(evenly_spread(window.size, SAMPLE))
+    again = question.tightened().walked(window.starts(cells))
+    otherwise = (again.outcome != found.outcome[cells]) | (again.attractor != found.attractor[cells])
+    return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
 
 
 class Stopwatch:

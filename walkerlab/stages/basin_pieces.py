@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.basin import NONE, Attractors, Walker, Window, arrivals, inside_cell
+from walkerlab.orbits.basin import ATOL, NONE, RTOL, Attractors, Walker, Window, arrivals, inside_cell
 from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.step_map import on_section
 from walkerlab.scene.contact import ContactScene, start_state
+from walkerlab.stages.numerical_error import tightened
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -57,11 +58,18 @@ class RigidQuestion:
     cells_at_once: int = 10_000
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # walks that take longer than starting another process
+    tolerances: tuple[float, float] = (RTOL, ATOL)
 
     def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
-        found = arrivals(self.walker, self.attractors, z * np.array(self.scale), self.steps)
+        scaled = z * np.array(self.scale)
+        found = arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
         return WalkEnds(found.outcome, found.attractor, found.steps)
+
+    def tightened(self) -> RigidQuestion:
+        """The same at a hundred times tighter tolerances."""
+        rtol, atol = self.tolerances
+        return replace(self, tolerances=(rtol / 100.0, atol / 100.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +94,10 @@ class ContactQuestion:
         walk = self.starts.walked_from(start_state(self.scene, state))
         settled = self.starts.settled_after(walk) if walk.outcome is Outcome.WALKED else None
         return (walk.outcome, NONE, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
+
+    def tightened(self) -> ContactQuestion:
+        """The same at a hundred times tighter tolerances."""
+        return replace(self, starts=replace(self.starts, tolerances=tightened(self.starts.tolerances)[0]))
 
 
 Question = RigidQuestion | ContactQuestion

@@ -17,6 +17,7 @@ from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.stages.numerical_error import evenly_spread
 from walkerlab.stages.simulate import trajectory_group
 from walkerlab.store.content import Group
 
@@ -35,14 +36,9 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
         if branch.period <= LONGEST
-        for place in spread(len(branch.points))
+        for place in evenly_spread(len(branch.points), MOST_OF_BRANCH)
         for group in motion(branch.points[place], branch.period, config, parameter)
     }
-
-
-def spread(count: int) -> list[int]:
-    """Places of at most so many points, both ends among them."""
-    return sorted({round(place) for place in np.linspace(0, count - 1, min(count, MOST_OF_BRANCH))})
 
 
 def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:

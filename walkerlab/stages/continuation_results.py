@@ -19,8 +19,9 @@ from walkerlab.orbits.bifurcations import Bifurcation
 from walkerlab.orbits.families import Crossing, GaitBranch, ends_at, steps_word, strike_to_strike
 from walkerlab.orbits.regions import Regions
 from walkerlab.orbits.step_maps import IteratedMap, Monitor, StepMap
-from walkerlab.scene.endings import WHAT, causes
+from walkerlab.scene.endings import WHAT, causes, without_pads
 from walkerlab.scene.parameter import Parameter
+from walkerlab.stages.numerical_error import OF_EACH_STEP, SAMPLE, USUAL, evenly_spread, tightened
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
 
@@ -62,6 +63,7 @@ def summary(
         "lyapunov": [{"model": one.model, **asdict(exponent)} for one in found for exponent in one.exponents],
         "cascades": [row for one in found for row in cascade_rows(one)],
         "limits": [row for one in found for row in limit_rows(one)],
+        "numerical_error": {one.model: error for one in found if (error := sample_again(one)) is not None},
         "endings": [row for one in found for row in ending_rows(one, parameter, config)],
         "attractors": [attractor_summary(one) for one in found if one.attractors.found],
         "curves": [row for one in found for row in curve_rows(one)],
@@ -127,6 +129,26 @@ def limit_rows(followed: Followed) -> Iterator[dict[str, Any]]:
             }
 
 
+def sample_again(followed: Followed) -> dict[str, Any] | None:
+    """What tighter tolerances change in the steps of some gaits, spread evenly over all branches; None without any."""
+    step_map, every = followed.step_map, [(branch, point) for branch in followed.branches for point in branch.points]
+    if step_map is None or not every:
+        return None
+    tighter, by = tightened(step_map.tolerances)
+    again = [
+        (point, step_map.timed(point.z, point.value, branch.period, tighter))
+        for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
+    ]
+    changes = [
+        (np.max(np.abs(found[0] - point.periods_s)), np.max(np.abs(found[1] - point.lengths_m)))
+        for point, found in again
+        if found is not None
+    ]
+    counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
+    largest = dict(zip(OF_EACH_STEP, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
+    return {**counts, **largest, **({} if by == USUAL else {"by": by})}
+
+
 def ending_rows(followed: Followed, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
     """What ends walks along the branches, and what the ground has to do with it, in words: `said`."""
     for branch in followed.branches:
@@ -140,8 +162,10 @@ def ending_rows(followed: Followed, parameter: Parameter, config: ContactConfig)
         for crossing in branch.crossings:
             if crossing.monitor.name == "tripped":
                 side = side_beyond(branch, crossing, followed.step_map)
-                said = f"{side} {crossing.value:.5g} {parameter.unit} {gait} trips over pads of its own step length."
-                said = " ".join([said, *causes("off-pad", config, contact=True)])
+                said = (
+                    f"{side} about {crossing.value:.2g} {parameter.unit} {gait} trips over pads of its own step "
+                    f"length: the pads end walks there, not the gait. Try {without_pads(config)}."
+                )
                 yield ending_row(followed.model, branch.period, crossing.value, "off-pad", said)
 
 

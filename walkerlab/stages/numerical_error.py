@@ -8,10 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 
 LEAST_RTOL: Final = 1e-14  # that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
+MORE_WORK: Final = 10  # that tighter tolerances may take
+SAMPLE: Final = 16  # of many walks, so many are taken again
 USUAL: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # of a tolerance that was divided
 OF_EACH_STEP: Final = {"step_period_s": "step_periods_s", "step_length_m": "step_lengths_m"}
@@ -35,7 +37,11 @@ def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tol
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Tolerances that err less and what sets them apart, in words: at the tightest that there are, another method."""
+    """Tolerances that err less, with room for the work that this takes, and what sets them apart, in words.
+
+    At the tightest that there are it is another method.
+    """
+    tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
         if rtol >= (1.0 - ROUNDING) * LEAST_RTOL:
@@ -56,3 +62,8 @@ def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     }
     changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
     return changes if by == USUAL else {**changes, "by": by}
+
+
+def evenly_spread(count: int, wanted: int) -> list[int]:
+    """Places of at most so many things among `count`, both ends among them."""
+    return sorted({round(place) for place in np.linspace(0, count - 1, min(count, wanted)).tolist()})

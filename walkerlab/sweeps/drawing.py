@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.figures.sweep import SweepFigure, choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.page import SweepPage, render_sweep
-from walkerlab.report.sections.walks import OF_ERROR, error_in_words
+from walkerlab.report.sections.walks import error_of_sample
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -87,12 +87,7 @@ def said_of(summary: Mapping[str, Any]) -> list[str]:
     """What a sweep says beside its numbers: what ended its walks, and how far their numbers are off."""
     ended = [str(one["said"]) for one in summary.get("endings", ())]
     error = summary.get("numerical_error")
-    if error is None:
-        return ended
-    ends = {key: error[key] for key in error if key in OF_ERROR}
-    largest = f"Largest numerical error: {error_in_words(ends)}" if ends else "Numerical errors are unknown"
-    otherwise = f", of which {error['ended_otherwise']} ended otherwise" if error["ended_otherwise"] else ""
-    return [*ended, f"{largest}; {error['walked_again']} of {error['of']} points were walked again{otherwise}."]
+    return ended if error is None else [*ended, error_of_sample(error, "points")]
 
 
 def spoken(values: Sequence[object]) -> str:

@@ -14,6 +14,7 @@ from walkerlab.config.loader import Template
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.stages.graph import PIPELINE, Graph
+from walkerlab.stages.numerical_error import SAMPLE, evenly_spread
 from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
@@ -39,8 +40,6 @@ from walkerlab.sweeps.question import Question
 from walkerlab.sweeps.result import Merge, question_slice, result_name, result_path
 
 PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
-SAMPLE = 16
-"""Points, evenly spread over a sweep, whose walks are taken a second time for their numerical error."""
 
 
 @dataclass(frozen=True)
@@ -248,8 +247,7 @@ class SweepRun:
 
     def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str], bool]]:
         """Of each point its config, its keys, and whether it is of the sample whose walks are taken again."""
-        every = np.sort(self.first)
-        sample = set(every[np.linspace(0, every.size - 1, min(SAMPLE, every.size)).round().astype(int)].tolist())
+        sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.points.config(index)
             yield config, self.points.keys(config), index in sample

@@ -15,6 +15,7 @@ from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Sec
 from walkerlab.report.numbers import count, number, quantity, whole
 from walkerlab.report.results import Results
 from walkerlab.report.sections.gaits import complex_number
+from walkerlab.report.sections.walks import error_of_sample
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.report.words import words
@@ -58,6 +59,8 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
         if one["lost_at"] is not None:
             said.append(words("families.lost", one, unit))
     said += [one["said"] for one in summary.get("endings", ()) if one["period"] == 1]
+    for model, error in summary.get("numerical_error", {}).items():
+        said.append(error_of_sample(error, f"gaits of the {model} model"))
     wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
     if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
         said.append(words("families.chaos", wild, unit))
@@ -217,8 +220,10 @@ def shares(summary: Mapping[str, Any]) -> Paragraph:
 
 
 def grounds(summary: Mapping[str, Any]) -> list[str]:
-    """What of the ground ended walks."""
-    return [str(one["said"]) for one in summary.get("endings", ()) if one["ground"]]
+    """What of the ground ended walks, and whether walks end alike at tighter tolerances."""
+    told = [str(one["said"]) for one in summary.get("endings", ()) if one["ground"]]
+    error = summary.get("numerical_error")
+    return told if error is None else [*told, error_of_sample(error, "starts")]
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

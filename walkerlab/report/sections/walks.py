@@ -168,6 +168,8 @@ def steps(results: Results) -> Section | None:
     return Section("steps", "Step by step", blocks, f"Steps take {listed(told)}.")
 
 
+USUAL = "a hundred times tighter tolerances"
+"""What the second walk has, unless `by` says otherwise."""
 NUMBERS_OF_STEPS = {"step_periods_s": "step_period_s", "step_lengths_m": "step_length_m"}
 """Numbers of each step, and under which key of `numerical_error` their error is."""
 OF_ERROR = {
@@ -190,7 +192,19 @@ def error_in_words(error: Mapping[str, Any]) -> str:
     if "reason" in error:
         return f"unknown: {error['reason']}"
     off = listed(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in OF_ERROR.items() if key in error)
-    return f"{off}, by a second walk with {error.get('by', 'a hundred times tighter tolerances')}"
+    return f"{off}, by a second walk with {error.get('by', USUAL)}"
+
+
+def error_of_sample(error: Mapping[str, Any], what: str) -> str:
+    """The largest numerical error of some of many walks, in a sentence; what: of which they are a sample."""
+    known = {key: error[key] for key in (*OF_ERROR, "by") if key in error}
+    again = f"{error['walked_again']} of {error['of']:,} {what} were walked again"
+    otherwise = f", of which {error['ended_otherwise']} ended otherwise" if error["ended_otherwise"] else ""
+    if known.keys() & OF_ERROR.keys():
+        return f"Largest numerical error: {error_in_words(known)}; {again}{otherwise}."
+    if error["ended_otherwise"] == error["walked_again"]:
+        return f"Numerical errors are unknown; {again}{otherwise}."
+    return f"{again} with {known.get('by', USUAL)}{otherwise or ', and ended alike'}."
 
 
 def errors(results: Results) -> str:
