@@ -1,10 +1,11 @@
 """Methods measured by hand, in the layout that `accuracy` stores."""
 
-import numpy as np
 from synthetic_maps import stability_maps
 from synthetic_walks import both_models, stored
 
-from walkerlab.store.content import Group, Variable
+from walkerlab.benchmarks.ladder import MethodRow
+from walkerlab.labels import labels_of
+from walkerlab.store.columns import rows_group
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
 # method, tolerance, outcome, error, run time s, right-hand sides
@@ -22,28 +23,12 @@ RUNS = (
 )
 
 
-def column(values, units="1"):
-    return Variable(np.array(values), ("row",), units, "number")
-
-
-def words(values):
-    return Variable(np.array(values, dtype=object), ("row",), "1", "text")
-
-
 def rows():
-    method, tolerance, outcome, error, wall, rhs = zip(*RUNS, strict=True)
-    return Group(
-        {
-            "row": column(range(len(RUNS))),
-            "method": words(method),
-            "outcome": words(outcome),
-            "tolerance": column(tolerance),
-            "reached": column([value is not None for value in error]),
-            "error": column([value or 0.0 for value in error]),
-            "wall_s": column(wall, "s"),
-            "rhs_evaluations": column(rhs),
-        }
-    )
+    made = [
+        MethodRow("rigid", method, tolerance, outcome, error, "dop853", False, wall_s, wall_s, 1, work, work, 0)
+        for method, tolerance, outcome, error, wall_s, work in RUNS
+    ]
+    return rows_group(made, labels_of(MethodRow))
 
 
 def measured(scenes=SCENES):

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from walkerlab.config.loader import load
+from walkerlab.labels import labels_of
+from walkerlab.paper.errata import Erratum
 from walkerlab.stages.walk_columns import legs, over_time
 from walkerlab.store.artifact import Stored
+from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
 
@@ -181,15 +184,7 @@ PAPER_ROWS = [
 
 
 def compare(rows=PAPER_ROWS):
-    errata = Group(
-        {
-            "where": texts(["A.5 row 2"], "row"),
-            "printed": texts(["plus"], "row"),
-            "right": texts(["minus"], "row"),
-            "evidence": texts(["Lagrange's equations"], "row"),
-            "measured": texts(["energy drifts by 0.13 J"], "row"),
-        }
-    )
+    found = Erratum("A.5 row 2", "plus", "minus", "Lagrange's equations", "energy drifts by 0.13 J")
     numbers = {"raw": 0.11, "aligned": 0.017, "per_leg": {"raw": [0.1, 0.11]}}
     summary = {
         "paper_numbers": rows,
@@ -199,7 +194,7 @@ def compare(rows=PAPER_ROWS):
         "max_velocity_error_rad_s": numbers,
         "orbit_distance": 0.014,
     }
-    return stored("compare", {"errata": errata}, summary)
+    return stored("compare", {"errata": rows_group([found], labels_of(Erratum))}, summary)
 
 
 EVERYTHING = {"fixedpoint": fixedpoint, "simulate": simulate, "contact-sim": contact_sim, "compare": compare}
