@@ -182,7 +182,7 @@ def test_a_walker_that_fell_says_so_before_one_that_walked():
         ("slid", {"slips_m": [0.001, -0.12]}, "−0.12 m"),
         ("off-pad", {"step_lengths_m": [0.36, 0.35]}, "30 mm behind"),
         ("no-heel-strike", {}, "3.19 s"),
-        ("budget-exhausted", {"rhs_evaluations": 4_000_000}, "4 000 000 right-hand sides"),
+        ("budget-exhausted", {"rhs_evaluations": 4_000_000}, "4,000,000 right-hand sides"),
         ("lifted-off", {"min_normal_force_N": -17.0}, "pull with 17 N"),
         ("rejected", {"step_periods_s": [], "step_lengths_m": [], "slips_m": []}, "2 of 4 steps"),
     ],
