@@ -92,6 +92,8 @@ def test_a_law_without_a_body_is_told_in_words_by_compiled_code(own):
 
 def test_every_word_of_the_config_is_a_law():
     assert set(FRICTION_LAWS) == set(get_args(Contact.model_fields["friction"].annotation))
+    for word in FRICTION_LAWS:
+        assert Contact(friction=word).has_friction == (friction_law(Contact(friction=word)).largest > 0.0)
 
 
 @pytest.mark.parametrize("word", FRICTION_LAWS)

@@ -168,6 +168,11 @@ class Contact(Block):
             raise PydanticCustomError("order", "must not exceed static_friction, {static}", {"static": f"{static:g}"})
         return value
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the ground holds feet back, by whatever law."""
+        return self.friction != "none"
+
     def in_si(self) -> ContactSI:
         """The force laws in SI units."""
         scale = MM_PER_M if self.units == "adams" else 1.0

@@ -66,8 +66,8 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
     """What the contact model's walk does without."""
     contact = config.contact
     found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
-    if contact is not None and contact.friction == "none":
-        saved = "4 of the 9 signals that a foot is watched by, and the friction law"
+    if contact is not None and not contact.has_friction:
+        saved = "4 of the 9 event functions that a foot is watched by, and the friction law"
         found.append(left_out("tangential velocity and friction force", "contact.friction is none", saved))
     if contact is not None and contact.stance == "pinned":
         what, why = "floating base and stance contact in the first step", "contact.stance is pinned: two angles suffice"

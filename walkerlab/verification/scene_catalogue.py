@@ -59,7 +59,7 @@ def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
     yield case("damping-over-100", "feet bounce", "ground", agreement=1e-3), on(damping=ground.damping / SOFTER)
     creep = {name: getattr(ground, name) / STICKIER for name in ("stiction_velocity", "friction_velocity")}
     yield case("creep-over-10", "friction that sticks the better", "ground"), on(**creep)
-    if ground.friction == "coulomb":
+    if ground.has_friction:
         smooth = case("friction-0", "without friction nothing holds the stance foot", "ground", STOPS)
         yield smooth, on(static_friction=0.0, dynamic_friction=0.0)
 

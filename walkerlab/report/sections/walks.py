@@ -116,7 +116,7 @@ def judged_assumptions(results: Results, summary: Mapping[str, Any]) -> list[tup
         ground = results.config.contact
         measured = "largest ratio of tangential to normal force: the friction coefficient it takes not to slip"
         verdict = Cell("needs friction", "fair")
-        if ground is not None and ground.friction != "none":
+        if ground is not None and ground.has_friction:
             verdict = HOLDS if ratio <= ground.static_friction else FAILS
         rows.append(("The stance foot does not slip", measured, number(ratio, 4), verdict))
     if (depth := summary.get("max_scuff_depth_m")) is not None:
