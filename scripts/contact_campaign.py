@@ -256,7 +256,7 @@ def of_plain(plain: plain_walk.Plain, walk: plain_walk.Walked) -> Quantities:
 
 def of_ours(plain: plain_walk.Plain, ground: Any, walk: ContactWalkResult) -> Quantities:
     """What is compared of ours; the energy is the plain formula's."""
-    times = np.concatenate((walk.touch_time_s, walk.knee_strike_s, [walk.end_time_s]))
+    times = np.concatenate((walk.touch_time_s, walk.knee_strikes_s, [walk.end_time_s]))
     lost = walk.dissipated_J[: len(plain_walk.CHANNELS)]
     energy = plain_walk.energy(plain, plain_walk.of_centre(plain, np.array(walk.end_state)), ground)
     found = (times, walk.touch_along_m, walk.slip_m, walk.rolling_m, lost, np.array([energy]))

@@ -42,7 +42,7 @@ def last_step(config: Config, steps: int) -> tuple[float, float]:
     walk = scene.walk(start_state(scene, gait.state), steps, Tolerances("radau5", RTOL, ATOL, BUDGET))
     if walk.touch_time_s.size < steps or walk.touch_time_s.size < 2:
         raise SystemExit(f"{walk.outcome.label} after {walk.touch_time_s.size} of {steps} steps: nothing to compare")
-    return float(walk.periods_s[-1]), float(walk.knee_strike_s[-1] - walk.touch_time_s[-2])
+    return float(walk.periods_s[-1]), float(walk.knee_strike_time_s[-1] - walk.touch_time_s[-2])
 
 
 def rows(file: str, steps: int) -> Iterator[list[str]]:

@@ -21,7 +21,7 @@ walker = assembled(RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED
 start = (-0.20420, 0.16940, -0.605819, -0.861041)
 walk = take_walk(walker, Tolerances("dop853", 1e-10, 1e-12, 10**6), start, 10, True)
 with h5py.File(sys.argv[1], "w") as file:
-    file["heel_strikes"] = walk.heel_strikes
+    file["heel_strikes"] = walk.touch_time_s
     file["final_state"] = walk.final_state
 """
 

@@ -85,7 +85,7 @@ def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
     stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
     answer = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run()
     assert answer.outcome == "walked"
-    assert truth.knee_strike_s[0] < until < truth.touch_time_s[0]
+    assert truth.knee_strike_time_s[0] < until < truth.touch_time_s[0]
     shank, thigh = (scene.assembly.index(body) for body in ("shank 1", "thigh 1"))
     assert answer.end[2 + shank] == answer.end[2 + thigh]
     assert answer.end == pytest.approx(truth.samples.states[1], abs=2e-5)

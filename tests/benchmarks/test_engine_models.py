@@ -90,9 +90,9 @@ def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
     result, rules, changes = knees_seen(kneed())
     # the swing knee locks, the trailing one is released and locks in turn
     assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
-    assert changes[0][0] == pytest.approx(result.knee_strike_s[0], abs=1e-4)
+    assert changes[0][0] == pytest.approx(result.knee_strike_time_s[0], abs=1e-4)
     assert 0.0 < changes[1][0] - result.touch_time_s[0] < 2e-3
-    assert changes[2][0] == pytest.approx(result.knee_strike_s[1], abs=1e-4)
+    assert changes[2][0] == pytest.approx(result.knee_strike_time_s[1], abs=1e-4)
     # the ground stops the foot, at about 2000 m/s^2 from 0.4 m/s, within the step that the cubic spans
     assert rules.walk_state.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
 

@@ -62,7 +62,7 @@ def test_released_by_compression_it_walks_twenty_steps_near_the_rigid_gait():
     walk = walked(steps=20)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=0.01)
-    assert walk.knee_strike_s[0] == pytest.approx(KNEE_STRIKE, abs=5e-3)
+    assert walk.knee_strike_time_s[0] == pytest.approx(KNEE_STRIKE, abs=5e-3)
     assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
 
 
@@ -86,7 +86,7 @@ def test_a_plain_integration_locks_releases_and_touches_at_the_same_times(rules,
     np.testing.assert_allclose(walk.touch_time_s, other.times, atol=1e-6)
     np.testing.assert_allclose(walk.touch_along_m, other.places, atol=1e-6)
     np.testing.assert_allclose(walk.slip_m, other.slips, atol=1e-6)
-    np.testing.assert_allclose(walk.knee_strike_s, other.locks, atol=1e-6)
+    np.testing.assert_allclose(walk.knee_strike_time_s, other.locks, atol=1e-6)
     # that time apart at the fastest body's few rad/s
     np.testing.assert_allclose(walk.end_state[2:6], other.end[2:6], atol=5e-6)
 
@@ -193,7 +193,7 @@ def test_a_library_walks_it_with_as_few_bodies():
     walk = scene.walk(start, 2, Tolerances("scipy-radau", 1e-6, 1e-8, 10**6), 0.01)
     ours = walked(steps=2)
     np.testing.assert_allclose(walk.touch_time_s, ours.touch_time_s, atol=1e-5)
-    np.testing.assert_allclose(walk.knee_strike_s, ours.knee_strike_s, atol=1e-5)
+    np.testing.assert_allclose(walk.knee_strike_time_s, ours.knee_strike_time_s, atol=1e-5)
     assert walk.energy_balance_residual_J < 1e-4 * exchanged(walk)
 
 
@@ -214,7 +214,7 @@ def test_a_stop_comes_to_the_ideal_lock_with_the_root_of_its_stiffness():
     ideal, stiffnesses = walked(steps=3), (1e3, 1e5, 1e7)
     laws = [NormalLaw(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
     stopped = [walked(steps=3, rules=KneeRules(law)) for law in laws]
-    for times in ("knee_strike_s", "touch_time_s"):
+    for times in ("knee_strike_time_s", "touch_time_s"):
         apart = [np.abs(getattr(walk, times) - getattr(ideal, times)).max() for walk in stopped]
         orders = -np.diff(np.log(apart)) / np.diff(np.log(stiffnesses))
         assert orders == pytest.approx([0.5, 0.5], abs=0.05)

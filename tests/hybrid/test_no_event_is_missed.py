@@ -96,7 +96,7 @@ def test_a_knee_strikes_at_its_time_at_any_tolerance():
     start = (*RIGID_ANGLES, *RIGID_RATES)
 
     def strike(rtol):
-        return take_walk(walker, Tolerances("dop853", rtol, 1e-2 * rtol, 10_000), start, 1).knee_strikes[0]
+        return take_walk(walker, Tolerances("dop853", rtol, 1e-2 * rtol, 10_000), start, 1).knee_strike_time_s[0]
 
     exact, tolerances = strike(1e-13), np.geomspace(1e-12, 1e-7, 101)
     late = np.array([strike(float(rtol)) - exact for rtol in tolerances])

@@ -57,7 +57,7 @@ def test_random_starts_fare_as_they_do_one_by_one(walker):
         walk = take_walk(assembled(walker), tolerances, tuple(start), STEPS)
         walked = walk.steps == STEPS  # a ground that would have to pull does not end a rigid walk
         assert (fates.outcome[i], fates.steps[i]) == (0 if walked else walk.outcome, walk.steps)
-        assert strikes.times[i, : walk.steps] == pytest.approx(walk.heel_strikes, abs=1e-6 * time)
+        assert strikes.times[i, : walk.steps] == pytest.approx(walk.touch_time_s, abs=1e-6 * time)
     assert {Outcome.FELL, Outcome.REJECTED} <= set(fates.outcome.tolist())
 
 

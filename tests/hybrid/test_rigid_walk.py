@@ -65,7 +65,7 @@ def test_ten_steps_end_where_the_reference_does(rtol, error):
     walk = walked(ONE_DEGREE, start_of(ONE_DEGREE), 10, rtol)
     assert walk.outcome is Outcome.WALKED
     assert walk.final_state == pytest.approx(TENTH_STATE, abs=error)
-    assert walk.heel_strikes[-1] == pytest.approx(TENTH_TIME, abs=10 * error)
+    assert walk.touch_time_s[-1] == pytest.approx(TENTH_TIME, abs=10 * error)
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if not method.compiled])
@@ -106,11 +106,11 @@ def test_a_step_is_the_one_scipy_takes(walker):
     start = start_of(walker)
     time, before, motion = one_step_by_scipy(walker, start)
     walk = walked(walker, start, 1, 1e-12, sampled=True)
-    assert walk.heel_strikes[0] == pytest.approx(time, abs=1e-10)
+    assert walk.touch_time_s[0] == pytest.approx(time, abs=1e-10)
     assert walk.before[0] == pytest.approx(before, abs=1e-10)
     assert walk.after[0] == pytest.approx(impact(walker, *before), abs=1e-10)
-    inside = walk.samples.time < walk.heel_strikes[0]
-    assert walk.samples.state[inside] == pytest.approx(motion(walk.samples.time[inside]).T, abs=1e-10)
+    inside = walk.samples.time_s < walk.touch_time_s[0]
+    assert walk.samples.state[inside] == pytest.approx(motion(walk.samples.time_s[inside]).T, abs=1e-10)
 
 
 def test_mirrored_walker_walks_down_to_the_left():
@@ -124,7 +124,7 @@ def test_mirrored_walker_walks_down_to_the_left():
     start = [-value for value in start_of(ONE_DEGREE)]
     mirrored = swing_by_scipy(walker, start, feet)
     walk = walked(ONE_DEGREE, start_of(ONE_DEGREE), 1, 1e-12)
-    assert mirrored.t_events[0][0] == pytest.approx(walk.heel_strikes[0], abs=1e-10)
+    assert mirrored.t_events[0][0] == pytest.approx(walk.touch_time_s[0], abs=1e-10)
     assert -np.array(impact(walker, *mirrored.y_events[0][0])) == pytest.approx(walk.after[0], abs=1e-10)
 
 
@@ -141,7 +141,7 @@ def test_energy_drifts_within_a_swing_as_printed():
 def test_mean_energy_is_the_time_mean_of_the_samples():
     walk = walked(PAPER._replace(c21_sign=AS_PRINTED), start_of(PAPER), 4, 1e-10, sampled=True)
     energy = energies(PAPER, walk.samples.state).sum(axis=1)
-    mean = np.trapezoid(energy, walk.samples.time) / walk.samples.time[-1]
+    mean = np.trapezoid(energy, walk.samples.time_s) / walk.samples.time_s[-1]
     # the trapezoidal rule's own error at 64 samples a unit of time
     assert walk.mean_energy == pytest.approx(mean, rel=1e-6)
 
@@ -181,11 +181,11 @@ def test_measures_along_a_walk_are_those_of_each_state():
 def test_samples_rise_and_hold_both_sides_of_every_heel_strike():
     steps = STEPS_AT_ONCE + 3
     walk = walked(PAPER, GAIT, steps, sampled=True)
-    time, state = walk.samples.time, walk.samples.state
+    time, state = walk.samples.time_s, walk.samples.state
     assert (np.diff(time) > 0.0).all()
     assert time[0] == 0.0
     assert tuple(state[0]) == GAIT
-    for strike, before, after in zip(walk.heel_strikes, walk.before, walk.after, strict=True):
+    for strike, before, after in zip(walk.touch_time_s, walk.before, walk.after, strict=True):
         at = np.searchsorted(time, strike)
         assert time[at] == strike
         assert (state[at] == after).all()
@@ -203,7 +203,7 @@ def test_a_walk_in_pieces_is_the_walk_as_a_whole():
     first = walked(PAPER, start_of(PAPER), STEPS_AT_ONCE, 1e-12)
     second = walked(PAPER, first.final_state, 3, 1e-12)
     assert whole.final_state == pytest.approx(second.final_state, abs=1e-11)
-    assert whole.heel_strikes[-1] == pytest.approx(first.heel_strikes[-1] + second.heel_strikes[-1], abs=1e-10)
+    assert whole.touch_time_s[-1] == pytest.approx(first.touch_time_s[-1] + second.touch_time_s[-1], abs=1e-10)
 
 
 def test_a_stable_walk_settles_on_the_gait():

@@ -69,7 +69,7 @@ def test_the_knee_strikes_when_the_published_one_does():
     newton(shooting, z, 1e-13)
     walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), on_section(model, z), 3, sampled=True)
     assert walk.outcome is Outcome.WALKED
-    assert walk.knee_strikes[0] == pytest.approx(0.348612, abs=1e-6)
+    assert walk.knee_strike_time_s[0] == pytest.approx(0.348612, abs=1e-6)
     assert walk.energy_drift < 1e-10
     knee = walk.samples.state[:, 2] - walk.samples.state[:, 0]
     assert knee[walk.samples.bent].min() < -0.1

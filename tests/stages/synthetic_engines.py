@@ -6,6 +6,7 @@ from walkerlab.benchmarks.engines.experiments import Truth
 from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.walk_record import WalkWork
 from walkerlab.stages import engines
 from walkerlab.stages.engines import EngineFindings
 
@@ -63,8 +64,8 @@ def truth():
         energy_balance_residual_J=0.0,
         explained_residual_J=0.0,
         dissipated_J=np.zeros(5),
-        knee_strike_s=np.zeros(0),
-        work=np.zeros(4, np.int64),
+        knee_strike_time_s=None,
+        work=WalkWork(0, 0, 0, 0),
         samples=None,
     )
     return Truth(2.0, np.zeros(8), times[:2], 2e-12, walk)

@@ -10,10 +10,12 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.walk_record import WalkRecord, WalkWork
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.walk_columns import numbers_of_steps, of_steps
+from walkerlab.stages.walk_columns import numbers_of, of_steps
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 from walkerlab.store.key import Identity
@@ -182,8 +184,10 @@ def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
 def test_a_knee_that_does_not_lock_is_a_gap():
     kneed = of_steps([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
     np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
-    told = numbers_of_steps(*np.array([[0.7, 1.4], [0.7, 0.7], [0.3, 0.3], [0.5, np.nan]]))
-    assert told["knee_strike_times_s"] == [0.5, None]
+    times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])
+    walk = WalkRecord(Outcome.WALKED, times, along, strikes, 1.4, WalkWork(0, 0, 0, 0))
+    assert numbers_of(walk)["knee_strike_times_s"] == [0.5, None]
+    assert walk.knee_strikes_s.tolist() == [0.5]
 
 
 def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):

@@ -58,9 +58,10 @@ from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
 from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.walk_record import WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.solvers.registry import Tolerances, finder_for, sharing
-from walkerlab.solvers.stepping import RHS, T
+from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -123,23 +124,17 @@ class ContactSamples:
     dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
 
 
-@dataclass(frozen=True)
-class ContactWalkResult:
-    """A walk on compliant ground, its fate and its cost."""
+@dataclass(frozen=True, eq=False)
+class ContactWalkResult(WalkRecord):
+    """A walk on compliant ground."""
 
-    outcome: Outcome
-    touch_time_s: Floats  # (steps,)
-    touch_along_m: Floats  # (steps,)
     slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
     rolling_m: Floats  # likewise, how far the stance foot rolled
-    end_time_s: float
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
     explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
-    knee_strike_s: Floats  # (steps,) when the knee of each step's swing leg locked; of straight legs, none
-    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     samples: ContactSamples | None
 
     @property
@@ -152,16 +147,6 @@ class ContactWalkResult:
             f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; tighten "
             "solver.contact.rtol or choose another solver.contact.method. If neither helps, the program is at fault."
         )
-
-    @property
-    def periods_s(self) -> Floats:
-        """Time of each step from touch to touch."""
-        return np.diff(self.touch_time_s, prepend=0.0)
-
-    @property
-    def lengths_m(self) -> Floats:
-        """Distance along the slope of each step from touch to touch; the first from the first foothold."""
-        return np.diff(self.touch_along_m, prepend=0.0)
 
 
 def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
@@ -437,19 +422,21 @@ def gather(
             observer.knees[:seen],
             observer.sampled_dissipation[:seen],
         )
+    strikes = walk_state.knee_strike[:done]
+    known = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
-        stopped.outcome,
-        walk_state.touch_time[:done],
-        walk_state.touch_along[:done],
-        walk_state.slip[:lifted],
-        walk_state.rolling[:lifted],
-        stopped.time_s,
-        stopped.state,
-        float(observer.extremes[MAX_PENETRATION]),
-        float(observer.extremes[RESIDUAL]),
-        explained_residual(observer, tolerances),
-        observer.dissipated.copy(),
-        walk_state.knee_strike[:done] if walker.kneed else np.zeros(0),
-        stopped.work,
-        samples,
+        outcome=stopped.outcome,
+        touch_time_s=walk_state.touch_time[:done],
+        touch_along_m=walk_state.touch_along[:done],
+        knee_strike_time_s=known if walker.kneed else None,
+        end_time_s=stopped.time_s,
+        work=WalkWork(*(int(stopped.work[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+        slip_m=walk_state.slip[:lifted],
+        rolling_m=walk_state.rolling[:lifted],
+        end_state=stopped.state,
+        max_penetration_m=float(observer.extremes[MAX_PENETRATION]),
+        energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
+        explained_residual_J=explained_residual(observer, tolerances),
+        dissipated_J=observer.dissipated.copy(),
+        samples=samples,
     )

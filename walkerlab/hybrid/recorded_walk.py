@@ -6,7 +6,7 @@ Long walks are taken a few dozen steps at a time, so that memory is needed for r
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,11 @@ from walkerlab.hybrid.rigid_observer import (
     observe_start,
 )
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
+from walkerlab.hybrid.walk_record import Array, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, Mode, Standing, linked, rolled_distance, swing_foot
 from walkerlab.solvers.registry import Tolerances, finder_for
-from walkerlab.solvers.stepping import ACCEPTED, BUDGET, REJECTED, RHS, clear_counts
+from walkerlab.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
 from walkerlab.solvers.system import State
 
 STEPS_AT_ONCE = 64
@@ -36,57 +37,30 @@ BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is n
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
-Array = NDArray[np.float64]
-
-
-class WalkWork(NamedTuple):
-    """What a walk cost."""
-
-    rhs_evaluations: int
-    accepted: int
-    rejected: int
-
 
 @dataclass(frozen=True, eq=False)
 class Samples:
     """A walk in time: a regular grid, and both sides of every heel strike."""
 
-    time: Array  # (samples,) s, strictly rising; the state before a heel strike is one rounding earlier than after
+    time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
     step: NDArray[np.int64]  # (samples,) from 0
     bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedWalk:
-    """How a walk of the rigid model went, SI units."""
+class RigidWalkResult(WalkRecord):
+    """A walk of the rigid model."""
 
-    outcome: Outcome
     start: State
-    heel_strikes: Array  # (steps,) s
-    before: Array  # (steps, 2 n) states just before the heel strikes
+    before: Array  # (steps, 2 n) states just before the touches
     after: Array  # (steps, 2 n) just after, roles changed
-    periods: Array  # (steps,) s
-    lengths: Array  # (steps,) m, from touch to touch
-    knee_strikes: Array | None  # (steps,) s; None for legs without knees
     min_normal_force: float  # N, of the ground on the stance foot
     max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
     max_scuff_depth: float  # m, of the swing foot below the slope
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean, from the stance foot
-    end_time: float  # s
     samples: Samples | None
-    work: WalkWork
-
-    @property
-    def steps(self) -> int:
-        """Steps taken."""
-        return int(self.heel_strikes.size)
-
-    @property
-    def touch_along(self) -> Array:
-        """Where the feet came down (steps,), in m along the slope from the first foothold."""
-        return np.cumsum(self.lengths)
 
     @property
     def final_state(self) -> State:
@@ -106,7 +80,7 @@ def take_walk(
     steps: int,
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
-) -> RecordedWalk:
+) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends.
 
     tolerances  how to integrate; no step is given more right-hand sides than any step needs
@@ -215,7 +189,7 @@ class Recorder:
         self.energy_integral += float(observer.energy[INTEGRAL])
         self.duration += float(observer.energy[DURATION])
 
-    def finished(self, outcome: Outcome) -> RecordedWalk:
+    def finished(self, outcome: Outcome) -> RigidWalkResult:
         """All that was seen."""
         end_time = self.time if outcome == Outcome.WALKED else self.duration
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
@@ -223,23 +197,22 @@ class Recorder:
         no_states = np.zeros((0, self.numbers))
         strikes = np.concatenate((np.zeros(0), *self.strikes))
         before, after = np.concatenate((no_states, *self.before)), np.concatenate((no_states, *self.after))
-        return RecordedWalk(
+        return RigidWalkResult(
             outcome=outcome,
+            touch_time_s=strikes,
+            touch_along_m=np.cumsum(step_lengths(self.walker, self.start, before, after)),
+            knee_strike_time_s=np.concatenate((np.zeros(0), *self.knees)) if self.kneed else None,
+            end_time_s=end_time,
+            work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
             start=self.start,
-            heel_strikes=strikes,
             before=before,
             after=after,
-            periods=np.diff(strikes, prepend=0.0),
-            lengths=step_lengths(self.walker, self.start, before, after),
-            knee_strikes=np.concatenate((np.zeros(0), *self.knees)) if self.kneed else None,
             min_normal_force=float(self.extremes[MIN_NORMAL_FORCE]),
             max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
             max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
-            end_time=end_time,
             samples=joined(self.pieces) if self.pieces else None,
-            work=WalkWork(int(self.counts[RHS]), int(self.counts[ACCEPTED]), int(self.counts[REJECTED])),
         )
 
 
@@ -271,7 +244,7 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
 
 def joined(pieces: list[Samples]) -> Samples:
     """One record of several that follow each other."""
-    time = np.concatenate([piece.time for piece in pieces])
+    time = np.concatenate([piece.time_s for piece in pieces])
     state = np.concatenate([piece.state for piece in pieces])
     step, bent = np.concatenate([piece.step for piece in pieces]), np.concatenate([piece.bent for piece in pieces])
     return Samples(time, state, step, bent)

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.recorded_walk import Array, RecordedWalk, Samples
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
+from walkerlab.hybrid.walk_record import Array
 from walkerlab.kernels import kernel
 from walkerlab.mechanics import standing
 from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, SWING, Mode, Standing, ground_reaction
@@ -54,14 +55,14 @@ class Places:
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
 
 
-def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RecordedWalk, samples: Samples) -> Places:
+def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
     """Where the walker's points are.
 
     knee_m  the knee in its thigh's frame; None without knees
     """
     n = len(walker.arm_x)
     psi = samples.state[:, :n] + walker.slope
-    touches = np.append(0.0, walk.touch_along)[samples.step]
+    touches = np.append(0.0, walk.touch_along_m)[samples.step]
     set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
     contact = touches - walker.radius * (samples.state[:, STANCE] - set_down)
     centre = np.column_stack((contact, np.full_like(contact, walker.radius)))

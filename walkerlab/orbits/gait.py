@@ -66,8 +66,8 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Vector, 
     rate, n = 1.0 / units.time, len(start) // 2
     return Gait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
-        period=float(step.periods[0]) * units.time,
-        step_length=float(step.lengths[0]) * units.length,
+        period=float(step.periods_s[0]) * units.time,
+        step_length=float(step.lengths_m[0]) * units.length,
         multipliers=tuple(values),
         residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
         energy=step.mean_energy * units.energy,
@@ -76,5 +76,5 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Vector, 
         max_friction_ratio=step.max_friction_ratio or None,
         max_scuff_depth=step.max_scuff_depth * units.length,
         trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
-        knee_strike=None if step.knee_strikes is None else float(step.knee_strikes[0]) * units.time,
+        knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )

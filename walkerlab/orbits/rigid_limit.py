@@ -175,8 +175,8 @@ class Limit:
         if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         angle, velocity = motion_of_legs(walk.samples.states, walker)
-        strikes = walk.knee_strike_s[walk.knee_strike_s > 0.0]
-        motion = sampled_at_strikes(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, strikes))
+        seen = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
+        motion = sampled_at_strikes(seen)
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases)
         smooth = between_impacts(motion, self.rigid.motion, phases)

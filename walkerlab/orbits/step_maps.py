@@ -231,7 +231,7 @@ class RigidMap:
         assert unit is not None, "a gait was walked"
         walker, units = unit
         taken = take_walk(walker, tolerances, on_section(walker, z), steps)
-        return None if taken.steps < steps else (taken.periods * units.time, taken.lengths * units.length)
+        return None if taken.steps < steps else (taken.periods_s * units.time, taken.lengths_m * units.length)
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """A walk, in one go; of ordinary accuracy, since errors grow on a chaotic attractor whatever they are."""

@@ -12,7 +12,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
@@ -94,7 +94,7 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
         energy=float(energies(walker, start).sum()),
         weight=float(walker.mass * walker.gravity),
         normal_force=float(reactions(walker, start)[0, 1]),
-        pull_from=first_below_zero(walk.samples.time, reactions(walker, walk.samples.state)[:, 1]),
+        pull_from=first_below_zero(walk.samples.time_s, reactions(walker, walk.samples.state)[:, 1]),
         heel_strikes=walk.steps,
         end=walk.outcome.label,
         end_time=end_time(walker, walk),
@@ -123,10 +123,10 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
     )
 
 
-def end_time(walker: Standing, walk: RecordedWalk) -> float:
+def end_time(walker: Standing, walk: RigidWalkResult) -> float:
     """When a sampled walk ends (s): a fall lies behind the last sample, and is found by inverse interpolation."""
     assert walk.samples is not None
-    time, hip = walk.samples.time, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
+    time, hip = walk.samples.time_s, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
     if walk.outcome is not Outcome.FELL:
         return float(time[-1])
     return float(np.polynomial.Polynomial.fit(hip[-FALLING:], time[-FALLING:], FALLING - 1)(0.0))

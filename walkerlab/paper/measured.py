@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.config.contact import Contact
 from walkerlab.hybrid.comparison import Array
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.hybrid.rigid_measures import energies
 from walkerlab.paper.appendix_a import RigidWalker, assembled, step_length
 from walkerlab.solvers.registry import ENDLESS, Tolerances
@@ -94,12 +94,12 @@ class RigidModel:
     energy_drift: float
 
 
-def five_cycles(walker: RigidWalker, start: State) -> RecordedWalk:
+def five_cycles(walker: RigidWalker, start: State) -> RigidWalkResult:
     """Ten steps of the rigid model with samples in time."""
     return take_walk(assembled(walker), TIGHT, start, 2 * CYCLES, sampled=True)
 
 
-def energy_record(walker: RigidWalker, walk: RecordedWalk) -> Array:
+def energy_record(walker: RigidWalker, walk: RigidWalkResult) -> Array:
     """Energy (samples,) in J along a sampled walk, from the current stance foot."""
     if walk.samples is None:
         raise ValueError("the walk was not sampled")
@@ -114,7 +114,7 @@ def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
         state=state,
         steps=walk.steps,
         step_length=step_length(walker, state[0], state[1]),
-        table_3=characteristics(walk.periods, walk.lengths, walk.mean_energy),
+        table_3=characteristics(walk.periods_s, walk.lengths_m, walk.mean_energy),
         energy_least=float(energy.min()),
         energy_most=float(energy.max()),
         energy_drift=walk.energy_drift,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.paper import measured, printed
 from walkerlab.paper.adams_start import AdamsStart, adams_start
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
@@ -92,7 +92,7 @@ def study_the_paper() -> PaperStudy:
         slope_rounding=rounding,
         as_printed=measured.rigid_model(wrong, gaits["as-printed"]),
         corrected=measured.rigid_model(right, gaits["corrected"]),
-        from_x_p=measured.characteristics(cycles.periods, cycles.lengths, cycles.mean_energy),
+        from_x_p=measured.characteristics(cycles.periods_s, cycles.lengths_m, cycles.mean_energy),
         five_steps_energy=five_steps.mean_energy,
         fastest=fastest_leg(one_step),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
@@ -113,13 +113,13 @@ def settled(walker: RigidWalker) -> State:
     return walk.final_state
 
 
-def fastest_leg(walk: RecordedWalk) -> float:
+def fastest_leg(walk: RigidWalkResult) -> float:
     """Largest angular velocity (rad/s) of a sampled walk."""
     assert walk.samples is not None
     return float(np.abs(walk.samples.state[:, 2:]).max())
 
 
-def misprinted_impact(walker: RigidWalker, one_step: RecordedWalk) -> Impact:
+def misprinted_impact(walker: RigidWalker, one_step: RigidWalkResult) -> Impact:
     """What (A.55) as printed does to the gait whose step is given."""
     theta_1, theta_2 = printed.fixed_point_as_printed()[:2]
     return Impact(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
 from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
@@ -42,10 +42,15 @@ class RigidScene:
         return self.states or self.energies or self.forces
 
     def walk(
-        self, start: State, steps: int, tolerances: Tolerances, advance: Callable[[int], None] | None = None
-    ) -> RecordedWalk:
-        """Walk up to `steps` steps from a state (2 n), sampled if anything in time is wanted; see `take_walk`."""
-        return take_walk(self.walker, tolerances, start, steps, self.sampled, advance)
+        self,
+        start: State,
+        steps: int,
+        tolerances: Tolerances,
+        sampled: bool = False,
+        advance: Callable[[int], None] | None = None,
+    ) -> RigidWalkResult:
+        """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
+        return take_walk(self.walker, tolerances, start, steps, sampled and self.sampled, advance)
 
 
 def rigid_scene(config: SimulateConfig) -> RigidScene:

@@ -6,6 +6,7 @@ the impact, released at first touch it is free.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -58,7 +59,7 @@ def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str
     """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
     model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
     walk = take_walk(model, RIGID, state, RIGID_STEPS)
-    last = {} if not walk.steps else {"period_s": float(walk.periods[-1]), "length_m": float(walk.lengths[-1])}
+    last = {} if not walk.steps else {"period_s": float(walk.periods_s[-1]), "length_m": float(walk.lengths_m[-1])}
     return {"outcome": walk.outcome.label, "steps": walk.steps, "of": RIGID_STEPS, **last}
 
 
@@ -70,10 +71,10 @@ def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResu
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
-    steps = int(walk.touch_time_s.size)
-    if steps == 0:
+    steps = walk.steps
+    if steps == 0 or walk.knee_strike_time_s is None:
         return {"outcome": walk.outcome.label, "steps": 0, "of": STEPS, **NO_STEP}
-    period, strike = float(walk.periods_s[-1]), float(walk.knee_strike_s[-1])
+    period, strike = float(walk.periods_s[-1]), float(walk.knee_strike_time_s[-1])
     lost = by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,
@@ -81,7 +82,7 @@ def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
         "of": STEPS,
         "period_s": period,
         "length_m": float(walk.lengths_m[-1]),
-        "knee_strike_s": strike - (float(walk.touch_time_s[-1]) - period) if strike >= 0.0 else None,
+        "knee_strike_s": strike - (float(walk.touch_time_s[-1]) - period) if not math.isnan(strike) else None,
         "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()},
     }
 

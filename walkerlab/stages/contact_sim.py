@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,10 +32,9 @@ from walkerlab.scene.contact import (
 )
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.thinning import thinned
-from walkerlab.stages.walk_columns import TIME, legs, numbers_of_steps, of_body, of_steps, over_time
+from walkerlab.stages.walk import content_of_walk
+from walkerlab.stages.walk_columns import TIME, legs, numbers_of, of_body, over_time, steps_of
 from walkerlab.store.content import Content, Group, Variable
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
@@ -61,26 +60,15 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
     interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     tell_unresolved_slip(settings.atol, scene, progress)
-    progress.start("contact-sim", 1)
-    result = scene.walk(start, steps, tolerances, interval)
-    progress.advance()
-    if result.samples is not None:
-        samples = thinned(result.samples, result.samples.time_s, result.touch_time_s, progress)
-        result = replace(result, samples=samples)
-    stored, said = groups(config, scene, result), summary(config, scene, result)
-    if not result.outcome.answered:
-        raise NoAnswer(
-            f"contact-sim: {result.outcome.label} after {result.touch_time_s.size} steps, {result.end_time_s:.4g} s",
-            said["advice"],
-            partial=Content(stored, said),
-        )
-    if again:
-        progress.start("contact-sim: numerical error", 1)
-        said["numerical_error"] = numerical_error(
-            said, tolerances, lambda tighter: summary(config, scene, scene.walk(start, steps, tighter))
-        )
+
+    def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
+        progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
+        taken = scene.walk(start, steps, tolerances, interval if sampled else None)
         progress.advance()
-    return Content(stored, said)
+        return taken
+
+    stored, said = partial(groups, config, scene), partial(summary, config, scene)
+    return content_of_walk("contact-sim", walk, tolerances, stored, said, progress, again)
 
 
 def compile_kernels(config: ContactSimConfig) -> None:
@@ -137,10 +125,8 @@ def own_pitch(config: ContactConfig, rigid_step: float, rigid_state: tuple[float
 def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Any]:
     """What the command prints."""
     return {
-        "outcome": result.outcome.label,
+        **numbers_of(result),
         "advice": advice(config, scene, result),
-        **numbers_of_steps(result.touch_time_s, result.periods_s, result.lengths_m, knee_strikes(scene, result)),
-        "end_time_s": result.end_time_s,
         "max_penetration_m": result.max_penetration_m,
         "slip_per_step_m": mean_of(result.slip_m),
         "slips_m": result.slip_m.tolist(),
@@ -148,11 +134,8 @@ def summary(config: ContactSimConfig, scene: ContactScene, result: ContactWalkRe
         "rolling_m": result.rolling_m.tolist(),
         "energy_balance_residual_J": result.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, result.dissipated_J),
-        **({"knee_strikes_s": result.knee_strike_s.tolist()} if result.knee_strike_s.size else {}),  # until 0.3
-        "rhs_evaluations": int(result.work[0]),
-        "accepted_steps": int(result.work[1]),
-        "rejected_steps": int(result.work[2]),
-        "jacobians": int(result.work[3]),
+        **strikes_until_0_3(result),
+        "jacobians": result.work.jacobians,
         "slope_rad": scene.walker.slope,
         **scene_measures(scene),
         "left_out": list(of_contact_walk(config)),
@@ -172,36 +155,22 @@ def mean_of(values: Floats) -> float | None:
     return float(np.mean(values)) if values.size else None
 
 
-def knee_strikes(scene: ContactScene, result: ContactWalkResult) -> Floats | None:
-    """When the swing leg's knee locked in each step (s), nan where it did not; None without knees."""
-    if not scene.walker.kneed:
-        return None
-    return np.where(result.knee_strike_s < 0.0, np.nan, result.knee_strike_s)
+def strikes_until_0_3(result: ContactWalkResult) -> dict[str, Any]:
+    """The older name of the knees' strikes, -1 where a knee did not lock."""
+    times = result.knee_strike_time_s
+    return {} if times is None or times.size == 0 else {"knee_strikes_s": np.nan_to_num(times, nan=-1.0).tolist()}
 
 
 def groups(config: ContactSimConfig, scene: ContactScene, result: ContactWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
-    stored = {"steps": steps_group(scene, result)} if result.touch_time_s.size else {}
+    stored: dict[str, Group] = {}
+    if result.steps:
+        stored["steps"] = Group(steps_of(result, slip_m=result.slip_m, rolling_m=result.rolling_m))
     if scene.terrain.has_pads:
         stored["terrain"] = pads_group(scene.terrain, result)
     if result.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, result.samples)
     return stored
-
-
-def steps_group(scene: ContactScene, result: ContactWalkResult) -> Group:
-    """One row a step."""
-    return Group(
-        of_steps(
-            result.touch_time_s,
-            period_s=result.periods_s,
-            length_m=result.lengths_m,
-            touch_along_m=result.touch_along_m,
-            knee_strike_time_s=knee_strikes(scene, result),
-            slip_m=result.slip_m,
-            rolling_m=result.rolling_m,
-        )
-    )
 
 
 def pads_group(terrain: Terrain, result: ContactWalkResult) -> Group:

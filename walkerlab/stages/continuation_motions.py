@@ -63,5 +63,5 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
 def thinned(samples: Samples) -> Samples:
     """Every third sample, and both sides of every heel strike."""
     changes = np.flatnonzero(np.diff(samples.step))
-    kept = np.unique(np.concatenate((np.arange(0, samples.time.size, EVERY), changes, changes + 1)))
-    return Samples(samples.time[kept], samples.state[kept], samples.step[kept], samples.bent[kept])
+    kept = np.unique(np.concatenate((np.arange(0, samples.time_s.size, EVERY), changes, changes + 1)))
+    return Samples(samples.time_s[kept], samples.state[kept], samples.step[kept], samples.bent[kept])

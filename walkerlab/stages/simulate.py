@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from walkerlab.config.reads import SimulateConfig, StartConfig
-from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.recorded_walk import RecordedWalk, Samples, as_state
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples, as_state
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
 from walkerlab.mechanics.standing import STANCE
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
-from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.thinning import thinned
-from walkerlab.stages.walk_columns import COORDINATE, STEP, TIME, legs, numbers_of_steps, of_body, of_steps, over_time
+from walkerlab.stages.walk import content_of_walk
+from walkerlab.stages.walk_columns import COORDINATE, STEP, TIME, legs, numbers_of, of_body, over_time, steps_of
 from walkerlab.store.content import Content, Group, Variable
 
 
@@ -30,23 +29,13 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     """
     scene = rigid_scene(config)
     start, steps = start_state(config, inputs), 2 * config.strides
-    progress.start("simulate", steps)
-    walk = scene.walk(start, steps, scene.tolerances, progress.advance)
-    if walk.samples is not None:
-        walk = replace(walk, samples=thinned(walk.samples, walk.samples.time, walk.heel_strikes, progress))
-    stored, said = groups(scene, walk), summary(config, walk)
-    if not walk.outcome.answered:
-        why = f"simulate: {walk.outcome.label} after {walk.steps} steps"
-        raise NoAnswer(why, walk.outcome.advice, Content(stored, said))
-    if again:
-        progress.start("simulate: numerical error", steps)
-        unsampled = replace(scene, states=False, energies=False, forces=False)
-        said["numerical_error"] = numerical_error(
-            said,
-            scene.tolerances,
-            lambda tighter: summary(config, unsampled.walk(start, steps, tighter, progress.advance)),
-        )
-    return Content(stored, said)
+
+    def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
+        progress.start("simulate" if sampled else "simulate: numerical error", steps)
+        return scene.walk(start, steps, tolerances, sampled, progress.advance)
+
+    of_scene, of_config = partial(groups, scene), partial(summary, config)
+    return content_of_walk("simulate", walk, scene.tolerances, of_scene, of_config, progress, again)
 
 
 def start_state(config: StartConfig, inputs: Mapping[str, Content]) -> State:
@@ -55,13 +44,10 @@ def start_state(config: StartConfig, inputs: Mapping[str, Content]) -> State:
     return as_state(given)
 
 
-def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
+def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
     """What the command prints."""
     return {
-        "outcome": walk.outcome.label,
-        "advice": walk.outcome.advice,
-        **numbers_of_steps(walk.heel_strikes, walk.periods, walk.lengths, walk.knee_strikes),
-        "end_time_s": walk.end_time,
+        **numbers_of(walk),
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,
@@ -69,34 +55,27 @@ def summary(config: SimulateConfig, walk: RecordedWalk) -> dict[str, Any]:
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio or None,
         "max_scuff_depth_m": walk.max_scuff_depth,
-        "rhs_evaluations": walk.work.rhs_evaluations,
-        "accepted_steps": walk.work.accepted,
-        "rejected_steps": walk.work.rejected,
         "equations": config.equations,
         "slope_rad": config.slope_rad,
         "left_out": list(of_rigid_walk(config)),
     }
 
 
-def groups(scene: RigidScene, walk: RecordedWalk) -> dict[str, Group]:
+def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored = {}
     if walk.steps:
         stored["steps"] = steps_group(scene, walk)
-    if walk.samples is not None and walk.samples.time.size:
+    if walk.samples is not None and walk.samples.time_s.size:
         stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
     return stored
 
 
-def steps_group(scene: RigidScene, walk: RecordedWalk) -> Group:
+def steps_group(scene: RigidScene, walk: RigidWalkResult) -> Group:
     """One row a step."""
     set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
-    columns = of_steps(
-        walk.heel_strikes,
-        period_s=walk.periods,
-        length_m=walk.lengths,
-        touch_along_m=walk.touch_along,
-        knee_strike_time_s=walk.knee_strikes,
+    columns = steps_of(
+        walk,
         rolling_m=scene.walker.radius * (set_down - walk.before[:, STANCE]),
         state_before=walk.before,
         state_after=walk.after,
@@ -105,12 +84,12 @@ def steps_group(scene: RigidScene, walk: RecordedWalk) -> Group:
     return Group({**columns, COORDINATE: names})
 
 
-def trajectory_group(scene: RigidScene, walk: RecordedWalk, samples: Samples) -> Group:
+def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
     """Samples of the walk, both sides of each heel strike among them: what `outputs` asks for."""
     # leg 0 swings in even steps, leg 1 in odd ones
     stance = 1 - samples.step % 2
     variables = {
-        **over_time(time=samples.time, stance_leg=stance),
+        **over_time(time=samples.time_s, stance_leg=stance),
         **legs(),
         STEP: Variable(samples.step, (TIME,), "1", "step number"),
     }
@@ -156,7 +135,7 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
     return found
 
 
-def place_variables(scene: RigidScene, walk: RecordedWalk, samples: Samples, stance: Any) -> dict[str, Variable]:
+def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Where hip, knees and feet are, along the slope from the first foothold and over it."""
     at = places(scene.walker, scene.knee_m, walk, samples)
     ground = np.zeros_like(at.contact)

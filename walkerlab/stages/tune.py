@@ -13,7 +13,7 @@ from walkerlab.config.reads import ContactConfig, TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.contact_run import ContactWalkResult
-from walkerlab.hybrid.recorded_walk import RecordedWalk, take_walk, with_scaled_rates
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.orbits.rigid_limit import motion_of_legs
@@ -63,7 +63,7 @@ class Procedure:
     """
 
     rigid_state: State
-    rigid: RecordedWalk
+    rigid: RigidWalkResult
     hinged: ContactWalkResult | None
     released: ContactWalkResult
     adjusted: ContactWalkResult | None
@@ -250,6 +250,6 @@ class TuneRun:
         )
         return {"numerical_error": error}
 
-    def rigid_walk(self) -> RecordedWalk:
+    def rigid_walk(self) -> RigidWalkResult:
         """The rigid model from its start, with samples."""
         return take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True)

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
-from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait
 from walkerlab.orbits.rigid_limit import (
@@ -94,7 +92,7 @@ def limit_findings(
     scene: ContactScene,
     gait: ContactGait,
     rigid_gait: Mapping[str, Any],
-    walk: RecordedWalk,
+    walk: RigidWalkResult,
     progress: Progress,
 ) -> LimitFindings | None:
     """Lead the contact towards the rigid limit; None if the rigid start's walk has no samples or no step.
@@ -105,10 +103,9 @@ def limit_findings(
     if walk.samples is None or walk.steps == 0:
         return None
     legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
-    strikes = np.zeros(0) if walk.knee_strikes is None else walk.knee_strikes
-    motion = sampled_at_strikes(
-        Motion(walk.samples.time, legs["angle"].values, legs["velocity"].values, walk.heel_strikes, strikes)
-    )
+    angle, velocity = legs["angle"].values, legs["velocity"].values
+    seen = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
+    motion = sampled_at_strikes(seen)
     limit = Limit(
         scene.ground,
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),

@@ -10,7 +10,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
 from walkerlab.orbits.contact_section import ContactGait, angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
@@ -283,13 +283,13 @@ def walk_group(walk: ContactWalkResult, walker: ContactWalker) -> Group | None:
     return Group({**legs_in_time(walk.samples, walker), **of_steps(walk.touch_time_s)})
 
 
-def rigid_group(walk: RecordedWalk) -> Group | None:
+def rigid_group(walk: RigidWalkResult) -> Group | None:
     """The same of the rigid model from its start."""
     samples = walk.samples
-    if samples is None or samples.time.size == 0:
+    if samples is None or samples.time_s.size == 0:
         return None
-    in_time = {**legs(), **over_time(time=samples.time), **leg_variables(samples, 1 - samples.step % 2)}
-    return Group({**in_time, **of_steps(walk.heel_strikes)})
+    in_time = {**legs(), **over_time(time=samples.time_s), **leg_variables(samples, 1 - samples.step % 2)}
+    return Group({**in_time, **of_steps(walk.touch_time_s)})
 
 
 def legs_in_time(samples: ContactSamples, walker: ContactWalker) -> dict[str, Variable]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from walkerlab.hybrid.walk_record import WalkRecord
 from walkerlab.labels import Label
 from walkerlab.store.columns import labelled, numbered
 from walkerlab.store.content import Variable
@@ -88,19 +89,32 @@ def of_step(name: str, values: ArrayLike, count: int) -> Variable:
     return labelled(found, OF_STEPS[name], STEP, gaps=gaps)
 
 
-def numbers_of_steps(
-    touch_time_s: NDArray[Any], period_s: NDArray[Any], length_m: NDArray[Any], knee_strike_s: NDArray[Any] | None
-) -> dict[str, Any]:
-    """What `--json` says of the steps of either model.
+def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
+    """The steps of a walk as columns: what both models know of them, and what one of them adds."""
+    return of_steps(
+        walk.touch_time_s,
+        period_s=walk.periods_s,
+        length_m=walk.lengths_m,
+        touch_along_m=walk.touch_along_m,
+        knee_strike_time_s=walk.knee_strike_time_s,
+        **values,
+    )
 
-    knee_strike_s  (steps,), nan where the knee did not lock; None without knees
-    """
-    told = {
-        "steps": int(touch_time_s.size),
-        "step_periods_s": period_s.tolist(),
-        "step_lengths_m": length_m.tolist(),
-        "touch_times_s": touch_time_s.tolist(),
+
+def numbers_of(walk: WalkRecord) -> dict[str, Any]:
+    """What `--json` says of a walk of either model; of legs without knees it says nothing about knees."""
+    strikes = [] if walk.knee_strike_time_s is None else walk.knee_strike_time_s.tolist()
+    known = [None if np.isnan(time) else time for time in strikes]
+    return {
+        "outcome": walk.outcome.label,
+        "advice": walk.advice,
+        "steps": walk.steps,
+        "step_periods_s": walk.periods_s.tolist(),
+        "step_lengths_m": walk.lengths_m.tolist(),
+        "touch_times_s": walk.touch_time_s.tolist(),
+        **({} if walk.knee_strike_time_s is None else {"knee_strike_times_s": known}),
+        "end_time_s": walk.end_time_s,
+        "rhs_evaluations": walk.work.rhs_evaluations,
+        "accepted_steps": walk.work.accepted,
+        "rejected_steps": walk.work.rejected,
     }
-    if knee_strike_s is None:
-        return told
-    return {**told, "knee_strike_times_s": [None if np.isnan(time) else time for time in knee_strike_s.tolist()]}

@@ -24,7 +24,7 @@ from walkerlab.config.walkers import is_plain_compass
 from walkerlab.ground.on_pads import OnPads
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactWalkResult
-from walkerlab.hybrid.recorded_walk import RecordedWalk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
@@ -99,7 +99,7 @@ def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     if not walk.steps:
         return ()
     units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
-    arrival = Arrival(case.name, float(walk.heel_strikes[-1]), np.array(walk.final_state), units)
+    arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
     return tuple(script(arrival, start.compass, walk, name) for name in LIBRARY)
 
 
@@ -149,7 +149,7 @@ def in_silence() -> Iterator[None]:
         yield
 
 
-def script(arrival: Arrival, compass: RigidWalker, walk: RecordedWalk, method: str) -> Choice:
+def script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
     """A method of SciPy's solve_ivp with nothing but its name given, its event function at every heel strike."""
     began = time.perf_counter()
     y, count = None, CAP

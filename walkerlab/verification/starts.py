@@ -14,7 +14,7 @@ from walkerlab.config.schema import SolverSettings
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import RecordedWalk, as_state, take_walk
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gait import Gait
@@ -91,13 +91,13 @@ class RigidStart:
     def walk(self, case: Case, tolerances: Tolerances) -> JudgedWalk:
         """Walk a case by a method."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
-        numbers = np.concatenate([walk.heel_strikes, walk.before.ravel(), walk.after.ravel()])
-        touches, cost = walk.heel_strikes / pendulum_time(self.config), (walk.work.rhs_evaluations, walk.work.accepted)
+        numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
+        touches, cost = walk.touch_time_s / pendulum_time(self.config), (walk.work.rhs_evaluations, walk.work.accepted)
         return JudgedWalk(walk.outcome, touches, None, walk.energy_drift, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
         """What heel strikes must keep."""
-        record: RecordedWalk = walk.record
+        record: RigidWalkResult = walk.record
         if not record.steps:
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)

@@ -1,0 +1,58 @@
+"""What is known of a walk, whichever model took it."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+
+Array = NDArray[np.float64]
+
+
+class WalkWork(NamedTuple):
+    """What a walk cost, in the order in which methods count it."""
+
+    rhs_evaluations: int
+    accepted: int
+    rejected: int
+    jacobians: int
+
+
+@dataclass(frozen=True, eq=False)
+class WalkRecord:
+    """How a walk went: its steps, its fate and its cost, SI units. A step ends as the swing foot touches the ground."""
+
+    outcome: Outcome
+    touch_time_s: Array  # (steps,)
+    touch_along_m: Array  # (steps,) along the slope from the first foothold
+    knee_strike_time_s: Array | None  # (steps,) when the swing leg's knee locked, nan if it did not; None without knees
+    end_time_s: float  # of the walk, which may end after the last touch
+    work: WalkWork
+
+    @property
+    def advice(self) -> str:
+        """What the outcome means and what to try next."""
+        return self.outcome.advice
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+        return int(self.touch_time_s.size)
+
+    @property
+    def periods_s(self) -> Array:
+        """Time of each step from touch to touch, (steps,)."""
+        return np.diff(self.touch_time_s, prepend=0.0)
+
+    @property
+    def lengths_m(self) -> Array:
+        """Distance along the slope of each step from touch to touch, (steps,); the first from the first foothold."""
+        return np.diff(self.touch_along_m, prepend=0.0)
+
+    @property
+    def knee_strikes_s(self) -> Array:
+        """When knees locked, (strikes,)."""
+        times = self.knee_strike_time_s
+        return np.zeros(0) if times is None else times[~np.isnan(times)]
