@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import Any
 
-from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.identity import Identities
 from walkerlab.stages.plan import why_unsuited
 from walkerlab.stages.progress import Progress, Silent
+from walkerlab.stages.task import task_of
 from walkerlab.store.content import Content
 
 REMEMBERED = 256
@@ -126,15 +124,10 @@ class InMemory:
 
     @staticmethod
     def _computed(stage: Stage, config: Config, results: dict[str, Content], progress: Progress, again: bool) -> Answer:
-        run = importlib.import_module(stage.module).run
         inputs = {name: results[name] for name in stage.inputs(config)}
-        extra: dict[str, Any] = {"jobs": 1} if stage.has_cells else {}
-        if stage.walks_again:
-            extra["again"] = again
-        if stage.keeps_parts:
-            extra["parts"] = PartsInMemory()
+        task = task_of(stage, config, inputs, jobs=1, parts=PartsInMemory(), again=again)
         try:
-            return Answer(run(only(config, stage.takes_under(config)), inputs, progress, **extra))
+            return Answer(task.run(progress))
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             return Answer(partial, error)

@@ -309,13 +309,19 @@ class Execution:
         assert identity is not None, "a stage that is left out does not run"
         if step.damaged and step.origin is None:
             self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
-        if stage.keeps_parts and self.planner.force:
-            Parts(self.folder.parts(stage.name), identity.key).forget()
+        parts = Parts(self.folder.parts(stage.name), identity.key)
+        if self.planner.force:
+            parts.forget()
         inputs = self.planner.inputs(stage)
         digests = {name: input_digest(stage, result) for name, result in inputs.items()}
-        absent = self.planner.missing_inputs(stage)
         task = task_of(
-            stage, self.planner.config, inputs, self.folder, jobs=self.jobs, key=identity.key, left_out=absent
+            stage,
+            self.planner.config,
+            inputs,
+            jobs=self.jobs,
+            parts=parts,
+            folder=self.folder.path,
+            left_out=self.planner.missing_inputs(stage),
         )
         number = self.of - len(self.left) + 1 + len(self.running)
         of = max(self.of, number)
@@ -357,7 +363,7 @@ class Execution:
                 continue
             absent = [entry for entry in self.planner.missing_inputs(stage) if entry.what not in pending]
             absent += [LeftOut(one.name, STILL_COMPUTED) for one in stages if one.name in pending]
-            task = task_of(stage, self.planner.config, inputs, self.folder, jobs=1, key="", left_out=tuple(absent))
+            task = task_of(stage, self.planner.config, inputs, folder=self.folder.path, left_out=tuple(absent))
             self.reporter.drawn(task.run(Silent()).summary, self.folder.path)
 
     def _suits(self, name: str) -> bool:

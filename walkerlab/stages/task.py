@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 from collections.abc import Mapping
@@ -11,14 +12,10 @@ from typing import Any
 from walkerlab import kernel_cache
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
-from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import Stage
 from walkerlab.stages.progress import Progress
-from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
-from walkerlab.store.parts import Parts
-from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import tell
 
 
@@ -26,38 +23,47 @@ from walkerlab.workers import tell
 class StageTask:
     """A stage with all that it is given.
 
-    config    what it takes of the config
-    inputs    the results that it gets
-    jobs      processes for independent cells, None if it has none
-    key       of its result, if it keeps parts of it; parts of another key are not used
-    left_out  the results that it has to do without, if it draws
+    config  what it takes of the config
+    inputs  the results that it gets
+    given   what else it asks for, by the names of its parameters
     """
 
     name: str
     module: str
     config: Any
-    inputs: Mapping[str, Stored]
-    folder: RunFolder
-    jobs: int | None = None
-    key: str | None = None
-    left_out: tuple[LeftOut, ...] | None = None
+    inputs: Mapping[str, Content]
+    given: Mapping[str, Any]
 
     def run(self, progress: Progress) -> Content:
         """Call the stage's `run` with what it declared and nothing else."""
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(self.module).run
-        extra: dict[str, Any] = {} if self.jobs is None else {"jobs": self.jobs}
-        if self.key is not None:
-            extra["parts"] = Parts(self.folder.parts(self.name), self.key)
-        if self.left_out is not None:
-            extra |= {"folder": self.folder.path, "left_out": self.left_out}
-            with drawing_into(self.folder.path):
-                content = run(self.config, self.inputs, progress, **extra)
-        else:
-            content = run(self.config, self.inputs, progress, **extra)
+        folder = self.given.get("folder")
+        with contextlib.nullcontext() if folder is None else drawing_into(folder):
+            content = run(self.config, self.inputs, progress, **self.given)
         if not isinstance(content, Content):
             raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
         return content
+
+
+def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
+    """The task of a stage; of what is offered it is given what it asks for.
+
+    jobs      processes for independent cells
+    parts     of its result, kept from a run that was cut off
+    again     whether walks are taken a second time for their numerical error
+    folder    of its run, which it draws into
+    left_out  the results that it has to do without as it draws
+    """
+    asked = {
+        "jobs": stage.has_cells,
+        "parts": stage.keeps_parts,
+        "again": stage.walks_again,
+        "folder": stage.draws,
+        "left_out": stage.draws,
+    }
+    given = {name: value for name, value in offered.items() if asked[name]}
+    return StageTask(stage.name, stage.module, only(config, stage.takes_under(config)), inputs, given)
 
 
 class PipeReporter:
@@ -86,29 +92,6 @@ def run_in_worker(task: StageTask) -> Content:
     importlib.import_module(task.module)
     with kernel_cache.watched(reporter.compiling):
         return task.run(reporter)
-
-
-def task_of(
-    stage: Stage,
-    config: Config,
-    inputs: Mapping[str, Stored],
-    folder: RunFolder,
-    *,
-    jobs: int,
-    key: str,
-    left_out: tuple[LeftOut, ...],
-) -> StageTask:
-    """The task of a stage; it is given of the rest what it asks for."""
-    return StageTask(
-        stage.name,
-        stage.module,
-        only(config, stage.takes_under(config)),
-        inputs,
-        folder,
-        jobs if stage.has_cells else None,
-        key if stage.keeps_parts else None,
-        left_out if stage.draws else None,
-    )
 
 
 def nothing_compiled_yet() -> bool:
