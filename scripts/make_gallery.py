@@ -48,20 +48,17 @@ def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
         "said": said,
         "slope_rad": walk.summary["slope_rad"],
         "meta": shown.meta,
-        "floats": shown.floats,
+        "floats": shown.track.packed(),
         "track": track,
     }
 
 
 def walker(name: str, track: Track, strikes: Sequence[float]) -> Walker:
     """A gait as the player moves it."""
-    thin = track.thinned(1.0 / SAMPLES_A_SECOND)
     return Walker(
         name=name,
         style="rigid",
-        channels=tuple(thin.channels),
-        samples=int(thin["t"].size),
-        floats=thin.packed(),
+        track=track.thinned(1.0 / SAMPLES_A_SECOND),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, list(strikes)),
     )
