@@ -50,7 +50,7 @@ from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
 from walkerlab.stages.accuracy import OFF_THE_GAIT
 from walkerlab.stages.continuation import FamilyQuestion, contact_branches, rigid_branches
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.runner import execute
+from walkerlab.stages.runner import Options, execute
 from walkerlab.stages.tune import MAP_RTOL
 from walkerlab.store.runfolder import RunFolder
 
@@ -281,7 +281,7 @@ def basin_line(work: str, bar: float, *sets: str) -> Line:
         loaded = load(None, ["slope_deg=1", *sets])
         place = RunFolder(Path(folder), loaded.run_name)
         execute(loaded.config, "fixedpoint", place)
-        report = execute(loaded.config, "basin", place, jobs=2)
+        report = execute(loaded.config, "basin", place, Options(jobs=2))
     line = at_most(f"{work}, two processes", report.wall_s, "s", bar, bar / 2.0)
     peer = peer_walks_per_s(loaded.config, report.summary)
     rates = f"{report.summary['trajectories_per_s']:.3g} walks/s (SciPy, one process: {peer:.3g})"

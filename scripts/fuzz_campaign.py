@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.errors import WalkerlabError
-from walkerlab.stages.runner import execute
+from walkerlab.stages.runner import Options, execute
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 
@@ -212,7 +212,7 @@ def fate_of(path: Path, runs: Path, number: int) -> str:
     config = found.config.model_copy(update={"strides": min(found.config.strides, 5)})
     on_ground = config.contact is not None and number % WALKED_ON_GROUND == 0
     stage = "contact-sim" if on_ground else "simulate"
-    report = execute(config, stage, RunFolder(runs, found.run_name), force=True)
+    report = execute(config, stage, RunFolder(runs, found.run_name), Options(force=True))
     return f"accepted, {stage} walked" if report.no_answer is None else f"accepted, {stage} has no answer, told"
 
 
