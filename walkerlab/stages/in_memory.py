@@ -69,7 +69,7 @@ class Keys:
 
 
 @dataclass(frozen=True)
-class Answer:
+class StageAnswer:
     """What a stage said: its content, which is partial if there is no answer and `no_answer` says why."""
 
     content: Content
@@ -83,7 +83,7 @@ class InMemory:
         """Nothing is computed yet."""
         self.graph = graph
         self.remembered = remembered
-        self._inputs: OrderedDict[tuple[str, bool], Answer] = OrderedDict()
+        self._inputs: OrderedDict[tuple[str, bool], StageAnswer] = OrderedDict()
 
     def answer(
         self,
@@ -93,7 +93,7 @@ class InMemory:
         progress: Progress | None = None,
         *,
         again: bool = True,
-    ) -> Answer:
+    ) -> StageAnswer:
         """The answer of a stage under a config, as the stage gives it when it is run.
 
         keys   of the stage and what it needs, from `Keys.of`
@@ -107,13 +107,13 @@ class InMemory:
             found = self._remembered(stage, config, results, progress, (keys[stage.name], again and stage.walks_again))
             if found.no_answer is not None:
                 said = NoAnswer(f"it needs {stage.name}: {found.no_answer.message}", found.no_answer.advice)
-                return Answer(Content(), said)
+                return StageAnswer(Content(), said)
             results[stage.name] = found.content
         raise AssertionError("a stage needs itself")
 
     def _remembered(
         self, stage: Stage, config: Config, results: dict[str, Content], progress: Progress, key: tuple[str, bool]
-    ) -> Answer:
+    ) -> StageAnswer:
         if key in self._inputs:
             self._inputs.move_to_end(key)
             return self._inputs[key]
@@ -123,11 +123,13 @@ class InMemory:
         return answer
 
     @staticmethod
-    def _computed(stage: Stage, config: Config, results: dict[str, Content], progress: Progress, again: bool) -> Answer:
+    def _computed(
+        stage: Stage, config: Config, results: dict[str, Content], progress: Progress, again: bool
+    ) -> StageAnswer:
         inputs = {name: results[name] for name in stage.inputs(config)}
         task = task_of(stage, config, inputs, jobs=1, parts=PartsInMemory(), again=again)
         try:
-            return Answer(task.run(progress))
+            return StageAnswer(task.run(progress))
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
-            return Answer(partial, error)
+            return StageAnswer(partial, error)
