@@ -61,10 +61,7 @@ def from_lagrange(coordinates, foot):
 def printed_swing():
     d = theta_2 - theta_1
     D = sp.Matrix(
-        [
-            [m * b**2, -m * L * b * sp.cos(d)],
-            [-m * L * b * sp.cos(d), M_H * L**2 + m * (L**2 + a**2)],
-        ]
+        [[m * b**2, -m * L * b * sp.cos(d)], [-m * L * b * sp.cos(d), M_H * L**2 + m * (L**2 + a**2)]]
     )  # (A.4)
     C = sp.Matrix([[0, m * L * b * w_2 * sp.sin(d)], [m * L * b * w_1 * sp.sin(d), 0]])  # (A.5)
     G = sp.Matrix([m * g * b * sp.sin(theta_1), -(M_H * L + m * (a + L)) * g * sp.sin(theta_2)])  # (A.6)

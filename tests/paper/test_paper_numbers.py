@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 from walkerlab.config.schema import Contact
 from walkerlab.mechanics.standing import BENT, Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
-from walkerlab.paper.judged import NumberVerdict, agreement, weigh
 from walkerlab.paper.measured import (
     Characteristics,
     ContactModel,
@@ -38,7 +37,7 @@ from walkerlab.paper.printed import (
     slope_of,
     walker_of_the_paper,
 )
-from walkerlab.paper.rows import paper_rows
+from walkerlab.paper.rows import NumberVerdict, paper_rows, weigh
 from walkerlab.paper.study import study_the_paper
 from walkerlab.solvers.scipy_methods import right_hand_side
 
@@ -74,7 +73,7 @@ def test_comparisons_in_words_are_read_as_their_number():
     ],
 )
 def test_agreement_goes_by_the_printed_digits(text, value, found):
-    assert agreement(printed(text), value) == found
+    assert printed(text).agreement(value) == found
 
 
 def test_nothing_is_refuted_by_another_scene():
@@ -165,7 +164,7 @@ def test_every_number_of_tables_and_of_eq_11_has_a_row(rows):
 def test_x_p_is_reproduced_by_the_equations_as_printed(rows):
     for entry in X_P:
         assert rows()[entry].verdict == NumberVerdict.REPRODUCED
-        assert agreement(entry, rows()[entry].as_printed)
+        assert entry.agreement(rows()[entry].as_printed)
 
 
 def test_step_periods_that_differ_are_refuted(rows):

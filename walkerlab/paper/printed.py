@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from typing import Final
 
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker
@@ -35,6 +35,16 @@ class Printed:
         """Worth of its last digit."""
         exponent = number(self.text).as_tuple().exponent
         return 10.0 ** int(exponent)
+
+    def agreement(self, value: float | None) -> str:
+        """How a value agrees with it to its digits: 'rounded', 'cut off', or '' if it does not."""
+        if value is None:
+            return ""
+        expected, found = number(self.text), Decimal(repr(float(value)))
+        last = Decimal(1).scaleb(int(expected.as_tuple().exponent))
+        if found.quantize(last, ROUND_HALF_UP) == expected:
+            return "rounded"
+        return "cut off" if found.quantize(last, ROUND_DOWN) == expected else ""
 
 
 WORDS: Final = {"one": "1", "five": "5", "zero": "0"}

@@ -2,19 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 
 from walkerlab.paper import printed
 from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
-from walkerlab.paper.judged import JudgedNumber, NumberVerdict, agreement, judged, regardless, weigh
 from walkerlab.paper.measured import CYCLES, Measured
+from walkerlab.paper.printed import Printed
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
-REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
 STEPS_OF_A_STRIDE = 2
 AROUND = 2.0  # 'around 1e-4' is up to twice that
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
+
+
+class NumberVerdict(StrEnum):
+    """How a printed number fares."""
+
+    REPRODUCED = "reproduced"  # it comes out to the printed digits
+    EXPLAINED = "explained"  # it does not, or not by itself, and what was measured says why
+    REFUTED = "refuted"  # it contradicts what was measured, or the paper's own numbers
+
+
+@dataclass(frozen=True)
+class JudgedNumber:
+    """A printed number beside the measured ones, in the unit it is printed in; None where a model has none."""
+
+    printed: Printed
+    as_printed: float | None
+    corrected: float | None
+    contact: float | None
+    verdict: NumberVerdict
+    evidence: str
+
+    @property
+    def summary(self) -> dict[str, str | float | None]:
+        """As commands print it."""
+        about = {name: getattr(self.printed, name) for name in ("where", "quantity", "unit")}
+        models = {name: getattr(self, name) for name in ("as_printed", "corrected", "contact")}
+        return {
+            **about,
+            "printed": self.printed.text,
+            **models,
+            "verdict": self.verdict.value,
+            "evidence": self.evidence,
+        }
+
+
+def judged(
+    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[NumberVerdict, str]
+) -> JudgedNumber:
+    """A printed number beside those of the rigid model, by set of equations, and of the contact model."""
+    return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, *found)
+
+
+def weigh(
+    agrees: bool, otherwise: NumberVerdict, departures: tuple[str, ...], evidence: str
+) -> tuple[NumberVerdict, str]:
+    """The verdict and its evidence.
+
+    agrees      the number came out
+    otherwise   what is said if it did not, of the paper's own scene
+    departures  in what the scene is not the paper's: a mismatch refutes nothing then
+    """
+    if agrees:
+        return NumberVerdict.REPRODUCED, evidence
+    if departures:
+        return NumberVerdict.EXPLAINED, f"Not the paper's scene ({'; '.join(departures)}). {evidence}"
+    return otherwise, evidence
+
+
+def regardless(departures: tuple[str, ...], evidence: str) -> str:
+    """The evidence of a verdict that follows from the paper's own numbers, which another scene does not change."""
+    if not departures:
+        return evidence
+    return f"{evidence} The verdict is about the paper's own numbers, not about this scene ({'; '.join(departures)})."
+
+
+REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
 
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
@@ -48,24 +115,24 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
         yield adams_row(result, measured)
 
 
-def input_of_both(entry: printed.Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
+def input_of_both(entry: Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
     """A parameter of both models."""
     text = prose("evidence.input", value, entry.unit)
     verdict, evidence = weigh(value == entry.value, EXPLAINED, departures, text)
     return JudgedNumber(entry, value, value, value, verdict, evidence)
 
 
-def input_of_contact(entry: printed.Printed, value: float, measured: Measured) -> JudgedNumber:
+def input_of_contact(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
     """A parameter of the contact model alone."""
     agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
     text = prose("evidence.input", value, entry.unit)
     return judged(entry, {}, value, weigh(agrees, EXPLAINED, measured.departures.contact, text))
 
 
-def fixed_point_row(entry: printed.Printed, coordinate: int, measured: Measured) -> JudgedNumber:
+def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> JudgedNumber:
     """A coordinate of x_p."""
     values = {name: model.state[coordinate] for name, model in measured.models.items()}
-    found = {name: agreement(entry, value) for name, value in values.items()}
+    found = {name: entry.agreement(value) for name, value in values.items()}
     text = prose("evidence.fixed_point", values, found)
     return judged(entry, values, None, weigh(any(found.values()), REFUTED, measured.departures.rigid, text))
 
@@ -78,7 +145,7 @@ def eigenvalue_row(measured: Measured) -> JudgedNumber:
     return judged(printed.EIGENVALUES, radii, None, weigh(stable, REFUTED, measured.departures.rigid, text))
 
 
-def unitless_row(entry: printed.Printed, value: float, measured: Measured) -> JudgedNumber:
+def unitless_row(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
     """Stiffness or damping, which are printed without a unit."""
     text = prose("evidence.unitless", measured.contact)
     return judged(entry, {}, value, weigh(False, EXPLAINED, measured.departures.contact, text))
@@ -108,9 +175,9 @@ def velocities_raised(measured: Measured) -> list[float | None]:
     return [raised_percent(measured, coordinate) for coordinate in (2, 3)]
 
 
-def raised_row(entry: printed.Printed, table_row: printed.StartRow, measured: Measured) -> JudgedNumber:
+def raised_row(entry: Printed, table_row: printed.StartRow, measured: Measured) -> JudgedNumber:
     """An increase of a velocity that section 4 claims: arithmetic, whatever the config."""
-    agrees = bool(agreement(entry, percent_of(table_row).of_matlab))
+    agrees = bool(entry.agreement(percent_of(table_row).of_matlab))
     verdict = REPRODUCED if agrees else REFUTED
     text = prose("evidence.raised", measured.contact, velocities_raised(measured))
     text = regardless(measured.departures.contact, text)
@@ -120,21 +187,21 @@ def raised_row(entry: printed.Printed, table_row: printed.StartRow, measured: Me
 def percent_row(table_row: printed.StartRow, coordinate: int, measured: Measured) -> JudgedNumber:
     """A percentage of Table 2: arithmetic, whatever the config."""
     entry, percent = table_row.percent, percent_of(table_row)
-    agrees = bool(agreement(entry, percent.of_matlab))
-    otherwise = EXPLAINED if agreement(entry, percent.of_adams) else REFUTED
+    agrees = bool(entry.agreement(percent.of_matlab))
+    otherwise = EXPLAINED if entry.agreement(percent.of_adams) else REFUTED
     verdict = REPRODUCED if agrees else otherwise
     text = regardless(measured.departures.contact, prose("evidence.percent", percent, verdict))
     return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
 
 
-def adams_start_row(entry: printed.Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
+def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
     """A coordinate of the ADAMS start: what it is, whatever the config, and what ours was."""
     start = measured.contact.start
     value = None if start is None else start[coordinate]
     is_angle = coordinate < 2
     text = prose("evidence.adams_start", study, is_angle, measured.contact, velocities_raised(measured))
     otherwise = EXPLAINED if is_angle or study.adams.starts_a_gait else REFUTED
-    verdict = REPRODUCED if agreement(entry, value) else otherwise
+    verdict = REPRODUCED if entry.agreement(value) else otherwise
     return judged(entry, {}, value, (verdict, regardless(measured.departures.contact, text)))
 
 
@@ -154,7 +221,7 @@ def strides_row(measured: Measured) -> JudgedNumber:
     )
 
 
-def error_row(entry: printed.Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
+def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
     """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config."""
     errors = measured.errors
     late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
@@ -181,7 +248,7 @@ def step_length_row(measured: Measured) -> JudgedNumber:
     contact = measured.contact.step_length
     found = [*lengths.values(), *([] if contact is None else [contact])]
     text = prose("evidence.step_length", lengths, contact, max(found, default=None))
-    agrees = any(agreement(printed.STEP_LENGTH, length) for length in lengths.values())
+    agrees = any(printed.STEP_LENGTH.agreement(length) for length in lengths.values())
     return judged(printed.STEP_LENGTH, lengths, contact, weigh(agrees, REFUTED, measured.departures.rigid, text))
 
 
@@ -221,11 +288,11 @@ def matlab_row(entry: printed.ResultRow, measured: Measured, study: PaperStudy) 
     """A number of Table 3's MATLAB column against the rigid model."""
     rigid, contact = columns(entry, measured)
     means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is printed.E_AVG else {}
-    taken = [steps for steps, mean in means.items() if agreement(printed.E_AVG.matlab, mean)]
+    taken = [steps for steps, mean in means.items() if printed.E_AVG.matlab.agreement(mean)]
     # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
     otherwise = EXPLAINED if taken else REFUTED
     text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
-    agrees = any(agreement(entry.matlab, value) for value in rigid.values())
+    agrees = any(entry.matlab.agreement(value) for value in rigid.values())
     return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
 
 
@@ -234,5 +301,5 @@ def adams_row(entry: printed.ResultRow, measured: Measured) -> JudgedNumber:
     rigid, contact = columns(entry, measured)
     text = prose("evidence.adams", entry, measured, names_of(entry))
     otherwise = EXPLAINED if contact is None else REFUTED
-    agrees = bool(agreement(entry.adams, contact))
+    agrees = bool(entry.adams.agreement(contact))
     return judged(entry.adams, rigid, contact, weigh(agrees, otherwise, measured.departures.contact, text))

@@ -16,7 +16,6 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
-from walkerlab.paper.judged import NumberVerdict
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -28,7 +27,7 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.rows import paper_rows
+from walkerlab.paper.rows import NumberVerdict, paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.scene.contact import GAIT, contact_scene, start_state

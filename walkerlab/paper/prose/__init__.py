@@ -9,8 +9,7 @@ import math
 from pathlib import Path
 
 from walkerlab.paper import arithmetic, printed
-from walkerlab.paper.judged import agreement
 from walkerlab.prose import Prose, f
 
-KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi, "agreement": agreement}
+KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi}
 prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})
