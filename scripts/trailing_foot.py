@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.ground.motion import mass_matrix, motion_gradient
+from walkerlab.ground.motion import motion_gradient, tree_equations
 from walkerlab.ground.walker import (
     LOCKED,
     FootMotion,
@@ -79,7 +79,7 @@ def freed(system: OnGround, y: Floats) -> FootMotion:
     form, n = system.form, int(system.form.bodies)
     s, c, M, masses = np.zeros(n), np.zeros(n), np.zeros((n, n)), np.diag([float(form.mass)] * (2 + n))
     sines_cosines(form, y, s, c)
-    mass_matrix(form, s, c, M)
+    tree_equations(form, s, c, y, M, np.zeros(n))
     masses[2:, 2:] = M
     # how fast the leading foot slips and sinks, by each velocity
     J = np.array([motion_gradient(form, LEADING, s, c, y, 2 + n + i)[1:] for i in range(2 + n)]).T

@@ -18,7 +18,7 @@ def test_where_the_walk_begins_does_not_matter():
     start[0] += 64.0
     lanes = tuple(lane + 64.0 for lane in scene.terrain.lanes)
     ground = JudgedGround(checkerboard(scene.pitch_m, lanes), scene.frame)
-    there = walk_contact(scene.walker, ground, None, 1, tuple(start.tolist()), settings(), 10, None)
+    there = walk_contact(scene.walker, ground, False, 1, tuple(start.tolist()), settings(), 10, None)
     np.testing.assert_allclose(there.touch_time_s, here.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(there.touch_along_m - 64.0, here.touch_along_m, atol=1e-6)
     assert there.outcome is here.outcome
@@ -29,7 +29,7 @@ def test_which_leg_begins_does_not_matter():
     y = start_state(scene, FIXED_POINT)
     exchanged = (y[0], y[1], y[3], y[2], y[4], y[5], y[7], y[6])
     ground = JudgedGround(checkerboard(scene.pitch_m, scene.terrain.lanes[::-1]), scene.frame)
-    other = walk_contact(scene.walker, ground, None, 0, exchanged, settings(), 10, None)
+    other = walk_contact(scene.walker, ground, False, 0, exchanged, settings(), 10, None)
     np.testing.assert_allclose(other.touch_time_s, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m, one.touch_along_m, atol=1e-6)
 

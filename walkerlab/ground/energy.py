@@ -3,7 +3,7 @@
 from typing import Any
 
 from walkerlab.ground.knees import knee_energy
-from walkerlab.ground.motion import mass_matrix
+from walkerlab.ground.motion import tree_equations
 from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.walker import OF_BODIES, Form, OnGround, foot_force, half_size, one_foot_motion, sines_cosines
 from walkerlab.kernels import inlined, matrix, vector
@@ -12,9 +12,10 @@ from walkerlab.kernels import inlined, matrix, vector
 @inlined
 def kinetic_energy(form: Form, y: Any) -> float:
     """Kinetic energy (J)."""
-    s, c, M = vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    # what is added to r here is not wanted
+    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
-    mass_matrix(form, s, c, M)
+    tree_equations(form, s, c, y, M, r)
     half, total = half_size(form), 0.0
     for i in range(form.places):
         total += form.mass * (y[half + i] * y[half + i])

@@ -45,9 +45,12 @@ def feet_and_forces(system: OnGround, chain: Any, q: Any, v: Any, feet: Any, for
         return
     for k in range(chain.shape[0]):
         torques[k] = 0.0
-    one = ground_wrench(system, 0, s, c, y, torques)
-    other = ground_wrench(system, 1, s, c, y, torques)
-    forces[0], forces[1] = one[0] + other[0], one[1] + other[1]
+    forces[0], forces[1] = 0.0, 0.0
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            push = ground_wrench(system, foot, s, c, y, torques)
+            forces[0] += push[0]
+            forces[1] += push[1]
     for j in range(chain.shape[1]):
         total = 0.0
         for k in range(chain.shape[0]):

@@ -12,7 +12,7 @@ from walkerlab.ground.walker import (
     half_size,
     sines_cosines,
 )
-from walkerlab.kernels import inlined, matrix, vector
+from walkerlab.kernels import inlined, matrix, vector, woven
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
 from walkerlab.solvers.system import block, derivative, jacobian
 
@@ -23,33 +23,24 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
     return (0.0, 0.0)
 
 
-@inlined
-def mass_matrix(form: Form, s: Any, c: Any, M: Any) -> None:
-    """M (n, n), kg m^2."""
-    for k in range(form.bodies):
+@woven
+def tree_equations(form: Form, s: Any, c: Any, y: Any, M: Any, r: Any) -> None:
+    """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
+    n, first = form.bodies, half_size(form) + form.places
+    for k in range(n):
         M[k, k] = form.A[k, k]
         for l in range(k):
+            A, B = form.A[k, l], form.B[k, l]
             cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            M[k, l] = form.A[k, l] * cos_d + form.B[k, l] * sin_d
+            M[k, l] = A * cos_d + B * sin_d
             M[l, k] = M[k, l]
+            r[k] += y[first + l] * y[first + l] * (A * sin_d - B * cos_d)
+            r[l] -= y[first + k] * y[first + k] * (A * sin_d - B * cos_d)
 
 
-@inlined
-def add_centrifugal(form: Form, s: Any, c: Any, y: Any, r: Any) -> None:
-    """Add the centrifugal terms (N m) to r (n,)."""
-    first = half_size(form) + form.places
-    for k in range(form.bodies):
-        for l in range(k):
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            r[k] += y[first + l] * y[first + l] * (form.A[k, l] * sin_d - form.B[k, l] * cos_d)
-            r[l] -= y[first + k] * y[first + k] * (form.A[l, k] * sin_d + form.B[l, k] * cos_d)
-
-
-@inlined
+@woven
 def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Force along and normal to the slope (N) on a foot; its torques on the bodies (N m) are added to r (n,)."""
-    if system.has_ground[foot] == 0:
-        return 0.0, 0.0
+    """Force along and normal to the slope (N) on a foot with ground; its torques (N m) are added to r (n,)."""
     form = system.form
     motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
@@ -62,7 +53,7 @@ def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -
     return force.along, force.normal.force
 
 
-@inlined
+@woven
 def all_forces(system: OnGround, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
     """Force of the ground along and normal to the slope (N); all torques on the bodies (N m) into r (n,).
 
@@ -74,10 +65,14 @@ def all_forces(system: OnGround, s: Any, c: Any, y: Any, r: Any) -> tuple[float,
         if form.places == 0:
             r[k] -= form.gravity_along * (s[k] * form.arm_x[k] + c[k] * form.arm_y[k])
             r[k] -= form.gravity_down * (c[k] * form.arm_x[k] - s[k] * form.arm_y[k])
-    one, other = ground_wrench(system, 0, s, c, y, r), ground_wrench(system, 1, s, c, y, r)
-    add_centrifugal(form, s, c, y, r)
+    along, normal = 0.0, 0.0
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            push = ground_wrench(system, foot, s, c, y, r)
+            along += push[0]
+            normal += push[1]
     add_stop_torques(system, y, r)
-    return one[0] + other[0], one[1] + other[1]
+    return along, normal
 
 
 @derivative.case(OnGround)
@@ -88,7 +83,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, s, c, y, r)
-    mass_matrix(form, s, c, M)
+    tree_equations(form, s, c, y, M, r)
     factor_linked(form.E, n, M, r)
     solve_linked(form.E, n, M, r)
     for i in range(half):
@@ -121,8 +116,6 @@ def motion_gradient(form: Form, foot: int, s: Any, c: Any, y: Any, j: int) -> tu
 @inlined
 def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
     """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
-    if system.has_ground[foot] == 0:
-        return
     form = system.form
     motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
@@ -170,27 +163,34 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     """Derivatives of the equations of motion, exact up to the switching points of the force law."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
-    for i in range(2 * half):
-        for j in range(2 * half):
-            J[i, j] = 1.0 if j == i + half else 0.0
-    s, c, alpha, column, M = (
-        vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES),
+    s, c, alpha, M, by_torque = (
+        vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES), matrix(OF_BODIES),
     )  # fmt: skip
+    for i in range(half):
+        for j in range(2 * half):
+            J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     sines_cosines(form, y, s, c)
     all_forces(system, s, c, y, alpha)
-    mass_matrix(form, s, c, M)
+    tree_equations(form, s, c, y, M, alpha)
     factor_linked(form.E, n, M, alpha)
     solve_linked(form.E, n, M, alpha)
-    add_ground_gradients(system, 0, s, c, y, J)
-    add_ground_gradients(system, 1, s, c, y, J)
+    for k in range(n):  # row k: the angular accelerations by a torque on body k
+        for l in range(n):
+            by_torque[k, l] = 1.0 if k == l else 0.0
+        gathered(form.E, n, by_torque[k])
+        solve_linked(form.E, n, M, by_torque[k])
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            add_ground_gradients(system, foot, s, c, y, J)
     add_stop_gradients(system, y, J)
     add_tree_gradients(form, s, c, y, alpha, J)
     for j in range(2 * half):
         for k in range(n):
-            column[k] = J[half + p + k, j]
-        gathered(form.E, n, column)
-        solve_linked(form.E, n, M, column)
+            alpha[k] = J[half + p + k, j]
         for k in range(n):
-            J[half + p + k, j] = column[k]
+            total = 0.0
+            for l in range(n):
+                total += by_torque[l, k] * alpha[l]
+            J[half + p + k, j] = total
         for i in range(p):
             J[half + i, j] /= form.mass
