@@ -146,7 +146,7 @@ class Run:
         except FileNotFoundError:
             raise StaleError(f"{self.folder.path} has no sweep {name}.", f"There are {', '.join(names)}.") from None
         except Damaged as error:
-            raise StaleError(f"{path} is damaged: {error}.", "The same sweep again puts it together anew.") from error
+            raise StaleError(f"{path} is damaged: {error}.", "Run the same sweep again to rebuild it.") from error
 
 
 def run(

@@ -45,7 +45,7 @@ def test_status_check_exits_5_unless_all_is_current(toy):
     done = toy("status", "--check", "--json")
     assert done.returncode == 5
     assert json.loads(done.stdout)["current"] is False
-    assert "error: not every result is current: 4 missing." in done.stderr
+    assert "error: not every result is up to date: 4 missing." in done.stderr
     assert toy("status").returncode == 0
     toy("page")
     assert toy("status", "--check").returncode == 0
@@ -70,14 +70,14 @@ def test_show_prints_summary_arrays_and_origin(toy):
 def test_show_of_no_run_exits_3_of_no_result_5_and_of_something_outdated_warns(toy):
     done = toy("show", "drop")
     assert done.returncode == 3  # there is no such run
-    assert "advice: `walkerlab drop` makes it." in done.stderr
+    assert "advice: `walkerlab drop` creates it." in done.stderr
     toy("drop")
     assert toy("show", "roll").returncode == 5  # the run has no such result
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text() + "# changed\n")
     done = toy("show", "drop")
     assert done.returncode == 0
-    assert "warning: runs/paper/drop.h5 is not current: code changed" in done.stderr
+    assert "warning: runs/paper/drop.h5 is out of date: code changed" in done.stderr
 
 
 def test_clean_removes_results_and_nothing_else(toy):

@@ -93,7 +93,7 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     artifact = "runs/paper/roll.h5"
     done = toy("rerun", artifact)
     assert done.returncode == 0
-    assert "comes out again to the last bit" in done.stdout
+    assert "is reproduced to the last bit" in done.stdout
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text().replace("math.sqrt(2", "math.sqrt(3"))
     done = toy("rerun", artifact, "--json")
@@ -106,7 +106,7 @@ def test_open_without_a_page_says_what_writes_it(toy):
     for command in (("open",), ("status", "paper"), ("diff", "paper", "kneed")):
         assert toy(*command).stderr.splitlines()[:2] == [
             "error: there is no run paper.",
-            "advice: `walkerlab report` makes the run of the paper config.",
+            "advice: `walkerlab report` creates the run of the paper config.",
         ]
     toy("roll")
     assert "there is no run papr. Did you mean paper?" in toy("open", "papr").stderr
@@ -167,7 +167,7 @@ def test_a_film_needs_no_name(walker):
 
 def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
-    assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` makes it." in done.stderr
+    assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
     typed = Request(sets=["start=[0, 1, 2, 3]"]).typed
     assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"

@@ -36,7 +36,7 @@ def test_a_sweep_prints_one_object_and_leaves_file_table_figure_and_page(swept):
 def test_the_same_sweep_again_prints_the_table_and_computes_nothing(swept):
     toy, _ = swept
     done = toy(*SWEEP, "--over", "gravity_m_s2=1:9:3", "--over", "slope_rad=[0.1, 1.2]", "--csv")
-    assert "6 of 6 points are there already" in done.stderr
+    assert "6 of 6 points exist already" in done.stderr
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert [row["outcome"] for row in rows] == ["answered", "no-answer"] * 3
     assert float(rows[4]["period_s"]) == (2 / 9) ** 0.5
@@ -56,7 +56,7 @@ def test_a_dry_run_lists_points_and_touches_nothing(swept):
     before = sorted(toy.folder.rglob("*"))
     text = toy(*SWEEP, "--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1", "--dry-run").stdout
     assert "  gravity_m_s2=3.0" in text
-    assert "5 points, 3 there already, 2 to compute" in text
+    assert "5 points, 3 computed already, 2 to compute" in text
     assert sorted(toy.folder.rglob("*")) == before
 
 

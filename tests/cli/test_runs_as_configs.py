@@ -196,7 +196,7 @@ def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
         data = path.read_bytes()
         path.unlink()  # the other run has the same file where a result was taken over
         path.write_bytes(data[:-1])
-    made = "`walkerlab drop -c runs/paper` and `walkerlab roll -c runs/paper` make them anew."
+    made = "`walkerlab drop -c runs/paper` and `walkerlab roll -c runs/paper` recompute them."
     done = toy("diff", "paper", "paper@strides=7")
     assert (done.returncode, done.stderr.splitlines()[1]) == (5, f"advice: {made}")
     assert all(f"runs/paper/{path.name} is damaged: it does not end" in done.stderr for path in artifacts)
@@ -224,7 +224,7 @@ def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
     assert toy("page").returncode == 0
     page = (toy.folder / "runs/paper/report.html").read_text()
     assert "<p>census: its result is damaged: it does not end" in page
-    assert "`walkerlab survey --full` makes it anew</p>" in page
+    assert "`walkerlab survey --full` recomputes it</p>" in page
 
 
 def test_a_run_has_the_name_that_it_is_given_and_goes_by_it_wherever_a_run_is_meant(toy):

@@ -251,11 +251,11 @@ def test_masses_of_parts_are_told_too() -> None:
 @pytest.mark.parametrize(
     ("line", "wrong", "said"),
     [
-        ("body: shank 2, centre_m", "body: shnk 2, centre_m", "21:14: walker.feet.1.body: shnk 2 is no body; did you"),
+        ("body: shank 2, centre_m", "body: shnk 2, centre_m", "21:14: walker.feet.1.body: shnk 2 is not a body; did"),
         ("body: shank 2, centre_m", "body: shank 1, centre_m", "21:14: walker.feet.1.body: shank 1 is not of leg 2"),
-        ("body: thigh 2, at_m", "body: thigh, at_m", "18:39: walker.particles.0.body: thigh is no body"),
-        ("legs: [[thigh 1,", "legs: [[thigh 3,", "22:11: walker.legs.0.0: thigh 3 is no body"),
-        ("parent: thigh 1,", "parent: tigh 1,", "15:30: walker.hinges.1.parent: tigh 1 is no body"),
+        ("body: thigh 2, at_m", "body: thigh, at_m", "18:39: walker.particles.0.body: thigh is not a body"),
+        ("legs: [[thigh 1,", "legs: [[thigh 3,", "22:11: walker.legs.0.0: thigh 3 is not a body"),
+        ("parent: thigh 1,", "parent: tigh 1,", "15:30: walker.hinges.1.parent: tigh 1 is not a body"),
     ],
 )
 def test_a_part_on_a_body_that_is_not_there_is_refused_where_it_stands(

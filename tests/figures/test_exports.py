@@ -193,7 +193,7 @@ def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, d
     with pytest.raises(StaleError) as refused:
         READERS[reader](run)
     assert refused.value.message.startswith(f"{path} is damaged: ")
-    assert refused.value.advice == f"`walkerlab contact-sim -c {run.path}` makes it anew."
+    assert refused.value.advice == f"`walkerlab contact-sim -c {run.path}` recomputes it."
     assert refused.value.exit_code == 5
 
 

@@ -98,7 +98,7 @@ def test_forced_numbers_are_the_same_and_drawings_are_made_anew(toy):
     assert read(toy.runs / "paper" / "roll.h5").digest() == digest
     report = toy.execute("page")
     assert actions(report)["bounce"] == "reuse"
-    assert reasons(report)["picture"] == "input drop was made anew"
+    assert reasons(report)["picture"] == "input drop was recomputed"
 
 
 def test_a_lost_input_is_made_again_and_results_that_agree_with_it_are_reused(toy):
@@ -129,7 +129,7 @@ def test_a_drawing_that_was_altered_is_drawn_again(toy):
     assert reasons(toy.execute("picture"))["picture"] == "figures/figure-01.svg was altered"
     assert figure.read_bytes() == drawn
     (toy.runs / "paper" / "report.html").unlink()
-    assert reasons(toy.execute("page"))["page"].startswith(("report.html is missing", "input picture was made anew"))
+    assert reasons(toy.execute("page"))["page"].startswith(("report.html is missing", "input picture was recomputed"))
     assert (toy.runs / "paper" / "report.html").exists()
 
 
@@ -137,7 +137,8 @@ def test_a_drawing_takes_what_happens_to_be_current(toy):
     figure = toy.runs / "paper" / "figures" / "figure-01.svg"
     report = toy.execute("picture")
     assert "survey" not in actions(report)
-    assert ("survey", "no current result; `walkerlab survey` makes one") in {(e.what, e.why) for e in report.left_out}
+    why = "no current result; `walkerlab survey` computes one"
+    assert ("survey", why) in {(e.what, e.why) for e in report.left_out}
     assert "without ['survey']" in figure.read_text()
     toy.execute("survey")
     assert toy.execute("picture").left_out == ()

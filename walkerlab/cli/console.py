@@ -67,7 +67,7 @@ class Console:
             return
         self._drawn = True
         path = (folder / str(page)).resolve()
-        self.note(f"page: {path} (with what there is so far; it is written again as results come in)")
+        self.note(f"page: {path} (partial; updated as results come in)")
         if self.open_page:
             from walkerlab.cli.browser import open_file
 

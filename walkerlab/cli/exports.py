@@ -58,7 +58,9 @@ class Target:
         if kind not in kinds:
             raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
         if named in kinds and named != kind:
-            raise ConfigError(f"--to {kind} and {output} are two formats.", "Leave --to away, or name the file alike.")
+            raise ConfigError(
+                f"--to {kind} and {output} name two formats.", "Leave out --to, or give the file that ending."
+            )
         return output or Path(f"{stem}.{kind}"), kind
 
 

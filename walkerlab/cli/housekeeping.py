@@ -20,7 +20,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="Name or folder of a run.")] = None,
         check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
     ) -> None:
-        """Say of each stage whether its result is current, and if not, why; and which runs there are."""
+        """Show whether each stage's result is up to date, and if not, why; and list all runs."""
         with exit_on_failure("status", request):
             from walkerlab.cli.status import print_status, print_status_of_run
 
@@ -41,7 +41,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             ),
         ],
     ) -> None:
-        """Print what is stored of a stage: summary, arrays, and where it comes from."""
+        """Print a stage's stored result: summary, arrays, and where it comes from."""
         *runs, stage = words
         if stage not in names:
             raise typer.BadParameter(f"there is no stage {stage!r}; there are {', '.join(names)}", param_hint="STAGE")
@@ -74,7 +74,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         all_runs: Annotated[bool, typer.Option("--all", help="Every run in the folder of all runs.")] = False,
         yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
     ) -> None:
-        """Remove the results of a run, and what killed runs left; other files stay."""
+        """Remove the results of a run and what killed runs left behind; other files stay."""
         with exit_on_failure("clean", request):
             from walkerlab.cli.clean import clean_folders, every_run
 

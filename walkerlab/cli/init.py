@@ -26,7 +26,7 @@ def write_config(file: Path, walker: str) -> str:
     """
     config = load(Path(template(walker))).config
     if file.exists():
-        raise StorageError(f"{file} is there already.", "Choose another name; nothing was overwritten.")
+        raise StorageError(f"{file} exists already.", "Choose another name; nothing was overwritten.")
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
     named = config.model_copy(update={"name": safe_name(file.stem)})

@@ -19,7 +19,7 @@ Output = Annotated[
         "--output",
         "-o",
         metavar="FILE",
-        help="Where to; its ending says the format, too. Default: named after the run.",
+        help="File to write; its ending gives the format. Default: named after the run.",
     ),
 ]
 FIRST_WALK = "default: contact-sim, or simulate where that has not run"
@@ -33,15 +33,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         request: Request,
         file: Annotated[
             Path | None,
-            typer.Argument(
-                metavar="[FILE]", help="The config to be written; it must not exist. Default: my-TYPE.yaml."
-            ),
+            typer.Argument(metavar="[FILE]", help="The config to write; it must not exist. Default: my-TYPE.yaml."),
         ] = None,
         walker: Annotated[
             str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
         ] = "compass",
     ) -> None:
-        """Write a commented config to begin with, and a schema by which editors check it."""
+        """Write a commented config to begin with, and a schema that editors check it against."""
         with exit_on_failure("init", request):
             from walkerlab.cli.init import write_config
 
@@ -65,7 +63,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         request: Request,
         artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
     ) -> None:
-        """Compute a stored result again, from nothing, and say whether it comes out the same."""
+        """Recompute a stored result from scratch, and say whether it is the same."""
         with exit_on_failure("rerun", request):
             from walkerlab.cli.rerun import rerun_artifact
 
@@ -112,15 +110,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         run: RunArgument,
         to: Annotated[
             str | None,
-            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 where ffmpeg is found; a file goes too."),
+            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 where ffmpeg is found; a file name works too."),
         ] = None,
         output: Output = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
-        steps: Annotated[int, typer.Option(min=1, help="Steps that are shown.")] = 4,
-        rate: Annotated[int, typer.Option(min=1, max=60, help="Pictures a second.")] = 25,
-        slower: Annotated[float, typer.Option(min=0.01, help="So many times slower than life.")] = 1.0,
+        steps: Annotated[int, typer.Option(min=1, help="Steps to show.")] = 4,
+        rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
+        slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:
-        """Draw a run's walk as a moving picture."""
+        """Animate a run's walk."""
         with exit_on_failure("animate", request):
             from walkerlab.cli.exports import Target
             from walkerlab.cli.films import Film, write_film

@@ -77,7 +77,9 @@ From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where t
 To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
 Model = Annotated[str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits to follow.")]
 Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
-Full = Annotated[bool, typer.Option("--full", help="Run the long campaign too; interrupted, it goes on the next time.")]
+Full = Annotated[
+    bool, typer.Option("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
+]
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:

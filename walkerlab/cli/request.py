@@ -90,7 +90,7 @@ class Request:
         ),
     ] = None
     force: Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")] = False
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would happen and why; touch nothing.")] = False
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done and why; change nothing.")] = False
     no_wait: Annotated[
         bool, typer.Option("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
     ] = False

@@ -45,11 +45,11 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
     if before != after:
         why = "the code is the same" if same_code else "the code has changed since"
         raise StaleError(
-            f"{path} does not come out again: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
+            f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
             "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
         )
     if not request.as_json:
-        print(f"{path} comes out again to the last bit: content {before[:SHORT]}.")
+        print(f"{path} is reproduced to the last bit: content {before[:SHORT]}.")
 
 
 def artifact_at(path: Path) -> Stored:
@@ -57,7 +57,7 @@ def artifact_at(path: Path) -> Stored:
     try:
         return read(path)
     except (FileNotFoundError, NotADirectoryError):
-        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists those of a run.") from None
+        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
     except Damaged as error:
-        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).typed}` makes it anew."
+        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).typed}` recomputes it."
         raise StaleError(f"{path} is damaged: {error}.", advice) from None

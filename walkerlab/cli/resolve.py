@@ -27,7 +27,7 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
     Raises ConfigError if the one that is named does not walk.
     """
     if model is not None and model not in MODELS:
-        raise ConfigError(f"--model {model}: is no walk.", f"There are {', '.join(MODELS)}.")
+        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
     if model is not None:
         return model
     rigid, contact = MODELS

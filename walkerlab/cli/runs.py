@@ -45,7 +45,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             results = [results_in(folder, names, graph) for folder in folders]
             for folder, found in zip(folders, results, strict=True):
                 if not found:
-                    raise StaleError(f"{folder.path} has no results.", "A stage's command makes them.")
+                    raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
             found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
             figures = draw(folders, results)
             if request.as_json:

@@ -24,12 +24,12 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():
-        raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` makes it.")
+        raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
     if step.found is None:
         why = "there is none yet" if step.reason == NOT_THERE else step.reason
-        raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` makes it.")
+        raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":
-        request.console.warn(f"{path} is not current: {step.reason}")
+        request.console.warn(f"{path} is out of date: {step.reason}")
     if request.as_json:
         print_json(
             {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}

@@ -103,4 +103,4 @@ def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
     if not counts:
         return None
     spoken = ", ".join(f"{number} {state}" for state, number in counts.items())
-    return StaleError(f"not every result is current: {spoken}.", f"`walkerlab {last}` makes all of them.")
+    return StaleError(f"not every result is up to date: {spoken}.", f"`walkerlab {last}` computes them all.")

@@ -30,14 +30,16 @@ Over = Annotated[
         "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
     ),
 ]
-Of = Annotated[str | None, typer.Option("--stage", metavar="NAME", help="The stage whose numbers are wanted.")]
-Zip = Annotated[bool, typer.Option("--zip", help="The n-th values make the n-th point, not each with each.")]
+Of = Annotated[str | None, typer.Option("--stage", metavar="NAME", help="The stage to run.")]
+Zip = Annotated[
+    bool, typer.Option("--zip", help="Combine the n-th values into the n-th point, instead of each with each.")
+]
 Sample = Annotated[
     str | None, typer.Option("--sample", metavar="SAMPLER:N", help="Draw points: latin-hypercube:500, sobol:512.")
 ]
-Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of that drawing; default 1.")]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn points; default 1.")]
 EngineName = Annotated[
-    str, typer.Option("--engine", metavar="NAME", help="Where it is computed: local, dask[=ADDRESS] or slurm.")
+    str, typer.Option("--engine", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm.")
 ]
 EngineOptions = Annotated[
     list[str] | None,
@@ -47,7 +49,7 @@ Jobs = Annotated[
     int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; default: all cores, of slurm 16.")
 ]
 ChunkSeconds = Annotated[
-    float | None, typer.Option("--chunk-seconds", metavar="S", help="How long a chunk is to take; default by engine.")
+    float | None, typer.Option("--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine.")
 ]
 Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="A number to draw; may be repeated.")]
 AsCsv = Annotated[
@@ -73,7 +75,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         show: Show = None,
         as_csv: AsCsv = False,
     ) -> None:
-        """Ask a stage over many values of parameters; what is computed already is taken over."""
+        """Run a stage over many values of parameters; results that exist are reused."""
         with exit_on_failure("sweep", request):
             from walkerlab.sweeps.engines import Order, engine_named
             from walkerlab.sweeps.question import axis_of_text
@@ -171,8 +173,8 @@ def show_plan(request: Request, foreseen: Foreseen) -> None:
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
     known = foreseen.estimate_s
-    time = "no such point was timed so far" if known is None else f"about {in_time(known)}"
-    counts = f"{foreseen.count} points, {foreseen.there} there already, {missing} to compute: {time}"
+    time = "no such point has been timed yet" if known is None else f"about {in_time(known)}"
+    counts = f"{foreseen.count} points, {foreseen.there} computed already, {missing} to compute: {time}"
     print("\n".join([f"in {foreseen.path}:", *lines, counts]))
 
 
@@ -236,7 +238,7 @@ def printed(swept: Swept, page: Path) -> list[str]:
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
-        *([f"  {swept.reused} of them were there already"] if swept.reused else []),
+        *([f"  {swept.reused} of them existed already"] if swept.reused else []),
         *(line for said in said_of(summary) for line in paragraph(said)),
         f"  numbers  {swept.path}",
         f"  page     {page}",

@@ -71,7 +71,7 @@ def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
     problems = []
     for place, name in bodies_named(walker):
         if name not in bodies:
-            text = f"{dotted(place)}: {shown(name)} is no body"
+            text = f"{dotted(place)}: {shown(name)} is not a body"
             problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(bodies), nearest(name, bodies)))
     for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
         if foot.body in bodies and foot.body not in leg:

@@ -74,7 +74,7 @@ def parameter_of(key: str, config: ContactConfig) -> Parameter:
             raise ConfigError(f"continuation.over: {shown(key)} is a block of keys, not a number", _ADVICE)
         meant = nearest(key, [*numbers_among(known), SLOPE_DEG])
         guess = f"; did you mean {meant}?" if meant else ""
-        raise ConfigError(f"continuation.over: {shown(key)} is no key of the config{guess}", _ADVICE)
+        raise ConfigError(f"continuation.over: {shown(key)} is not a key of the config{guess}", _ADVICE)
     if config.contact is None and path[0] == "contact":
         raise ConfigError(f"continuation.over: {key} belongs to the contact block, and the config has none", _ADVICE)
     if "number" not in kind(known[key].annotation):

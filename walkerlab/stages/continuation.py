@@ -207,7 +207,7 @@ def refuse_second(asked: FamilyQuestion) -> None:
     key, own = second.parameter.key, second.parameter.value_in(asked.config)
     if second.parameter.path == asked.parameter.path:
         raise ConfigError(
-            f"continuation.second: {key} is the number that gaits are followed over already", "Choose another key."
+            f"continuation.second: {key} is already the number that gaits are followed over", "Choose another key."
         )
     if own not in second.span:
         raise ConfigError(

@@ -239,13 +239,13 @@ PIPELINE = Graph(
     Stage(
         "known-problems",
         "walkerlab.stages.known_problems",
-        "Answer problems with known answers through the contact code, once for every scene.",
+        "Solve problems with known answers with the contact code, once for all scenes.",
         takes=object,
     ),
     Stage(
         "stability",
         "walkerlab.stages.stability",
-        "Judge extreme cases and problems with known answers.",
+        "Verify extreme cases and problems with known answers.",
         takes=CompassCasesConfig,
         takes_of_scene=SceneCasesConfig,
         takes_of_paper=WalksConfig,
@@ -256,7 +256,7 @@ PIPELINE = Graph(
     Stage(
         "stability-maps",
         "walkerlab.stages.stability_maps",
-        "Map stability over stiffness, stiction velocity and step size; goes on where it was interrupted.",
+        "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
         takes=MapsConfig,
         takes_of_paper=WalksConfig,
         has_cells=True,
@@ -274,7 +274,7 @@ PIPELINE = Graph(
     Stage(
         "basin",
         "walkerlab.stages.basin",
-        "Map which starts come to which attractor, and which fall; goes on where it was interrupted.",
+        "Map which starts reach which attractor, and which fall; resumes where it was interrupted.",
         takes=BasinConfig,
         inputs=results_of("fixedpoint"),
         has_cells=True,

@@ -60,7 +60,7 @@ class Keys:
             unsuited = why_unsuited(stage, config)
             if unsuited is not None:
                 raise ConfigError(
-                    f"{target} cannot be had: {unsuited}.",
+                    f"{target} is not available: {unsuited}.",
                     "Add one to the config; `walkerlab schema` lists its keys.",
                 )
             given = {name: keys[name] for name in stage.inputs(config)}

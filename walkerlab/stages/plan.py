@@ -106,7 +106,7 @@ class Planner:
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
                 elif step.damaged:
-                    self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} makes it anew"
+                    self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} recomputes it"
 
     def decide(self, stage: Stage) -> Step:
         """What is to happen with a stage, given what became of its inputs."""
@@ -165,8 +165,8 @@ class Planner:
     def _why_absent(self, name: str) -> str:
         command = self._command_of(name)
         if self.graph[name].optional:
-            return self.left_out.get(name, f"it was not asked for; {command} makes it")
-        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; {command} makes one"
+            return self.left_out.get(name, f"it was not asked for; {command} computes it")
+        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; {command} computes one"
         return self.left_out.get(name, none_yet)
 
     def _command_of(self, name: str) -> str:
@@ -203,7 +203,7 @@ class Planner:
         """What of a result's inputs has another content than it was made with, in words."""
         for name, result in self.inputs(stage).items():
             if found.provenance.input_digests.get(name) != input_digest(stage, result):
-                return f"input {name} was made anew"
+                return f"input {name} was recomputed"
         return None
 
 

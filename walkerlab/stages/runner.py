@@ -308,7 +308,7 @@ class Execution:
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
         if step.damaged and step.origin is None:
-            self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; made anew")
+            self.reporter.warn(f"{self.folder.artifact(stage.name)} is {step.reason}; recomputed")
         parts = Parts(self.folder.parts(stage.name), identity.key)
         if self.planner.force:
             parts.forget()

@@ -123,8 +123,8 @@ def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE
     intact, bad = read_all(folder, stages)
     if bad:
         commands = listed(makes(folder, graph[stage]) for stage in bad)
-        them = "makes it" if len(bad) == 1 else "make them"
-        raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them} anew.")
+        them = "recomputes it" if len(bad) == 1 else "recompute them"
+        raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them}.")
     return intact
 
 
@@ -132,7 +132,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
     """A stage's result; StaleError if it is not there, or cannot be read."""
     found = results_in(folder, [stage], graph)
     if stage not in found:
-        raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} makes it.")
+        raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} computes it.")
     return found[stage]
 
 
@@ -157,7 +157,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     there = sorted(path.name for path in runs_dir.glob("*/"))
     near = nearest(Path(text).name, there)
     meant = f" Did you mean {near}?" if near else f" There are {', '.join(there)}." if there else ""
-    raise ConfigError(f"there is no run {text}.{meant}", "`walkerlab report` makes the run of the paper config.")
+    raise ConfigError(f"there is no run {text}.{meant}", "`walkerlab report` creates the run of the paper config.")
 
 
 def claim(folder: RunFolder, config: Config) -> None:
@@ -183,7 +183,7 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
     held = config_of(folder)
     if held is None and record is None:  # nothing there can be read
         return
-    changes = ["it is no config any more"] if held is None else list(differences("", asked_of(held), asked_of(config)))
+    changes = ["it is no longer a config"] if held is None else list(differences("", asked_of(held), asked_of(config)))
     if changes:
         origin = f", made from {record.source}" if record is not None and record.source else ""
         more = ", …" if len(changes) > SHOWN_CHANGES else ""

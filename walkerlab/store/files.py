@@ -25,7 +25,7 @@ ADVICE = {
     errno.EPERM: "Choose a folder that can be written with --runs.",
     errno.ENOTDIR: "A file stands where a folder is needed; choose another folder with --runs.",
     errno.EEXIST: "A file stands where a folder is needed; choose another folder with --runs.",
-    errno.EISDIR: "A folder stands where the result belongs; move it away.",
+    errno.EISDIR: "There is a folder where the result belongs; move it elsewhere.",
     errno.ENAMETOOLONG: "Choose a shorter folder with --runs, or a shorter name in the config.",
     errno.ELOOP: "A symbolic link stands in the way; choose another folder with --runs.",
     errno.EIO: "The disk reports an error; choose another folder with --runs.",
@@ -78,7 +78,7 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     with storing(path):
         if not path.parent.is_dir():
-            raise StorageError(f"{path} could not be stored: its folder is not there any more.")
+            raise StorageError(f"{path} could not be stored: its folder no longer exists.")
         try:
             yield temporary
             with temporary.open("rb") as file:

@@ -175,7 +175,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
         count = -1
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise refusal([Problem(Position(source, 0, 0), f"{key}: {values} is no range of values", FORMS)])
+        raise refusal([Problem(Position(source, 0, 0), f"{key}: {values} is not a range of values", FORMS)])
     if logarithmic and min(low, high) <= 0.0:
         raise refusal(
             [Problem(Position(source, 0, 0), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
@@ -220,7 +220,7 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MOST_POINTS:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
-        raise refusal([Problem(Position(f"--sample {sample}", 1, 1), "is no sampler with a number", allowed)])
+        raise refusal([Problem(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)])
     unit = unit_sample(name, len(axes), int(number), seed)
     return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
 

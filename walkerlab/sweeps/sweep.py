@@ -187,7 +187,7 @@ class SweepRun:
                 self._take_over(merge, reporter)
             reused = int(merge.there[self.inverse].sum())
             if reused:
-                reporter.note(f"sweep: {reused} of {len(self.question)} points are there already")
+                reporter.note(f"sweep: {reused} of {len(self.question)} points exist already")
             begun = provenance.begin(self.config, {})
             progress = reporter.begin(
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
