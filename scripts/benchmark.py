@@ -39,11 +39,10 @@ from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, tw
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
-from walkerlab.orbits.gait import Gait
-from walkerlab.orbits.slope_branch import SlopeBranch
+from walkerlab.orbits.fixed_point import Gait, Search, SearchSettings, SlopeBranch, find_gaits
+from walkerlab.orbits.newton import Root
+from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
-from walkerlab.orbits.step_map import newton, on_section
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
@@ -228,10 +227,9 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     seed = seeds(search.walker)[0]
 
     def solve() -> None:
-        reached = SlopeBranch(search.looking, seed).follow(search.walker.slope)
+        reached = SlopeBranch(search.looking, search.walker, seed).follow(search.walker.slope)
         assert reached.z is not None, "the gait can be followed"
-        z = np.array(reached.z)
-        newton(search.solving, z, search.settings.solved_residual)
+        assert isinstance(search.solved(reached.z), Root), "and solved"
 
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 

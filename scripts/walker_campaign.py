@@ -29,15 +29,12 @@ from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalke
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.fixed_point import GaitSearch, Search, SearchSettings, find_gaits
-from walkerlab.orbits.gait import Gait
-from walkerlab.orbits.random_starts import LEAST_START, MOST_START, SHORTEST_STEP
+from walkerlab.orbits.fixed_point import LEAST_START, MOST_START, Gait, GaitSearch, Search, SearchSettings, find_gaits
+from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
-from walkerlab.orbits.step_map import WALKED, evaluate, on_section, section_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.stepping import T
 
 Draw = np.random.Generator
 STEPS = 10
@@ -227,13 +224,15 @@ def overlooks(walker: Standing) -> bool:
     starts[:, 0] = 0.5 * starts[:, 0] - still
 
     def residual(z: NDArray[np.float64]) -> NDArray[np.float64]:
-        return looking.z_next - z if evaluate(looking, z)[0] == WALKED else np.ones(d)
+        step = looking.walk(search.equations.section, z, derived=False)
+        return step.z[0] - z if step.time.size else np.ones(d)
 
-    walking = [z for z in starts if evaluate(looking, z)[0] == WALKED]
+    walking = [z for z in starts if looking.walk(search.equations.section, z, derived=False).time.size]
     for z in walking[:TRIED]:
         solved = root(residual, z, options={"maxfev": EVALUATIONS})
+        step = looking.walk(search.equations.section, solved.x, derived=False)
         left = np.abs(residual(solved.x)).max()
-        if left < SOLVED and abs(solved.x[0] + still) > APART and looking.method.clock[T] > SHORTEST_STEP:
+        if left < SOLVED and abs(solved.x[0] + still) > APART and step.time[0] > SHORTEST_STEP:
             return True
     return False
 
@@ -276,7 +275,7 @@ def traces(walker: Standing, gait: Gait) -> Iterator[tuple[float, float, float]]
     """
     unit, units = unit_walker(walker)
     n = len(gait.state) // 2
-    z = section_of(unit, (*gait.state[:n], *(rate * units.time for rate in gait.state[n:])))
+    z = coordinates_of(unit, (*gait.state[:n], *(rate * units.time for rate in gait.state[n:])))
     whole, half = (differences(unit, z, aside) for aside in (ASIDE, 0.5 * ASIDE))
     for k in range(min(len(whole), len(half))):
         # what a walk bends over this distance falls with its square
@@ -297,7 +296,9 @@ def differences(walker: Standing, z: NDArray[np.float64], aside: float) -> NDArr
 def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
     """Section coordinates after each of ten steps from z."""
     tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
-    return [section_of(walker, y) for y in take_walk(walker, tolerances, on_section(walker, z.tolist()), STEPS).after]
+    return [
+        coordinates_of(walker, y) for y in take_walk(walker, tolerances, on_section(walker, z.tolist()), STEPS).after
+    ]
 
 
 ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked", "none found")

@@ -12,8 +12,7 @@ from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results
 from walkerlab.report.sections.families import basin as section
 from walkerlab.stages import plot
-from walkerlab.stages.basin import group_of, summary, window_of
-from walkerlab.stages.basin_pieces import WalkEnds
+from walkerlab.stages.basin import WalkEnds, group_of, summary, window_of
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 

@@ -13,7 +13,7 @@ from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import find_gait_from
-from walkerlab.orbits.contact_section import step_from_section
+from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.scaled_starts import scaled_starts
 from walkerlab.scene.contact import start_state
 from walkerlab.stages import contact_sim

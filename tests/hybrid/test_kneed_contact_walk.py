@@ -33,7 +33,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, Particle
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.orbits.contact_gait import find_gait_from, section_points
-from walkerlab.orbits.contact_section import coordinates_of, state_on_section, step_from_section
+from walkerlab.orbits.contact_map import coordinates_of, state_on_section, step_from_section
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.registry import Tolerances
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits import contact_gait as search
 from walkerlab.orbits.contact_gait import GaitAnswer, gait_near
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.newton import NotConverged
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
@@ -81,17 +83,13 @@ def test_ground_without_a_gait_is_said_in_words(sets, word):
     assert answer.advice
 
 
-def singular(*_arguments, **_settings):
-    """What Newton's method raises where a multiplier is 1."""
-    return np.linalg.solve(np.zeros((6, 6)), np.ones(6))
-
-
 def test_a_search_that_fails_says_what_came_in_its_way(gait, monkeypatch):
     backward = replace(gait, step=replace(gait.step, length_m=-0.1))
     monkeypatch.setattr(search, "find_contact_gait", lambda *_arguments, **_settings: backward)
     said = gait_near(None, None, None, None, 0.3)
     assert said == "it led to a walk that does not advance, with steps of -0.1 m"
-    monkeypatch.setattr(search, "find_contact_gait", singular)
+    singular = NotConverged(Outcome.WALKED, singular=True)
+    monkeypatch.setattr(search, "find_contact_gait", lambda *_arguments, **_settings: singular)
     said = answer_of().reason
     assert "its matrix is singular" in said
     assert "rejected" not in said

@@ -18,13 +18,15 @@ from walkerlab.orbits.attractors import (
     settled,
     swept,
 )
-from walkerlab.orbits.bifurcation_curves import curve_through
 from walkerlab.orbits.bifurcations import on_pairs
-from walkerlab.orbits.continuation import Evaluated, Segment, Solved, StepControl, corrected, root_along, stepped
+from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, root_along, stepped
 from walkerlab.orbits.families import BranchFollower, Limits, Seed, ValueSpan, period_amplitude
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.newton import Evaluated
+from walkerlab.orbits.plane import curve_through
+from walkerlab.orbits.shooting import RigidMap
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_maps import RigidMap, multipliers_of, walk_steps
+from walkerlab.orbits.step_map import multipliers_of, walk_steps
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
 A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81

@@ -6,27 +6,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import EVENTS
-from walkerlab.orbits.fixed_point import RANDOM_START, Search, SearchSettings, branches, choice
+from walkerlab.orbits.fixed_point import (
+    DAMPING,
+    RANDOM_START,
+    Gait,
+    Search,
+    SearchSettings,
+    SlopeBranch,
+    branches,
+    choice,
+)
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.gait import Gait
-from walkerlab.orbits.random_starts import NEW, NOWHERE, follow_starts, known_gaits
-from walkerlab.orbits.slope_branch import SlopeBranch
+from walkerlab.orbits.newton import NotConverged, newton
+from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, StepEquations, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
-from walkerlab.orbits.step_map import NO_RESIDUAL, evaluate, newton
-from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import RHS
 
 
 def find_gaits(walker, *rest, **options):
     return find_gaits_of_model(assembled(walker), *rest, **options)
-
-
-def new_shooting(walker, *rest, **options):
-    return new_shooting_of_model(assembled(walker), *rest, **options)
 
 
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
@@ -37,9 +37,29 @@ def on_slope(degrees, walker=PAPER):
     return walker._replace(slope=np.deg2rad(degrees))
 
 
+TIGHT = Tolerances("dop853", 1e-13, 1e-15, 10**5)
+
+
+class Counted(Shooting):
+    """A step map that counts what it costs."""
+
+    def __init__(self, like, tolerances):
+        super().__init__(like, tolerances)
+        self.steps, self.evaluations = 0, 0
+
+    def walk(self, section, z, steps=1, derived=True):
+        walked = super().walk(section, z, steps, derived)
+        self.steps += 1
+        self.evaluations += int((self.memory.varied if derived else self.memory.plain).counts[RHS])
+        return walked
+
+
 def shooting(walker):
-    method = new_dop853(16, 1e-13, 1e-15, 10**5)
-    return new_shooting(walker, method, finder_for(method, EVENTS))
+    return Counted(assembled(walker), TIGHT)
+
+
+def solve(shooting, walker, z, tolerance):
+    return newton(StepEquations(shooting, section_of(assembled(walker))), np.array(z), tolerance, 60, DAMPING)
 
 
 # from two other integrations of the same equations
@@ -120,21 +140,13 @@ def test_the_same_seed_draws_the_same_starts():
 
 
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
-    search = Search(assembled(PAPER), SearchSettings())
-    work = []
-    branch = SlopeBranch(search.looking, seeds(search.walker)[0])
-    correct = branch._corrected
-
-    def counted(points, s):
-        found = correct(points, s)
-        work.append(int(search.looking.method.counts[RHS]))
-        return found
-
-    branch._corrected = counted
-    assert branch.follow(search.walker.slope).z is not None
-    assert len(work) <= 8
+    settings = SearchSettings()
+    walker = Search(assembled(PAPER), settings).walker
+    counted = Counted(walker, settings.looking)
+    assert SlopeBranch(counted, walker, seeds(walker)[0]).follow(walker.slope).z is not None
     # one step of walking takes about 200 right-hand sides
-    assert sum(work) < 30 * 200
+    assert counted.steps <= 30
+    assert counted.evaluations < 30 * 200
 
 
 @pytest.mark.parametrize("degrees", [0.0, -1.0, -40.0])
@@ -259,25 +271,26 @@ def test_scaled_walkers_walk_alike(length, mass, gravity, degrees):
 def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degrees, sign):
     walker = RigidWalker(1.0, fraction, 5.0, 5.0 * hip, 5.0 * inertia, 9.81, np.deg2rad(degrees), sign)
     for gait in find_gaits(walker).gaits:
-        map_ = shooting(walker)
         z = np.array(gait.state[1:])
-        status, period = evaluate(map_, z)
-        assert status == 0
-        assert period == pytest.approx(gait.period, rel=1e-10)
-        assert np.abs(map_.z_next - z).max() < 1e-11 * np.sqrt(9.81)
+        step = shooting(walker).walk(section_of(assembled(walker)), z)
+        assert step.outcome is Outcome.WALKED
+        assert step.time[0] == pytest.approx(gait.period, rel=1e-10)
+        assert np.abs(step.z[0] - z).max() < 1e-11 * np.sqrt(9.81)
 
 
 def test_newton_gives_up_where_no_step_is_taken():
-    status, _, residual, evaluations = newton(shooting(PAPER), np.array([0.17, 3.0, 3.0]), 1e-12)
-    assert status != Outcome.WALKED
-    assert residual == NO_RESIDUAL
-    assert evaluations == 1
+    map_ = shooting(PAPER)
+    found = solve(map_, PAPER, [0.17, 3.0, 3.0], 1e-12)
+    assert isinstance(found, NotConverged)
+    assert found.outcome is not Outcome.WALKED
+    assert map_.steps == 1
 
 
 def test_newton_stops_when_only_rounding_is_left():
-    *_, residual, evaluations = newton(shooting(PAPER), np.array([0.168, -0.61, -0.86]), 0.0)
-    assert residual < 1e-14
-    assert evaluations <= 8
+    map_ = shooting(PAPER)
+    found = solve(map_, PAPER, [0.168, -0.61, -0.86], 1e-16)
+    assert found.evaluated.residual < 1e-14
+    assert map_.steps <= 8
 
 
 def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
@@ -292,40 +305,34 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     assert starts_from_seeds(2.0) == after_others
 
 
-def led(map_, starts, gaits=()):
-    where = np.zeros(len(starts), np.int64)
-    follow_starts(map_, known_gaits(map_, list(gaits)), starts, where)
-    return where.tolist()
+def led(map_, walker, starts, gaits=()):
+    return map_.lead(section_of(assembled(walker)), list(gaits), starts).tolist()
 
 
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
 def test_a_gait_is_come_near_with_fewer_derivatives_than_it_is_solved_with(walker):
     map_ = shooting(walker)
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
-    solved, near = gait * [1.02, 0.96, 1.03], gait * [[1.02, 0.96, 1.03]]
-    newton(map_, solved, 1e-6)
-    work = int(map_.method.counts[RHS])
-    assert led(map_, near) == [NEW]
+    near = gait * [[1.02, 0.96, 1.03]]
+    solved = solve(map_, walker, near[0], 1e-6).x
+    assert led(map_, walker, near) == [NEW]
     np.testing.assert_allclose([solved, near[0]], [gait, gait], atol=1e-5)
-    assert int(map_.method.counts[RHS]) <= work / 3
+    assert int(map_.memory.varied.counts[RHS]) <= map_.evaluations / 3
 
 
 def test_a_start_near_a_known_gait_is_followed_no_further():
     map_ = shooting(PAPER)
     gaits = [np.array(gait.state)[[1, 2, 3]] for gait in find_gaits(PAPER).gaits]
-    derivatives = []
-    for gait in gaits:
-        newton(map_, gait, 1e-12)
-        derivatives.append(map_.DP.copy())
+    derivatives = [map_.walk(section_of(assembled(PAPER)), gait).DP[0] for gait in gaits]
     starts = np.array(gaits) * [1.001, 0.999, 1.001]
     before = starts.copy()
-    assert led(map_, starts, zip(gaits, derivatives, strict=True)) == [0, 1]
+    assert led(map_, PAPER, starts, zip(gaits, derivatives, strict=True)) == [0, 1]
     np.testing.assert_array_equal(starts, before)
 
 
 def test_a_start_that_does_not_walk_or_comes_to_stand_leads_nowhere():
     together = -PAPER.slope + 1e-4
-    assert led(shooting(PAPER), np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NOWHERE, NOWHERE]
+    assert led(shooting(PAPER), PAPER, np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NOWHERE, NOWHERE]
 
 
 @pytest.mark.parametrize("degrees", [0.5445378151260504, 2.7453781512605043, 7.147058823529412])

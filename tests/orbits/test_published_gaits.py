@@ -7,13 +7,12 @@ import pytest
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.hybrid.rigid_walk import EVENTS
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.step_map import evaluate, new_shooting, newton, on_section, variation_size
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import Tolerances, finder_for
+from walkerlab.orbits.newton import Root, newton
+from walkerlab.orbits.shooting import Shooting, StepEquations, on_section, section_of
+from walkerlab.solvers.registry import Tolerances
 
 ROUND_FEET = straight_legs(Limb(0.4, 1.0, 0.1, 0.0, 0.01), 0.0, Arc(0.1))
 MCGEER = straight_legs(Limb(1.0, 1.0, 0.37, 0.0, 0.32**2), 0.0, Arc(0.3))
@@ -37,36 +36,37 @@ PUBLISHED = {
 }  # fmt: skip
 
 
-def shooting_of(parts, slope, gravity):
-    model = standing(parts, gravity, slope)
-    method = new_dop853(variation_size(model), 1e-13, 1e-16, 10**6)
-    return model, new_shooting(model, method, finder_for(method, EVENTS))
+TIGHT = Tolerances("dop853", 1e-13, 1e-16, 10**6)
+
+
+def solved(model, z):
+    found = newton(StepEquations(Shooting(model, TIGHT), section_of(model)), z, 1e-13)
+    assert isinstance(found, Root)
+    return found.x, found.evaluated
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_gait_of_a_published_walker(name):
     parts, slope, gravity, (angle, stance, swing), period, multipliers = PUBLISHED[name]
-    _, shooting = shooting_of(parts, slope, gravity)
     massless = stance * (1.0 - math.cos(2.0 * angle))  # the trailing foot's momentum about the hip is lost
-    z = np.array([angle - slope, massless if swing is None else swing, stance])
-    status, found_period, residual, _ = newton(shooting, z, 1e-13)
-    assert status == Outcome.WALKED
-    assert residual < 1e-12
+    z, here = solved(
+        standing(parts, gravity, slope), np.array([angle - slope, massless if swing is None else swing, stance])
+    )
+    assert here.residual < 1e-12
     assert z[0] + slope == pytest.approx(angle, abs=2e-7)
     assert z[2] == pytest.approx(stance, abs=2e-7)
     if swing is not None:
         assert z[1] == pytest.approx(swing, abs=2e-7)
-    assert found_period == pytest.approx(period, abs=1e-6)
-    eigenvalues = np.linalg.eigvals(shooting.DP)
+    assert here.data.time[0] == pytest.approx(period, abs=1e-6)
+    eigenvalues = np.linalg.eigvals(here.data.DP[0])
     for wanted in multipliers:
         assert np.abs(eigenvalues - wanted).min() < 1e-5
 
 
 def test_the_knee_strikes_when_the_published_one_does():
     parts, slope, gravity, (angle, stance, swing), *_ = PUBLISHED["kneed"]
-    model, shooting = shooting_of(parts, slope, gravity)
-    z = np.array([angle - slope, swing, stance])
-    newton(shooting, z, 1e-13)
+    model = standing(parts, gravity, slope)
+    z, _ = solved(model, np.array([angle - slope, swing, stance]))
     walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), on_section(model, z), 3, sampled=True)
     assert walk.outcome is Outcome.WALKED
     assert walk.knee_strike_time_s[0] == pytest.approx(0.348612, abs=1e-6)
@@ -79,15 +79,12 @@ def test_the_knee_strikes_when_the_published_one_does():
 @pytest.mark.parametrize("at_strike", ["locked", "free"])
 def test_the_step_maps_derivative_is_its_slope_through_the_knee_strike(at_strike):
     model = standing(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
-    method = new_dop853(variation_size(model), 1e-13, 1e-16, 10**6)
-    shooting = new_shooting(model, method, finder_for(method, EVENTS))
+    shooting = Shooting(model, TIGHT)
     z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.picked)]
-    evaluate(shooting, z)
-    DP, h = shooting.DP.copy(), 1e-4
+    DP, h = shooting.walk(section_of(model), z).DP[0], 1e-4
 
     def ahead(offset):
-        evaluate(shooting, z + offset)
-        return shooting.z_next.copy()
+        return shooting.walk(section_of(model), z + offset).z[0]
 
     for j, e in enumerate(np.eye(z.size)):
         slope = (8 * (ahead(h * e) - ahead(-h * e)) - (ahead(2 * h * e) - ahead(-2 * h * e))) / (12 * h)

@@ -8,10 +8,11 @@ from kneed_by_hand import step, walker_of
 from scipy.optimize import fsolve
 
 from walkerlab.config.walkers import Kneed, Torso
+from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
-from walkerlab.orbits.fixed_point import Search, SearchSettings, find_gaits
-from walkerlab.orbits.random_starts import LEAST_START, MOST_START
-from walkerlab.orbits.step_map import WALKED, evaluate
+from walkerlab.orbits.fixed_point import LEAST_START, LOOKING, MOST_START, SearchSettings, find_gaits
+from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.parts import assembly_of
 
 THIGH = {"length_m": 0.5998, "mass_kg": 4.9813, "mass_below_hip_m": 0.36521, "inertia_kg_m2": 0.022104}
@@ -70,14 +71,14 @@ def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_g
 
 
 def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found):
-    search = Search(with_torso(), SearchSettings())
-    looking, walker = search.looking, search.walker
+    walker, _ = unit_walker(with_torso())
     starts = np.random.default_rng(1).uniform(LEAST_START[:3], MOST_START[:3], (2000, 3))
     starts[:, 0] = 0.5 * starts[:, 0] - walker.slope
     walked = 0
     for z in starts:
-        if evaluate(looking, z)[0] == WALKED:
+        walk = take_walk(walker, LOOKING, on_section(walker, z), 1)
+        if walk.steps:
             walked += 1
             # a swing takes the time of a pendulum, of which rounding is a 1e-13th
-            assert looking.knee_time[0] > 1e-3
+            assert walk.knee_strike_time_s[0] > 1e-3
     assert walked > 10

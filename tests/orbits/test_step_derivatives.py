@@ -8,23 +8,18 @@ import pytest
 
 from walkerlab.config import loader
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import EVENTS
-from walkerlab.orbits.contact_section import ContactGait, find_contact_gait, step_from_section
+from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait
+from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.step_map import evaluate, newton
-from walkerlab.orbits.step_map import new_shooting as new_shooting_of_model
+from walkerlab.orbits.newton import newton
+from walkerlab.orbits.shooting import Shooting, StepEquations, section_of
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.contact import contact_scene
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import Tolerances, finder_for
+from walkerlab.solvers.registry import Tolerances
 
 
 def find_gaits(walker, *rest, **options):
     return find_gaits_of_model(assembled(walker), *rest, **options)
-
-
-def new_shooting(walker, *rest, **options):
-    return new_shooting_of_model(assembled(walker), *rest, **options)
 
 
 # central differences of order six, the Richardson extrapolation of those of order two with steps 1, 2 and 3
@@ -59,9 +54,9 @@ WALKERS = {"corrected": PAPER, "as printed": PRINTED, "four degrees": STEEP}
 OFF_THE_GAIT = {"at the gait": (0.0, 0.0, 0.0), "wider": (5e-3, -2e-2, 1e-2), "slower": (-2e-3, 3e-2, 2e-2)}
 
 
-def shooting(walker):
-    method = new_dop853(16, 1e-13, 1e-15, 10**5)
-    return new_shooting(walker, method, finder_for(method, EVENTS))
+def equations(walker):
+    model = assembled(walker)
+    return StepEquations(Shooting(model, Tolerances("dop853", 1e-13, 1e-15, 10**5)), section_of(model))
 
 
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
@@ -69,30 +64,27 @@ def shooting(walker):
 def test_rigid_step_maps_derivative_is_its_slope(name, offset):
     """Through the swing by the variational equations, through the heel strike by the saltation."""
     walker = WALKERS[name]
-    step_map = shooting(walker)
+    of_walker = equations(walker)
     z = np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT[offset])
 
     def ends(z):
-        assert evaluate(step_map, z)[0] == Outcome.WALKED
-        return step_map.z_next.copy()
+        here = of_walker.at(z)
+        assert here.outcome is Outcome.WALKED
+        return here.data.z[0]
 
-    ends(z)
-    DP = step_map.DP.copy()
+    DP = of_walker.at(z).data.DP[0]
     np.testing.assert_allclose(DP, slope_of(ends, z, [1e-3] * 3), rtol=0.0, atol=AGREEMENT)
 
 
 @pytest.mark.parametrize("name", WALKERS)
 def test_newton_converges_quadratically_on_the_rigid_step_map(name):
     walker = WALKERS[name]
-    step_map = shooting(walker)
-    z = np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT["wider"])
-    residuals = []
+    of_walker, z, residuals = equations(walker), np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT["wider"]), []
     while not residuals or residuals[-1] > ROUNDING:
         # one move: it ends with the first residual that is any smaller
-        aim = 0.999 * residuals[-1] if residuals else 1.0
-        status, _, residual, _ = newton(step_map, z, aim)
-        assert status == Outcome.WALKED
-        residuals.append(residual)
+        found = newton(of_walker, z, 0.999 * residuals[-1] if residuals else 1.0)
+        z = found.x
+        residuals.append(found.evaluated.residual)
     assert is_quadratic(residuals)
 
 
@@ -112,8 +104,8 @@ def scene():
 
 
 def stepped(scene, z, tolerance):
-    methods = Tolerances("radau5", tolerance, 1e-2 * tolerance, 10**6)
-    step = step_from_section(scene.walker, scene.ground, methods, z, PITCH)
+    tolerances = Tolerances("radau5", tolerance, 1e-2 * tolerance, 10**6)
+    step = step_from_section(scene.walker, scene.ground, tolerances, z, PITCH)
     assert step.outcome is Outcome.WALKED
     return step
 
@@ -135,10 +127,10 @@ def test_contact_derivative_converges_with_the_tolerance(scene):
 
 def test_newton_converges_quadratically_on_the_contact_step_map(scene):
     # the walk's own error has to be below the last residual
-    methods = Tolerances("radau5", 1e-11, 1e-13, 10**6)
+    tolerances = Tolerances("radau5", 1e-11, 1e-13, 10**6)
 
     def moves(tolerance):
-        found = find_contact_gait(scene.walker, scene.ground, methods, NEAR_THE_GAIT + ASIDE, PITCH, tolerance)
+        found = find_contact_gait(scene.walker, scene.ground, tolerances, NEAR_THE_GAIT + ASIDE, PITCH, tolerance)
         assert isinstance(found, ContactGait)
         return found.iterations, found.residual
 

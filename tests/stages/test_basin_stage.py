@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.stages import basin
-from walkerlab.stages.basin_pieces import RigidQuestion, WalkEnds, unpacked
+from walkerlab.stages.basin import RigidQuestion, WalkEnds, unpacked
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content

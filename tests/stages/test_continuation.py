@@ -10,7 +10,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.orbits import regions
+from walkerlab.orbits import plane as plane_of_gaits
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
 from walkerlab.stages.continuation_results import attractor_summary, ending_rows, first_doubling
@@ -138,7 +138,7 @@ def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_de
 
 
 def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value(monkeypatch):
-    monkeypatch.setattr(regions, "CELLS", (2, 2))  # the plane beside them is not looked at
+    monkeypatch.setattr(plane_of_gaits, "CELLS", (2, 2))  # the plane beside them is not looked at
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=9.5", "second.to=10.5",
@@ -150,7 +150,7 @@ def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value
 
 
 def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
-    monkeypatch.setattr(regions, "CELLS", (10, 3))
+    monkeypatch.setattr(plane_of_gaits, "CELLS", (10, 3))
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=8", "second.to=12",

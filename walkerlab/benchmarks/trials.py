@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_observer import Unobserved
+from walkerlab.hybrid.rigid_observer import unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
-from walkerlab.hybrid.rigid_walk import walk
+from walkerlab.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import Standing
 from walkerlab.paper.appendix_a import RigidWalker
@@ -82,17 +82,14 @@ class RigidTrial:
         n = len(self.walker.blank)
         method = entry.new(n, rtol, atol, budget)
         finder = finder_for(method, RIGID_EVENTS)
-        strikes, knees = np.zeros(self.steps), np.zeros(self.steps if self.walker.kneed else 0)
-        before, after = np.zeros((self.steps, n)), np.zeros((self.steps, n))
+        walker, observer, strikes = np.asarray(self.walker), unwatched(), new_heel_strikes(self.steps, n)
         stride = walk if entry.compiled else uncompiled(walk)
 
         def run() -> TrialRun:
             clear_counts(method)
             method.clock[H_NEXT] = 0.0
-            status, _ = stride(
-                self.walker, method, finder, Unobserved(), np.array(self.start), strikes, before, after, knees
-            )
-            return finished(Outcome(status), after[-1], method.counts)
+            status, _ = stride(walker, method, finder, observer, np.array(self.start), strikes)
+            return finished(Outcome(status), strikes.after[-1], method.counts)
 
         return run
 

@@ -24,7 +24,7 @@ from walkerlab.hybrid.rigid_observer import (
     new_observer,
     observe_start,
 )
-from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, walk
+from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
 from walkerlab.hybrid.walk_record import Array, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, Mode, Standing, linked, rolled_distance, swing_foot
@@ -129,25 +129,25 @@ class Recorder:
 
     def walk_on(self, steps: int) -> Outcome:
         """Take up to `steps` more steps."""
-        strikes, knees = np.zeros(steps), np.zeros(steps)
-        before, after = np.zeros((steps, self.numbers)), np.zeros((steps, self.numbers))
+        seen = new_heel_strikes(steps, self.numbers)
         observer = new_observer(self._grid(steps), self.numbers)
         clear_counts(self.method)
         self.method.counts[BUDGET] = self._left_for(steps)
         status, taken = self.walk(
-            self.walker, self.method, self.finder, observer, np.array(self.state), strikes, before, after, knees
+            np.asarray(self.walker), self.method, self.finder, observer, np.array(self.state), seen
         )
         self.counts += self.method.counts
         self._keep(observer)
         begun = self.time
-        strikes, before, after = strikes[:taken] + begun, before[:taken], after[:taken]
+        strikes, before, after = seen.time[:taken] + begun, seen.before[:taken], seen.after[:taken]
+        knees = seen.knee_time + begun
         if self.sampled:
-            self.pieces.append(self._samples(observer, strikes, before, after, knees + begun))
+            self.pieces.append(self._samples(observer, strikes, before, after, knees))
         self.strikes.append(strikes)
         self.before.append(before)
         self.after.append(after)
         if self.kneed:
-            self.knees.append(knees[:taken] + begun)
+            self.knees.append(knees[:taken])
         self.steps += taken
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import by_type_or_default, inlined, vector
+from walkerlab.kernels import inlined, vector
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
@@ -18,13 +18,10 @@ CLOSER = 3  # parabolas to an extremum
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
 
-class Unobserved(NamedTuple):
-    """A walk of which only the heel strikes are wanted."""
-
-
 class Observer(NamedTuple):
-    """What is recorded of a walk besides its heel strikes."""
+    """What is recorded of a walk besides its heel strikes; nothing, if it is not `watching`."""
 
+    watching: bool
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n)
     steps: Any  # (samples,) which step a sample belongs to
@@ -33,35 +30,25 @@ class Observer(NamedTuple):
     energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
 
 
-@by_type_or_default
-def observe_start(observer: Any, mode: Mode, y: Any) -> None:
-    """Take note of the start of a swing phase."""
-
-
-@by_type_or_default
-def observe(observer: Any, method: Any, mode: Mode, fraction: float, step: int) -> None:
-    """Take note of the last integration step up to `fraction` of it; the dense output is ready."""
-
-
-@by_type_or_default
-def wants_dense(observer: Any) -> bool:
-    """Whether `observe` needs the dense output of every integration step."""
-    return False
-
-
 def new_observer(times: Any, numbers: int) -> Observer:
     """An observer with memory for samples of a state of some `numbers` at `times` (s, rising)."""
     extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0])
     steps = np.zeros(times.size, np.int64)
-    return Observer(times, np.zeros((times.size, numbers)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
+    return Observer(True, times, np.zeros((times.size, numbers)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
 
 
-@observe_start.case(Observer)
-def record_start(observer: Observer, mode: Mode, y: Any) -> None:
-    """The energy that the swing phase must keep."""
-    kinetic, potential = energies(mode.model, y)
-    observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
-    record_extremes(observer, mode, y)
+def unwatched() -> Observer:
+    """The observer of a walk of which only the heel strikes are wanted."""
+    return new_observer(np.zeros(0), 0)._replace(watching=False)
+
+
+@inlined
+def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
+    """Take note of the start of a swing phase, whose energy it must keep."""
+    if observer.watching:
+        kinetic, potential = energies(mode.model, y)
+        observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
+        record_extremes(observer, mode, y)
 
 
 @inlined
@@ -133,9 +120,12 @@ def ascend_to_worst(
         middle = min(max(middle, spacing), last - spacing)
 
 
-@observe.case(Observer)
-def record(observer: Observer, method: Any, mode: Mode, fraction: float, step: int) -> None:
-    """Samples that fall into the integration step; extremes and the energy's integral from eighths of it."""
+@inlined
+def observe(observer: Observer, method: Any, mode: Mode, fraction: float, step: int) -> None:
+    """Take note of the last integration step up to `fraction` of it; its dense output is ready.
+
+    Samples that fall into it are kept; extremes and the energy's integral are taken from eighths of it.
+    """
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
     mean_energy = SIMPSON[0] * observer.energy[LATEST]
@@ -159,9 +149,3 @@ def record(observer: Observer, method: Any, mode: Mode, fraction: float, step: i
         observer.steps[index] = step
         index += 1
     observer.recorded[0] = index
-
-
-@wants_dense.case(Observer)
-def with_dense(observer: Observer) -> bool:
-    """Yes."""
-    return True

@@ -17,9 +17,9 @@ import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.bifurcations import eigenvector
-from walkerlab.orbits.continuation import Floats
 from walkerlab.orbits.families import GaitPoint, Seed
-from walkerlab.orbits.step_maps import StepMap
+from walkerlab.orbits.newton import Floats
+from walkerlab.orbits.step_map import StepMap
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same

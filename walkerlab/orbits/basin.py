@@ -26,13 +26,11 @@ from walkerlab.hybrid.rigid_lanes import (
     struck,
     walk_lanes,
 )
-from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import EVENTS, hip_above_fall, walk
+from walkerlab.hybrid.rigid_walk import hip_above_fall
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits import step_map
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import finder_for
-from walkerlab.solvers.stepping import H_NEXT, clear_counts
+from walkerlab.orbits.shooting import Shooting, section_of
+from walkerlab.orbits.shooting import on_section as state_on_section
+from walkerlab.solvers.registry import Tolerances
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -153,27 +151,20 @@ def walk_one_by_one(
     walker: Standing, capture: Capture, z: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
     """`walk_lanes` for any walker; a walk is looked at every so many steps."""
-    size = len(walker.blank)
-    method = new_dop853(size, *tolerances, BUDGET)
-    finder = finder_for(method, EVENTS)
-    strikes, knees = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
-    before, after = np.zeros((AT_ONCE, size)), np.zeros((AT_ONCE, size))
+    shooting, section = Shooting(walker, Tolerances("dop853", *tolerances, BUDGET)), section_of(walker)
     for number, start in enumerate(z):
-        y = np.array(step_map.on_section(walker, start))
-        outcome, steps = REJECTED if hip_above_fall(walker, y) < 0.0 else WALKED, 0
+        here, steps = start, 0
+        outcome = REJECTED if hip_above_fall(walker, state_on_section(walker, start)) < 0.0 else WALKED
         while outcome == WALKED and steps < capture.most:
-            clear_counts(method)
-            method.clock[H_NEXT] = 0.0
-            room = min(AT_ONCE, capture.most - steps)
-            outcome, taken = walk(walker, method, finder, Unobserved(), y, strikes[:room], before, after, knees)
-            points = after[:taken][:, list(walker.picked)]
+            part = shooting.walk(section, here, min(AT_ONCE, capture.most - steps), derived=False)
+            outcome, points, taken = int(part.outcome), part.z, part.time.size
             near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
             if near.any():
                 taken = int(np.argmax(near.any(axis=1))) + 1
                 capture.attractor[number] = capture.owner[np.argmax(near[taken - 1])]
                 outcome = WALKED
             if taken:
-                capture.last[number], y = points[taken - 1], after[taken - 1].copy()
+                capture.last[number] = here = points[taken - 1]
             steps += taken
             if near.any():
                 break

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.continuation import Evaluated, Floats, Segment, Solved, root_along
-from walkerlab.orbits.step_maps import IteratedMap, StepMap, multipliers_of, walk_steps
+from walkerlab.orbits.continuation import Segment, Solved, root_along
+from walkerlab.orbits.newton import Evaluated, Floats
+from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
 
 Kind = Literal["fold", "flip", "torus"]
 KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")

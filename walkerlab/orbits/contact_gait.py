@@ -18,7 +18,10 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.contact_section import ContactGait, coordinates_of, find_contact_gait
+from walkerlab.orbits.contact_map import SectionStep, coordinates_of, step_from_section
+from walkerlab.orbits.continuation import Follower, Strides, Way
+from walkerlab.orbits.newton import Damping, Evaluated, NotConverged, newton
+from walkerlab.orbits.step_map import multipliers_of
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -27,9 +30,64 @@ Floats = NDArray[np.float64]
 WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
 NEWTON_STEPS = 10  # steps walked in one search by Newton's method
 BUDGET_OF_A_STEP = 40_000  # right-hand sides
+GAIT_RESIDUAL = 1e-10
+DAMPING = Damping(1e-3, 2.0)
 # nearly rigid ground, by which factor its laws differ from the wanted ones
 STIFFER, STICKIER = 100.0, 30.0
-FIRST_STRIDE, SHORTEST_STRIDE, MOST_STRIDES = 0.25, 0.02, 24  # of the way from nearly rigid to the wanted ground
+FIRST_STRIDE, STRIDES = 0.25, Strides(1.0, 0.02, 2)  # of the way from nearly rigid to the wanted ground
+
+
+@dataclass(frozen=True)
+class ContactGait:
+    """A periodic walk of the contact model."""
+
+    z: Floats  # section coordinates
+    step: SectionStep  # the step from there
+    multipliers: NDArray[np.complex128]  # of the step map, largest first
+    residual: float  # largest component of P(z) - z, in the section's units
+    iterations: int
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers are inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+
+class OnOwnPads:
+    """P(z) - z = 0 of a walker on compliant ground, whose pads are laid for the step that it has just taken."""
+
+    def __init__(self, walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, pitch_m: float) -> None:
+        """The first step is on pads of the pitch that is given."""
+        self.walker, self.ground, self.tolerances, self.pitch_m = walker, ground, tolerances, pitch_m
+
+    def at(self, z: Floats) -> Evaluated[SectionStep]:
+        """Residual and its derivative at section coordinates z."""
+        step = step_from_section(self.walker, self.ground, self.tolerances, z, self.pitch_m)
+        if step.outcome is Outcome.WALKED:
+            self.pitch_m = step.length_m
+        return Evaluated(step.outcome, step.z - z, step.DP - np.eye(z.size), step)
+
+
+def find_contact_gait(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    pitch_m: float,
+    residual: float = GAIT_RESIDUAL,
+    most: int = 60,
+) -> ContactGait | NotConverged:
+    """The gait near section coordinates z, by Newton's method.
+
+    pitch_m   the pads' pitch to begin with
+    residual  of the gait
+    most      how many steps may be walked in search of it
+    """
+    found = newton(OnOwnPads(walker, ground, tolerances, pitch_m), z, residual, most, DAMPING, 1.0)
+    if isinstance(found, NotConverged):
+        return found
+    here = found.evaluated
+    return ContactGait(found.x, here.data, multipliers_of(here.data.DP), here.residual, found.corrections)
 
 
 @dataclass(frozen=True)
@@ -99,13 +157,13 @@ def section_points(
 def gait_near(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float
 ) -> ContactGait | str:
-    """Newton's method from section coordinates z (6,): the gait, or what came in its way."""
-    try:
-        found = find_contact_gait(walker, ground, tolerances, z, pitch_m, most_steps=NEWTON_STEPS)
-    except np.linalg.LinAlgError:
-        return "its matrix is singular, since a multiplier is 1"
-    if not isinstance(found, ContactGait):
-        return "it did not converge" if found.outcome is Outcome.WALKED else f"a step ended as {found.outcome.label}"
+    """Newton's method from section coordinates z: the gait, or what came in its way."""
+    found = find_contact_gait(walker, ground, tolerances, z, pitch_m, most=NEWTON_STEPS)
+    if isinstance(found, NotConverged):
+        if found.singular:
+            return "its matrix is singular, since a multiplier is 1"
+        walked = found.outcome is Outcome.WALKED
+        return "it did not converge" if walked else f"a step ended as {found.outcome.label}"
     if found.step.length_m <= 0.0:
         return f"it led to a walk that does not advance, with steps of {found.step.length_m:.3g} m"
     return found
@@ -140,24 +198,28 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
             "nearly rigid ground has no gait either",
             "Damp or stiffen the contact, choose a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
         )
-    rigidity, stride, before = 1.0, FIRST_STRIDE, None
-    for _ in range(MOST_STRIDES):
-        ahead = max(0.0, rigidity - stride)
-        guess = last.z
-        if before is not None:
-            guess = last.z + (last.z - before[1]) * (ahead - rigidity) / (rigidity - before[0])
-        found = gait_near(with_rigidity(walker, ahead), ground, tolerances, guess, last.step.length_m)
-        if isinstance(found, ContactGait):
-            before, last, rigidity, stride = (rigidity, last.z), found, ahead, 1.5 * stride
-            if rigidity == 0.0:
-                return GaitAnswer(last, "followed from nearly rigid ground")
-        else:
-            stride *= 0.5
-            if stride < SHORTEST_STRIDE:
-                break
+    gaits = {0.0: last}
+
+    def softer(way: float, expected: Floats) -> Floats | None:
+        """Section coordinates and step length after a part of the way from nearly rigid to the wanted ground."""
+        near = gait_near(with_rigidity(walker, 1.0 - way), ground, tolerances, expected[:-1], expected[-1])
+        if not isinstance(near, ContactGait):
+            return None
+        gaits[way] = near
+        return with_length(near)
+
+    way = Follower(softer, Way(0.0, FIRST_STRIDE, ((0.0, with_length(last)),)), STRIDES).to(1.0)
+    if way.at == 1.0:
+        return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
+    rigidity = 1.0 - way.at
     return GaitAnswer(
         None,
         f"followed from nearly rigid ground the gait is lost where that is {STIFFER**rigidity:.3g} times as stiff "
         f"and creep {STICKIER**rigidity:.3g} times as slow as wanted",
         "Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
     )
+
+
+def with_length(gait: ContactGait) -> Floats:
+    """Section coordinates of a gait, and its step length behind them."""
+    return np.append(gait.z, gait.step.length_m)

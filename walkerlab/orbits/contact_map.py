@@ -1,4 +1,14 @@
-"""The contact model's step map over a parameter, on the section of `contact_section`, for families of gaits."""
+"""The step map of the contact model, on a section where nothing is touching or lifting.
+
+Section: the swing foot passes the stance foot. One foot then stands, the transients of its touch have died away, and
+the other swings freely; just after a touch the state is still in motion on the contact's own time scale, which makes
+touch-down a poor section. Coordinates by role: height of the centre of mass, the angles of the legs' bodies but the
+uppermost of the swing leg, which follows from the section, velocity along and normal to the slope, and the angular
+velocities of all bodies that turn on their own; of two straight legs these are six numbers. A knee of the stance leg is
+locked, that of the swing leg is not. Where along the slope it happens does not matter.
+
+One step maps the section to itself with the legs' roles exchanged.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +19,223 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard
-from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import JudgedGround
+from walkerlab.ground.knees import IdealLock
+from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, has_ground_in_air
+from walkerlab.ground.walker import ContactWalker, feet_motion, folded, on_ground
+from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, material_along
+from walkerlab.hybrid.contact_knee import rate_of
+from walkerlab.hybrid.contact_observer import ContactObserver
+from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.contact_section import Floats, SectionStep, angled_bodies, step_from_section, turning_bodies
-from walkerlab.orbits.step_maps import (
-    REMEMBERED,
-    Iterates,
-    MappedStep,
-    Monitor,
-    difference_formula,
-    no_step,
-    walk_steps,
-)
+from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor, no_step
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import State
+
+Floats = NDArray[np.float64]
+# places in the state: along, height, the bodies' angles, and the velocities of these
+ALONG, HEIGHT, ANGLES = 0, 1, 2
+COORDINATES = 6  # of a walker with two straight legs
+NEWTON_STEPS = 20
+
+
+@dataclass(frozen=True)
+class SectionStep:
+    """One step from the section to the section."""
+
+    outcome: Outcome
+    z: Floats  # (coordinates,) where it led
+    DP: Floats  # (coordinates, coordinates) its derivative, if it was wanted
+    period_s: float
+    length_m: float  # how far the walker went
+    slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
+    rolling_m: float  # likewise
+    dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
+    height_lost_J: float  # potential energy given up
+    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    touch_s: float  # from the section to the touch
+    spacing_m: float  # between the feet at the touch
+
+
+def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
+    locked = walker.whole.shanks[stance] if walker.kneed else None
+    return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
+
+
+def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
+    free = turning_bodies(walker, stance)[1:]
+    if walker.kneed and not isinstance(walker.stop, IdealLock):
+        return (*free, int(walker.whole.shanks[stance]))
+    return free
+
+
+def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
+    """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
+    whole, n = walker.whole, angles.size
+    if walker.kneed and whole.shanks[stance] not in given:
+        angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
+    for body in range(n):
+        if whole.E[body, body] == 0.0 and body not in given:
+            angles[body] = whole.E[body, :n] @ angles
+    return angles
+
+
+def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
+    """How far foot 0 is ahead of foot 1 (m), and its derivatives by the bodies' angles (n)."""
+    s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
+    x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
+    return float(c @ x - s @ y), -(s * x + c * y)
+
+
+def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
+    """The walker's state of section coordinates, with `stance` the standing leg, at along = 0."""
+    n = int(walker.whole.bodies)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    state = np.zeros(4 + 2 * n)
+    state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
+    rates = np.zeros(n)
+    rates[list(turning)] = z[3 + len(angled) :]
+    state[4 + n :] = with_followers(walker, stance, rates, turning)
+    angles = np.zeros(n)
+    angles[list(angled)] = z[1 : 1 + len(angled)]
+    angles[turning[0]] = angles[walker.legs[stance][0]]
+    state[ANGLES : ANGLES + n] = feet_abreast(walker, stance, angles)
+    return tuple(float(x) for x in state)
+
+
+def feet_abreast(walker: ContactWalker, stance: int, angles: Floats) -> Floats:
+    """The angles (n) with the swing leg's uppermost body turned until the feet pass each other."""
+    angled, upper = angled_bodies(walker, stance), turning_bodies(walker, stance)[0]
+    turned = with_followers(walker, stance, np.eye(angles.size)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):
+        angles = with_followers(walker, stance, angles, (upper, *angled))
+        apart, gradient = feet_apart(walker, angles)
+        move = -apart / float(gradient @ turned)
+        angles[upper] += move
+        if abs(move) < 1e-15:
+            break
+    return with_followers(walker, stance, angles, (upper, *angled))
+
+
+def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
+    """Section coordinates of a state whose standing leg is `stance`."""
+    n = int(walker.whole.bodies)
+    angles = [ANGLES + body for body in angled_bodies(walker, stance)]
+    rates = [4 + n + body for body in turning_bodies(walker, stance)]
+    return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
+
+
+def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
+    """Derivative (4 + 2 n, coordinates) of `state_on_section`, at the state it gave."""
+    n = int(walker.whole.bodies)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
+    _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
+    given = (turning[0], *angled)
+    upper = with_followers(walker, stance, np.eye(n)[turning[0]], given)
+    along[HEIGHT, 0] = 1.0
+    for column, body in enumerate(angled, 1):
+        turned = with_followers(walker, stance, np.eye(n)[body], given)
+        along[ANGLES : ANGLES + n, column] = turned - upper * (gradient @ turned) / (gradient @ upper)
+    along[2 + n, 1 + len(angled)] = along[3 + n, 2 + len(angled)] = 1.0
+    for column, body in enumerate(turning, 3 + len(angled)):
+        along[4 + n :, column] = with_followers(walker, stance, np.eye(n)[body], turning)
+    return along
+
+
+def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: int, pitch_m: float) -> JudgedGround:
+    """The ground with its pads laid for steps of `pitch_m`, the standing foot in the middle of one."""
+    if not ground.terrain.has_pads:
+        return ground
+    foothold = feet_motion(walker.whole, state)[stance].along
+    ahead = foothold + pitch_m
+    lanes = (ahead, foothold) if stance == 1 else (foothold, ahead)
+    return JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
+
+
+def step_from_section(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    pitch_m: float,
+    derived: bool = True,
+) -> SectionStep:
+    """Walk from the section to the section.
+
+    z        section coordinates
+    pitch_m  what the pads are laid for
+    derived  whether the derivative is wanted
+    """
+    stance = STANCE_FOOT
+    start = state_on_section(walker, z, stance)
+    laid = pads_for(ground, walker, start, stance, pitch_m)
+    walk_state = new_walk_state(walker, laid.terrain, stance, 2, start)
+    stand_on_section(walk_state, walker, laid, start, stance)
+    observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
+    if derived:
+        observer.tangent.Phi[:, :] = directions(walker, start, stance)
+    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    end = np.array(stopped.state)
+    slipped, rolled = since_touch(walker, walk_state, stopped.state, 1 - stance)
+    DP = section_derivative(walker, walk_state, observer, end, 1 - stance) if derived else np.zeros((z.size, 0))
+    lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
+    lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
+    return SectionStep(
+        stopped.outcome,
+        coordinates_of(walker, end, 1 - stance),
+        DP,
+        stopped.time_s,
+        float(end[ALONG] - start[ALONG]),
+        float(walk_state.slip[0] + slipped),
+        float(walk_state.rolling[0] + rolled),
+        observer.dissipated.copy(),
+        float(lost),
+        stopped.work,
+        float(walk_state.touch_time[0]),
+        float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
+    )
+
+
+def since_touch(walker: ContactWalker, walk_state: WalkState, y: State, foot: int) -> tuple[float, float]:
+    """How far a foot has slipped and rolled since its touch (m)."""
+    along = feet_motion(walker.whole, y)[foot].along
+    slipped = material_along(walker.whole, foot, along, y) - float(walk_state.touched[foot])
+    return slipped, along - float(walk_state.foothold[foot]) - slipped
+
+
+def stand_on_section(
+    walk_state: WalkState, walker: ContactWalker, ground: JudgedGround, start: State, stance: int
+) -> None:
+    """Correct a walk state made for a start with both feet down: here one stands and the other swings past it."""
+    swing = 1 - stance
+    feet = feet_motion(walker.whole, start)
+    walk_state.at_zero[:] = 0
+    walk_state.at_zero[PASSING] = 1
+    walk_state.sides[PASSING] = 1 if swing == 1 else -1
+    above = feet[swing].height > 0.0
+    walk_state.has_ground[swing] = above and has_ground_in_air(
+        ground.terrain, bool(walk_state.has_ground[swing]), False, True
+    )
+    walk_state.left_cells[swing] = walk_state.cells[swing] - 1
+    walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
+
+
+def section_derivative(
+    walker: ContactWalker, walk_state: WalkState, observer: ContactObserver, end: Floats, stance: int
+) -> Floats:
+    """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
+    system = on_ground(walker, walk_state.has_ground, walk_state.knee)
+    rate = rate_of(system, folded(system.form, end), end.size)
+    gradient, n = np.zeros(end.size), int(walker.whole.bodies)
+    gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
+    Phi = observer.tangent.Phi
+    on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
+    return np.column_stack([coordinates_of(walker, column, stance) for column in on_section.T])
 
 
 @dataclass(frozen=True)
@@ -40,8 +250,7 @@ class ContactMap:
     """A walker on compliant ground, its coordinates where the feet pass, in units of leg length and pendulum time.
 
     Pads let the swing foot of straight legs through, so that a family is followed where it touches only ahead of the
-    stance foot; `watch` says where pads of the gait's own step length would trip it. The derivative along the section
-    is exact, that along the parameter a difference of exact steps, which only steers.
+    stance foot; `watch` says where pads of the gait's own step length would trip it.
     """
 
     monitors = (
@@ -55,8 +264,7 @@ class ContactMap:
         scale: float,
         tolerances: Tolerances,
         step_length_m: float,
-        on_pads: bool,
-        like: ContactWalker,
+        like: WalkerOnGround,
     ) -> None:
         """A family of walkers.
 
@@ -64,70 +272,41 @@ class ContactMap:
         scale          magnitude of changes of the parameter that matter
         tolerances     how to integrate a step
         step_length_m  that steps are judged by
-        on_pads        whether the ground that was asked for has pads, so that tripping is to be watched
-        like           one of the walkers
+        like           one of the walkers, whose leg and pendulum measure all
         """
         self._at = lru_cache(REMEMBERED)(walker_at)
-        self._near = lru_cache(REMEMBERED)(self._formula)
-        self._scale, self.tolerances, self._measure, self._on_pads = scale, tolerances, step_length_m, on_pads
-        self._units: Floats | None = None
-        angled, turning = angled_bodies(like, STANCE_FOOT), turning_bodies(like, STANCE_FOOT)
-        self._angles, self._rates = len(angled), len(turning)
+        self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
+        self._on_pads = like.ground.terrain.has_pads
+        angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
+        L, tau = like.ground.frame.leg_length, like.ground.frame.pendulum_time
+        self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
 
-    def _formula(self, p: float) -> tuple[list[WalkerOnGround], Floats] | None:
-        return difference_formula(self._at, p, min(self._scale, abs(p)) if p != 0.0 else self._scale)
-
-    def units(self, frame_length: float, pendulum_time: float) -> Floats:
-        """(d,) what one unit of each coordinate is in SI; those of the first walker, whatever the parameter."""
-        if self._units is None:
-            L, tau = frame_length, pendulum_time
-            self._units = np.array([L, *[1.0] * self._angles, L / tau, L / tau, *[1.0 / tau] * self._rates])
-        return self._units
-
-    def of_section(self, z: Floats, p: float) -> Floats:
+    def of_section(self, z: Floats) -> Floats:
         """Coordinates of a point of the section in SI."""
-        here = self._at(p)
-        assert here is not None, "a point of the section belongs to a walker"
-        return np.asarray(z / self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time))
+        return np.asarray(z / self._units)
 
-    def _walk(self, here: WalkerOnGround, z: Floats, terrain: Terrain) -> SectionStep:
-        units = self.units(here.ground.frame.leg_length, here.ground.frame.pendulum_time)
+    def _walk(self, here: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+        own, frame = here.ground
+        terrain = terrain or (after_mid_swing(self._measure) if own.has_pads else own)
         measure = terrain.stride_measure if terrain.has_pads else self._measure
-        return step_from_section(
-            here.walker, JudgedGround(terrain, here.ground.frame), self.tolerances, z * units, measure
-        )
+        ground = JudgedGround(terrain, frame)
+        return step_from_section(here.walker, ground, self.tolerances, z * self._units, measure, derived)
 
-    def _terrain(self, here: WalkerOnGround) -> Terrain:
-        terrain = here.ground.terrain
-        return after_mid_swing(self._measure) if terrain.has_pads else terrain
-
-    def step(self, z: Floats, p: float) -> MappedStep:
-        """One step with all derivatives."""
-        here, near = self._at(p), self._near(p)
-        if here is None or near is None:
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        """One step, with its exact derivative along the section."""
+        here = self._at(p)
+        if here is None:
             return no_step(Outcome.REJECTED, z.size)
-        step = self._walk(here, z, self._terrain(here))
+        step = self._walk(here, z, derived)
         if step.outcome is not Outcome.WALKED:
             return no_step(step.outcome, z.size)
-        Dp = np.zeros(z.size)
-        for beside, weight in zip(*near, strict=True):
-            other = self._walk(beside, z, self._terrain(beside))
-            if other.outcome is not Outcome.WALKED:
-                return no_step(other.outcome, z.size)
-            Dp += weight * other.z
-        return self._mapped(here, step, Dp)
-
-    def _mapped(self, here: WalkerOnGround, step: SectionStep, Dp: Floats) -> MappedStep:
-        frame = here.ground.frame
-        units = self.units(frame.leg_length, frame.pendulum_time)
-        half = min(1.0, max(-1.0, 0.5 * step.spacing_m / frame.leg_length))
+        half = min(1.0, max(-1.0, 0.5 * step.spacing_m / here.ground.frame.leg_length))
         return MappedStep(
             Outcome.WALKED,
-            step.z / units,
-            step.DP * units / units[:, None],
-            Dp / units,
+            step.z / self._units,
+            step.DP * self._units / self._units[:, None] if derived else step.DP,
             step.period_s,
             step.length_m,
             math.asin(half) - here.walker.slope,
@@ -140,10 +319,10 @@ class ContactMap:
         assert here is not None, "what is watched was walked"
         slip, tripped, at = 0.0, 0.0, z
         for _ in range(steps):
-            step = self._walk(here, at, self._terrain(here))
-            slip, at = max(slip, abs(step.slip_m)), step.z / self.units(1.0, 1.0)
+            step = self._walk(here, at, False)
+            slip, at = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
-                on_pads = self._walk(here, z, checkerboard(step.length_m, (0.0, 0.0)))
+                on_pads = self._walk(here, z, False, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
@@ -151,42 +330,39 @@ class ContactMap:
         """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise."""
         other = copy(self)
         other.tolerances = tolerances
-        cycle = walk_steps(other, z, p, steps)
-        if cycle.outcome is not Outcome.WALKED:
+        outcome, taken, _ = other._walked(z, p, steps)
+        if outcome is not Outcome.WALKED:
             return None
-        strikes = np.array([step.strike_s for step in cycle.steps])
-        waits = np.array([step.period_s for step in cycle.steps]) - strikes
-        return np.roll(waits, 1) + strikes, np.array([step.length_m for step in cycle.steps])
+        waits = [step.period_s - step.strike_s for step in taken]
+        periods = [before + step.strike_s for before, step in zip((waits[-1], *waits), taken, strict=False)]
+        return np.array(periods), np.array([step.length_m for step in taken])
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """A walk from section to section, step by step."""
-        here = self._at(p)
-        points: list[Floats] = []
-        lengths: list[float] = []
-        periods: list[float] = []
-        angles: list[float] = []
-        outcome = Outcome.REJECTED if here is None else Outcome.WALKED
-        direction = None if tangent is None else np.array(tangent)
-        before = 0.0
-        while here is not None and len(points) < steps:
-            step = self._walk(here, z, self._terrain(here))
-            outcome = step.outcome
-            if outcome is not Outcome.WALKED:
-                break
-            mapped = self._mapped(here, step, np.zeros(z.size))
-            if direction is not None:
-                direction = mapped.DP @ direction
-                lengths.append(float(np.linalg.norm(direction)))
-                direction /= lengths[-1]
-            z = mapped.z
-            points.append(z)
-            periods.append(before + mapped.strike_s)
-            angles.append(mapped.angle)
-            before = mapped.period_s - mapped.strike_s
+        outcome, taken, lengths = self._walked(z, p, steps, tangent)
+        waits = [0.0, *(step.period_s - step.strike_s for step in taken)]
         return Iterates(
             outcome,
-            np.array(points).reshape(-1, z.size),
+            np.array([step.z for step in taken]).reshape(-1, z.size),
             np.array(lengths),
-            np.array(periods),
-            np.array(angles),
+            np.array([wait + step.strike_s for wait, step in zip(waits, taken, strict=False)]),
+            np.array([step.angle for step in taken]),
         )
+
+    def _walked(
+        self, z: Floats, p: float, steps: int, tangent: Floats | None = None
+    ) -> tuple[Outcome, list[MappedStep], list[float]]:
+        """The last step's outcome, the steps that were taken, and by how much a tangent grew in each."""
+        taken: list[MappedStep] = []
+        lengths: list[float] = []
+        while len(taken) < steps:
+            step = self.step(z, p, tangent is not None)
+            if step.outcome is not Outcome.WALKED:
+                return step.outcome, taken, lengths
+            z = step.z
+            taken.append(step)
+            if tangent is not None:
+                image = step.DP @ tangent
+                lengths.append(float(np.linalg.norm(image)))
+                tangent = image / lengths[-1]
+        return Outcome.WALKED, taken, lengths

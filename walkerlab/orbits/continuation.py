@@ -1,7 +1,8 @@
-"""Following a curve of solutions through folds: pseudo-arclength continuation with step control.
+"""Following solutions over a parameter: from value to value, or along their curve through its folds.
 
-A curve is where `m` equations in `m + 1` unknowns hold. One step predicts along the tangent and corrects by Newton's
-method on the plane normal to it, so that a fold, where the parameter turns back, is a point like any other.
+Both foretell the next solution and correct it by Newton's method. From value to value a polynomial through the last
+ones foretells. A curve is where `m` equations in `m + 1` unknowns hold: one step predicts along the tangent and
+corrects on the plane normal to it, so that a fold, where the parameter turns back, is a point like any other.
 
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); Kuznetsov, Elements of
 applied bifurcation theory, chapter 10.
@@ -10,49 +11,95 @@ applied bifurcation theory, chapter 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, Floats, NotConverged, newton
 
-Floats = NDArray[np.float64]
 D = TypeVar("D")
-MOST_CORRECTIONS = 8
 FEW_CORRECTIONS = 3
 RESOLUTION = 1e-14  # of arclength
-SLACK = 100.0  # a residual this much above the tolerance that no longer shrinks is rounding
+Points = tuple[tuple[float, Floats], ...]
+"""Solutions by abscissa, the latest last."""
 
 
-@dataclass(frozen=True)
-class Evaluated(Generic[D]):
-    """The equations at a point.
+class Strides(NamedTuple):
+    """How far one stride goes over the parameter, and how many points foretell where it leads."""
 
-    outcome   WALKED if there is a value
-    value     (m,)
-    jacobian  (m, m + 1)
-    data      what the caller wants to keep of it
-    """
-
-    outcome: Outcome
-    value: Floats
-    jacobian: Floats
-    data: D
+    widest: float
+    narrowest: float
+    remembered: int
 
 
-class Equations(Protocol[D]):
-    """m equations in m + 1 unknowns."""
+class Way(NamedTuple):
+    """How far a solution was followed, and how it goes on from there."""
 
-    def at(self, x: Floats) -> Evaluated[D]:
-        """Value and derivative at x (m + 1,)."""
+    at: float
+    stride: float
+    points: Points
+
+
+class Follower:
+    """Follows a solution from value to value of a rising parameter; the way is walked once and remembered."""
+
+    def __init__(
+        self,
+        solve: Callable[[float, Floats], Floats | None],
+        first: Way,
+        strides: Strides,
+        abscissa: Callable[[float], float] = float,
+    ) -> None:
+        """Begin where `first` has come.
+
+        solve     the solution (m,) at a value near where it is expected; None if it is not found
+        abscissa  what it is a smooth function of
+        """
+        self._solve, self._strides, self._abscissa, self._ways = solve, strides, abscissa, [first]
+
+    def to(self, target: float) -> Way:
+        """The way to the parameter's value `target`, or to where the solution is lost before.
+
+        It begins as the way to any value further on does.
+        """
+        way = self._ways[0]
+        for way in self._ways:  # grows on the way
+            following = way.at + way.stride
+            if following >= target or way.stride < self._strides.narrowest:
+                break
+            if way is self._ways[-1]:
+                self._ways.append(self._onward(way, following))
+        while way.at < target and way.stride >= self._strides.narrowest:
+            way = self._onward(way, min(target, way.at + way.stride))
+        return way
+
+    def _onward(self, way: Way, ahead: float) -> Way:
+        """On to a value with a wider stride; with a narrower one where it was, if the solution is not found there."""
+        abscissa = self._abscissa(ahead)
+        found = self._solve(ahead, interpolated(way.points, abscissa))
+        if found is None:
+            return way._replace(stride=0.5 * way.stride)
+        points = (*way.points, (abscissa, found))[-self._strides.remembered :]
+        return Way(ahead, min(self._strides.widest, 1.5 * way.stride), points)
+
+
+def interpolated(points: Points, x: float) -> Floats:
+    """Value at x of the polynomial through `points` (Lagrange)."""
+    total = np.zeros_like(points[0][1])
+    for i, (x_i, y_i) in enumerate(points):
+        weight = 1.0
+        for j, (x_j, _) in enumerate(points):
+            if j != i:
+                weight *= (x - x_j) / (x_i - x_j)
+        total += weight * y_i
+    return total
 
 
 @dataclass(frozen=True)
 class Solved(Generic[D]):
-    """A point of the curve."""
+    """A point of a curve."""
 
     x: Floats
     tangent: Floats  # of unit length
@@ -61,44 +108,34 @@ class Solved(Generic[D]):
 
 
 @dataclass(frozen=True)
-class NotConverged:
-    """Why Newton's method found nothing."""
+class OnPlane(Generic[D]):
+    """The equations of a curve, and that a point lies on the plane through `point` with a normal."""
 
-    outcome: Outcome  # WALKED if it could be evaluated and did not converge
+    equations: Equations[D]
+    point: Floats
+    normal: Floats
 
-
-def tangent_of(jacobian: Floats, along: Floats) -> Floats:
-    """Unit tangent of a curve, on the same side as `along`."""
-    bordered = np.vstack((jacobian, along))
-    right = np.zeros(along.size)
-    right[-1] = 1.0
-    direction = np.linalg.solve(bordered, right)
-    return np.asarray(direction / np.linalg.norm(direction))
+    def at(self, x: Floats) -> Evaluated[D]:
+        """Value and derivative at x (m + 1,)."""
+        here = self.equations.at(x)
+        value = np.append(here.value, self.normal @ (x - self.point))
+        return replace(here, value=value, jacobian=np.vstack((here.jacobian, self.normal)))
 
 
 def corrected(
-    equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MOST_CORRECTIONS
+    equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_EVALUATIONS
 ) -> Solved[D] | NotConverged:
-    """Newton's method from `guess` on the plane through it with that normal."""
-    x, best = guess, np.inf
-    for correction in range(most):
-        here = equations.at(x)
-        if here.outcome is not Outcome.WALKED:
-            return NotConverged(here.outcome)
-        residual = float(np.max(np.abs(here.value)))
-        rounding = residual >= 0.5 * best and residual <= SLACK * tolerance
-        if residual <= tolerance or rounding:
-            try:
-                return Solved(x, tangent_of(here.jacobian, normal), here, correction)
-            except np.linalg.LinAlgError:
-                return NotConverged(Outcome.WALKED)
-        best = min(best, residual)
-        try:
-            move = np.linalg.solve(np.vstack((here.jacobian, normal)), np.append(-here.value, normal @ (guess - x)))
-        except np.linalg.LinAlgError:
-            return NotConverged(Outcome.WALKED)
-        x = x + move
-    return NotConverged(Outcome.WALKED)
+    """The point of a curve on the plane through `guess` with that normal, by Newton's method from there."""
+    found = newton(OnPlane(equations, guess, normal), guess, tolerance, most)
+    if isinstance(found, NotConverged):
+        return found
+    ahead = np.zeros(guess.size)
+    ahead[-1] = 1.0
+    try:
+        direction = np.linalg.solve(found.evaluated.jacobian, ahead)
+    except np.linalg.LinAlgError:
+        return NotConverged(Outcome.WALKED, singular=True)
+    return Solved(found.x, direction / np.linalg.norm(direction), found.evaluated, found.corrections)
 
 
 @dataclass(frozen=True)
@@ -170,7 +207,7 @@ class Segment(Generic[D]):
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
         guess = self.first.x + s * self.first.tangent + share * share * bend
-        return corrected(self.equations, guess, self.first.tangent, self.tolerance, 2 * MOST_CORRECTIONS)
+        return corrected(self.equations, guess, self.first.tangent, self.tolerance, 2 * MAX_EVALUATIONS)
 
 
 class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an error)
@@ -182,6 +219,9 @@ def root_along(segment: Segment[D], measure: Callable[[Solved[D]], float]) -> So
 
     Brent's method on the corrected curve: secant and inverse quadratic steps, safe by their bracket.
     """
+    # Imported here: what follows no curve does without.
+    from scipy.optimize import brentq
+
     found: dict[float, Solved[D]] = {0.0: segment.first, segment.length: segment.second}
 
     def at(s: float) -> float:

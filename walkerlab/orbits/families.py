@@ -26,16 +26,9 @@ from walkerlab.orbits.bifurcations import (
     flip_form,
     onto_doubled,
 )
-from walkerlab.orbits.continuation import (
-    Floats,
-    NotConverged,
-    Segment,
-    Solved,
-    StepControl,
-    corrected,
-    stepped,
-)
-from walkerlab.orbits.step_maps import IteratedMap, Monitor, StepMap, multipliers_of
+from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
+from walkerlab.orbits.newton import Floats, NotConverged
+from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, multipliers_of
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
@@ -168,11 +161,11 @@ class GaitBranch:
 
 
 class Seed(NamedTuple):
-    """Section coordinates z (d,) near a gait of `period` steps at a value of the parameter."""
+    """Section coordinates z (d,) near a gait of so many steps at a value of the parameter."""
 
     z: Floats
     value: float
-    period: int = 1
+    steps: int = 1
 
 
 class BranchFollower:
@@ -196,13 +189,13 @@ class BranchFollower:
         """
         branches = list(known)
         for seed in seeds:
-            start = self.solved_at(seed.z, seed.value, seed.period)
-            if start is None or repeats_sooner(start, seed.period):
+            start = self.solved_at(seed.z, seed.value, seed.steps)
+            if start is None or repeats_sooner(start, seed.steps):
                 continue
-            like = [branch for branch in branches if branch.period == seed.period]
+            like = [branch for branch in branches if branch.period == seed.steps]
             if any(self.lies_on(branch, start) for branch in like):
                 continue
-            found = self.both_ways(start, seed.period)
+            found = self.both_ways(start, seed.steps)
             # between a flip and the first gait beyond it a branch that is known has no points
             if not any(self.lies_on(found, branch.points[0].solved) for branch in like):
                 branches.append(found)

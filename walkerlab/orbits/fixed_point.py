@@ -5,55 +5,123 @@ random starting values, the paper's way (section 3.3), and from many more where 
 starts reach a heel strike at all. All of it happens with the similar walker of unit size.
 """
 
+import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_walk import EVENTS
-from walkerlab.mechanics.standing import Standing, on_slope
-from walkerlab.orbits.gait import Gait, measured
-from walkerlab.orbits.random_starts import (
-    LEAST_START,
-    MOST_START,
-    NEW,
-    SHORTEST_STEP,
-    follow_starts,
-    known_gaits,
-)
-from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.slope_branch import SlopeBranch
-from walkerlab.orbits.small_slope import Vector, seeds
-from walkerlab.orbits.step_map import Shooting, new_shooting, newton, variation_size
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.registry import Tolerances, finder_for
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
+from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
+from walkerlab.orbits.newton import Damping, Floats, NotConverged, Root, newton
+from walkerlab.orbits.shooting import EXACT, NEW, SHORTEST_STEP, Shooting, StepEquations, Steps, on_section, section_of
+from walkerlab.orbits.similarity import Units, unit_walker
+from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
+from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import State
 
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
 SAME = 1e-5  # relative distance of states below which two searches found one gait
+LOOKING = Tolerances("dop853", 1e-8, 1e-11, 20_000)
+MAX_EVALUATIONS, DAMPING = 60, Damping(2.0**-8)  # of Newton's method
+# on the way from a vanishing slope
+STRIDES = Strides(math.log(1.6), math.log(1.001), 3)  # of the logarithm of the slope's cube root
+EVALUATIONS_ON_THE_WAY = 20
+LOOSE = 1e-8  # residual that is good enough, relative; a multiplier tends to 1 as the slope vanishes
+JUMP = 0.02  # a gait further than this from where it was expected is another gait
+RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
+# angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
+# free at heel strike
+LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A fixed point of the step map, SI units."""
+
+    state: State  # just after the heel strike
+    period: float  # s
+    step_length: float  # m
+    multipliers: tuple[complex, ...]  # eigenvalues of the step map's derivative, largest first
+    residual: float  # rad, largest component of P(x) - x, velocities times sqrt(L/g); from a step walked by itself
+    energy: float  # J, time mean over the step, from the stance foot
+    energy_drift: float  # J, between least and most of it
+    min_normal_force: float  # N
+    max_friction_ratio: float | None  # None if the ground pushes nowhere
+    max_scuff_depth: float  # m
+    trailing_foot_rises: bool  # after the heel strike
+    knee_strike: float | None  # s; None for legs without knees
+    found_by: tuple[str, ...] = ()  # the searches that led here
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest magnitude of a multiplier."""
+        return abs(self.multipliers[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return self.spectral_radius < 1.0
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """What no ground can give, so that nobody walks this gait; else empty. An unstable gait is a gait."""
+        found = []
+        if self.min_normal_force < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if not self.trailing_foot_rises:
+            found.append("the foot behind would have to leave through the ground")
+        return tuple(found)
+
+
+def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, DP: Floats) -> Gait | None:
+    """The gait at section coordinates z (d,), after walking one step of it; None if that step does not end.
+
+    walker  the unit walker, whose units are `units`
+    DP      (d, d) derivative of the step map there
+    """
+    start = on_section(walker, z)
+    step = take_walk(walker, tolerances, start, 1)
+    if step.steps == 0:
+        return None
+    rate, n = 1.0 / units.time, len(start) // 2
+    return Gait(
+        state=(*start[:n], *(omega * rate for omega in start[n:])),
+        period=float(step.periods_s[0]) * units.time,
+        step_length=float(step.lengths_m[0]) * units.length,
+        multipliers=tuple(multipliers_of(DP).tolist()),
+        residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
+        energy=step.mean_energy * units.energy,
+        energy_drift=step.energy_drift * units.energy,
+        min_normal_force=step.min_normal_force * units.force,
+        max_friction_ratio=step.max_friction_ratio or None,
+        max_scuff_depth=step.max_scuff_depth * units.length,
+        trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
+        knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
+    )
 
 
 @dataclass(frozen=True)
 class SearchSettings:
     """How hard to look.
 
-    random_starts  starting values to draw
-    further_starts  to draw where nothing is found
-    rtol, atol     tolerances while looking; gaits are then solved with the `solved_` ones, down to that residual
-    residual       of an acceptable gait, which may be rounding on a steep slope
-    budget         right-hand sides for one call of the solver
+    random_starts     starting values to draw
+    further_starts    to draw where nothing is found
+    looking, solving  how steps are walked while gaits are looked for, and while they are solved
+    solved_residual   down to which they are then solved
+    residual          of an acceptable gait, which may be rounding on a steep slope
     """
 
     random_starts: int = 100
     further_starts: int = 1000
-    rtol: float = 1e-8
-    atol: float = 1e-11
-    solved_rtol: float = 1e-13
-    solved_atol: float = 1e-13
+    looking: Tolerances = LOOKING
+    solving: Tolerances = EXACT
     solved_residual: float = 1e-14
     residual: float = 1e-11
-    budget: int = 20_000
 
 
 @dataclass(frozen=True)
@@ -105,25 +173,93 @@ NO_DESCENT = (
 NONE_TO_FOLLOW = "the theory of small slopes has no gait of this walker to follow"
 
 
-def shooting(walker: Standing, rtol: float, atol: float, budget: int) -> Shooting:
-    """The walker's step map at these tolerances."""
-    method = new_dop853(variation_size(walker), rtol, atol, budget)
-    return new_shooting(walker, method, finder_for(method, EVENTS))
+class Reached(NamedTuple):
+    """How far a gait could be followed."""
+
+    slope: float  # rad
+    z: Floats | None  # (3,) at the slope asked for; None if the gait was lost before
+
+
+class SlopeBranch:
+    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
+
+    In s^2 both gaits of the small-slope theory are smooth, and polynomials through the last points foretell the next.
+    """
+
+    def __init__(self, shooting: Shooting, walker: Standing, seed: SmallSlopeSeed) -> None:
+        """Start from a seed of `walker`, on whatever slope."""
+        self.shooting, self.walker, self.seed = shooting, walker, seed
+
+    def follow(self, slope: float) -> Reached:
+        """The gait at `slope` > 0 (rad)."""
+        s = float(np.cbrt(slope))
+        follower = self.from_seed if s > np.cbrt(self.seed.slope) else self.begun(s)
+        if follower is None:
+            return Reached(0.0, None)
+        way = follower.to(math.log(s))
+        if way.at < math.log(s):
+            return Reached(math.exp(3.0 * way.at), None)
+        return Reached(slope, state_at(s, way.points[-1][1]))
+
+    @cached_property
+    def from_seed(self) -> Follower | None:
+        """The way that all steeper slopes have in common; None if it has no start."""
+        return self.begun(float(np.cbrt(self.seed.slope)))
+
+    def begun(self, s: float) -> Follower | None:
+        """The way from the first gait at s or, where the seed is too rough for that, nearer to its limit."""
+        seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
+        limit = (0.0, np.array([*seed.limit, seed.period]))
+        rough = (limit, (s_seed**2, scaled(s_seed, seed.z, seed.period)))
+        for _ in range(RETREATS + 1):
+            found = self.gait_at(math.log(s), interpolated(rough, s * s))
+            if found is not None:
+                first = Way(math.log(s), STRIDES.widest, (limit, (s * s, found)))
+                return Follower(self.gait_at, first, STRIDES, square)
+            s *= 0.5
+        return None
+
+    def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
+        """(y, T) near where it is expected; None if Newton's method finds no gait there."""
+        s = math.exp(log_s)
+        equations = StepEquations(self.shooting, section_of(on_slope(self.walker, s**3)))
+        solved = newton(equations, state_at(s, expected), LOOSE * s, EVALUATIONS_ON_THE_WAY, DAMPING)
+        if isinstance(solved, NotConverged):
+            return None
+        found = scaled(s, solved.x, float(solved.evaluated.data.time[0]))
+        moved = np.abs(found - expected)
+        near = moved[:3].max() <= JUMP * np.abs(found[:3]).max() and moved[3] <= JUMP * found[3]
+        return found if near else None
+
+
+def state_at(s: float, y: Floats) -> Floats:
+    """Section coordinates (3,) of a scaled gait."""
+    return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
+
+
+def scaled(s: float, z: Floats, period: float) -> Floats:
+    """(y, T) of a gait at s."""
+    return np.array([(z[0] + s**3) / s, z[1] / s, z[2] / s, period])
+
+
+def square(log_s: float) -> float:
+    """The square of s."""
+    return math.exp(2.0 * log_s)
 
 
 @lru_cache(maxsize=16)
 def branches(walker: Standing, settings: SearchSettings) -> tuple[SlopeBranch, ...]:
     """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
-    looking = shooting(walker, settings.rtol, settings.atol, settings.budget)
-    return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
+    looking = Shooting(walker, settings.looking)
+    return tuple(SlopeBranch(looking, walker, seed) for seed in seeds(walker))
 
 
 @dataclass
 class FoundGait:
     """A gait with what led to it."""
 
-    z: Vector
-    DP: Vector  # derivative of the step map there
+    z: Floats
+    DP: Floats  # derivative of the step map there
     gait: Gait
     by: list[str]
 
@@ -138,10 +274,8 @@ class Search:
         self.found: list[FoundGait] = []
         self.lost: list[str] = []
         self.drawn = 0
-        rtol, atol = settings.solved_rtol, settings.solved_atol
-        self.tolerances = Tolerances("dop853", rtol, atol, settings.budget)
-        self.looking = shooting(self.walker, settings.rtol, settings.atol, settings.budget)
-        self.solving = shooting(self.walker, rtol, atol, settings.budget)
+        self.looking = Shooting(self.walker, settings.looking)
+        self.equations = StepEquations(Shooting(self.walker, settings.solving), section_of(self.walker))
 
     def follow_seeds(self) -> None:
         """Follow the gaits of the small-slope theory to the walker's slope."""
@@ -156,42 +290,45 @@ class Search:
 
     def draw(self, generator: np.random.Generator, count: int) -> None:
         """Solve the step map from random starting values, unless they lead to a gait that was found before."""
-        d = len(self.walker.picked)
+        d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (count, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
-        known = known_gaits(self.looking, [(found.z, found.DP) for found in self.found])
-        led = np.zeros(len(starts), np.int64)
-        follow_starts(self.looking, known, starts, led)
+        led = self.looking.lead(self.equations.section, [(found.z, found.DP) for found in self.found], starts)
         for z, gait in zip(starts, led, strict=True):
             if gait >= 0:
                 self.found[gait].by.append(RANDOM_START)
             elif gait == NEW and not self.stands(z):
                 self.keep(z, RANDOM_START)
 
-    def stands(self, z: Vector) -> bool:
+    def stands(self, z: Floats) -> bool:
         """Whether the legs are together."""
         return abs(float(z[0]) + self.walker.slope + self.walker.lean) < SMALLEST_ANGLE
 
-    def keep(self, z: Vector, by: str) -> bool:
+    def keep(self, z: Floats, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
         if self.known(z, by):
             return True
-        z = np.array(z)
-        status, period, residual, _ = newton(self.solving, z, self.settings.solved_residual)
-        if status != Outcome.WALKED or residual > self.settings.residual or period < SHORTEST_STEP:
+        settings, solved = self.settings, self.solved(z)
+        if isinstance(solved, NotConverged) or solved.evaluated.data.time[0] < SHORTEST_STEP:
             return False
+        z, DP = solved.x, solved.evaluated.data.DP[0]
         if self.walker.slope == 0.0 and self.stands(z):
             return False
         if self.known(z, by):
             return True
-        gait = measured(self.walker, self.units, self.tolerances, z, self.solving.DP)
-        if gait is None or gait.residual > self.settings.residual:
+        gait = measured(self.walker, self.units, settings.solving, z, DP)
+        if gait is None or gait.residual > settings.residual:
             return False
-        self.found.append(FoundGait(z, self.solving.DP.copy(), gait, [by]))
+        self.found.append(FoundGait(z, DP, gait, [by]))
         return True
 
-    def known(self, z: Vector, by: str) -> bool:
+    def solved(self, z: Floats) -> Root[Steps] | NotConverged:
+        """The fixed point near z, to rounding."""
+        least, enough = self.settings.solved_residual, self.settings.residual
+        return newton(self.equations, z, least, MAX_EVALUATIONS, DAMPING, enough / least)
+
+    def known(self, z: Floats, by: str) -> bool:
         """Whether z is one of the gaits found, which is then noted to be found again."""
         for found in self.found:
             if np.abs(found.z - z).max() < SAME * np.abs(z).max():

@@ -27,7 +27,7 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_section import ContactGait, find_contact_gait
+from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -36,6 +36,7 @@ GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
 WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10  # of the walks that are timed, and of those that show their numerical error
 ABSOLUTE = 0.01  # absolute tolerance in relative ones
 REPEATS = 3
+MAX_EVALUATIONS = 30  # of Newton's method
 
 
 class ContactFactors(NamedTuple):
@@ -147,10 +148,7 @@ class Limit:
     def gait(self, walker: ContactWalker, near: ContactGait, tolerance: float) -> ContactGait | None:
         """The gait on this ground near another one's; None if it is not found."""
         how = settings(tolerance)
-        try:
-            found = find_contact_gait(walker, self.ground, how, near.z, near.step.length_m, most_steps=30)
-        except np.linalg.LinAlgError:
-            return None
+        found = find_contact_gait(walker, self.ground, how, near.z, near.step.length_m, most=MAX_EVALUATIONS)
         return found if isinstance(found, ContactGait) else None
 
     def distance(self, setting: ContactFactors, gait: ContactGait, check: ContactGait | None) -> Distance:

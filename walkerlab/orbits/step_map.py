@@ -1,206 +1,172 @@
-"""The step map of the rigid model and its exact derivative.
+"""A walker's step from section to section over one parameter, whatever the model: all that orbits are sought on.
 
-A gait's state lies on the section 'both feet on the slope, just after heel strike'. Its coordinates z are the stance
-leg's angle, which the swing leg's follows from, and the velocities of all bodies that turn by themselves then: swing
-leg, stance leg, and a shank whose knee was free during the impact. A compass has (theta_2, dtheta_1, dtheta_2).
+`shooting.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
+fixed point of n steps in a row, `walk_steps`, whose derivative is the product of the steps' own.
 """
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_observer import Unobserved
-from walkerlab.hybrid.rigid_walk import take_step
-from walkerlab.kernels import inlined, kernel, vector
-from walkerlab.mechanics.links import spread
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing
-from walkerlab.solvers.dop853 import new_dop853
-from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
-from walkerlab.solvers.system import State
+from walkerlab.solvers.registry import Tolerances
 
-WALKED, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.NO_HEEL_STRIKE)
-SMALLEST_MOVE = 2.0**-8
-MOST_EVALUATIONS = 60
-NO_RESIDUAL = 1e300
-SMALL = 2.0**-13
-"""Length of the directions that are led along: what is linear in them is exact, and needs fewer digits than the state.
+Floats = NDArray[np.float64]
 
-With an absolute tolerance of a tenth of the relative one they keep some three digits less, which halves the steps.
-"""
-ROUNDING = 1e-10  # a residual this small that no longer shrinks is rounding
+SPREAD = 1e-3  # of the parameter, between the points of the difference formula
+REMEMBERED = 4096  # walkers built so far
+CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
+FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
+"""Offsets and weights of formulas of second order for a first derivative."""
 
 
-def on_section(walker: Standing, z: Any) -> State:
-    """The state (2 n) of section coordinates z (d,)."""
-    y = np.zeros(len(walker.blank))
-    lift(walker, z, -2.0 * (walker.slope + walker.lean), y, 0)
-    return tuple(y.tolist())
+@dataclass(frozen=True)
+class Monitor:
+    """Something that a model assumes and does not enforce; `limit` is where the assumption fails."""
+
+    name: str
+    unit: str
+    meaning: str
+    limit: float | None = None
 
 
-@inlined
-def lift(walker: Standing, z: Any, both: float, y: Any, at: int) -> None:
-    """The state of section coordinates z (d,) with straight legs whose angles sum to `both` (rad), from y[at] on.
+@dataclass(frozen=True)
+class MappedStep:
+    """One step from section to section.
 
-    Linear in z for `both` = 0: the derivative of the state on the section along z.
+    z         (d,) where it led
+    DP        (d, d) its derivative with respect to where it began, if it was wanted
+    period_s, length_m  its duration and the distance walked
+    angle     rad, stance leg just after the step's heel strike
+    strike_s  when that is, from the section on
     """
-    n = len(walker.arm_x)
-    theta, omega = vector(walker.arm_x), vector(walker.arm_x)
-    for k in range(n):
-        theta[k], omega[k] = 0.0, 0.0
-    theta[STANCE], theta[SWING] = z[0], both - z[0]
-    for i in range(1, len(z)):
-        omega[walker.section[i] - n] = z[i]
-    spread(walker.E[STRAIGHT], n, theta)
-    spread(walker.E[AT_STRIKE], n, omega)
-    for k in range(n):
-        y[at + k], y[at + n + k] = theta[k], omega[k]
+
+    outcome: Outcome
+    z: Floats
+    DP: Floats
+    period_s: float
+    length_m: float
+    angle: float
+    strike_s: float
 
 
-def section_of(walker: Standing, y: Any) -> Any:
-    """The section coordinates (d,) of a state (2 n) just after heel strike."""
-    return np.array([y[i] for i in walker.picked])
+@dataclass(frozen=True)
+class Iterates:
+    """A walk on the section with a tangent beside it.
 
-
-class Shooting(NamedTuple):
-    """A walker's step map with the memory to evaluate, differentiate and invert it."""
-
-    walker: Standing
-    method: Any  # for the equations of the walker with a column for each coordinate
-    plain: Any  # for those of the walker alone
-    finder: CrossingFinder
-    y: Any  # (2 n (1 + d),) the state with its columns, at the step's start and end
-    plain_y: Any  # (2 n,)
-    unit: Any  # (d,) a unit vector
-    z_next: Any  # (d,) where a step led
-    DP: Any  # (d, d) its derivative
-    system: Any  # (d, d) Newton's matrix
-    pivots: Any  # (d,)
-    knee_time: Any  # (1,) s
-    start: Any  # (d,) one of many
-    move: Any  # (d,) Newton's
-    best: Any  # (d,) the best state met
-    best_DP: Any  # (d, d) the derivative there
-
-
-def variation_size(walker: Standing) -> int:
-    """How many equations the step map's derivative takes."""
-    return len(walker.blank) * (1 + len(walker.picked))
-
-
-def new_shooting(walker: Standing, method: Any, finder: CrossingFinder) -> Shooting:
-    """The step map of `walker`, integrated with `method`, which has room for `variation_size` equations."""
-    d = len(walker.picked)
-    plain = new_dop853(len(walker.blank), method.rtol, method.atol, int(method.counts[BUDGET]))
-    return Shooting(
-        walker, method, plain, finder, np.zeros(variation_size(walker)), np.zeros(len(walker.blank)), np.zeros(d),
-        np.zeros(d), np.zeros((d, d)), np.zeros((d, d)), np.zeros(d, np.int64), np.zeros(1), np.zeros(d), np.zeros(d),
-        np.zeros(d), np.zeros((d, d)),
-    )  # fmt: skip
-
-
-@inlined
-def step_from(shooting: Shooting, walker: Standing, z: Any, derived: bool) -> tuple[int, float, float]:
-    """One step of `walker` from z (d,): where it led is left in `z_next`, and if `derived` its derivative in `DP`.
-
-    Without the derivative it is a fraction of the work.
-
-    Returns the outcome's number, the step's duration (s) and the residual, the largest component of P(z) - z: huge if
-    the step did not end in a heel strike.
+    points   (steps, d) where each step led
+    lengths  (steps,) by how much the tangent grew in each; empty without one
+    periods_s  (steps,)
+    angles   (steps,) rad, as in `MappedStep`
     """
-    section, unit = walker.section, shooting.unit
-    method = shooting.method if derived else shooting.plain
-    y = shooting.y if derived else shooting.plain_y
-    size, d = len(walker.blank), len(z)
-    lift(walker, z, -2.0 * (walker.slope + walker.lean), y, 0)
-    for j in range(len(y) // size - 1):
-        for i in range(d):
-            unit[i] = SMALL if i == j else 0.0
-        lift(walker, unit, 0.0, y, size * (j + 1))
-    if not derived:
-        clear_counts(method)
-    method.clock[H_NEXT] = 0.0
-    status, period = take_step(walker, method, shooting.finder, Unobserved(), 0.0, y, 0, shooting.knee_time)
-    if status != WALKED:
-        return status, period, NO_RESIDUAL
-    residual = 0.0
-    for i in range(d):
-        shooting.z_next[i] = y[section[i]]
-        residual = max(residual, abs(shooting.z_next[i] - z[i]))
-        if derived:
-            for j in range(d):
-                shooting.DP[i, j] = y[size * (j + 1) + section[i]] / SMALL
-    return status, period, residual
+
+    outcome: Outcome
+    points: Floats
+    lengths: Floats
+    periods_s: Floats
+    angles: Floats
 
 
-def evaluate(shooting: Shooting, z: Any) -> tuple[int, float]:
-    """A step with its derivative for callers outside compiled code: Newton's first look, without a move."""
-    status, period, _, _ = newton(shooting, np.array(z, float), NO_RESIDUAL)
-    return status, period
+class StepMap(Protocol):
+    """A walker's step from section to section, over one parameter."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The section's coordinates, all of magnitude one."""
+
+    @property
+    def monitors(self) -> tuple[Monitor, ...]:
+        """What `watch` measures."""
+
+    @property
+    def scale(self) -> float:
+        """Magnitude of changes of the parameter that matter."""
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        """One step from z (d,) at the parameter's value p, with its derivative; REJECTED where p makes no walker."""
+
+    def watch(self, z: Floats, p: float, steps: int) -> Floats:
+        """(monitors,) the worst of each over some steps."""
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Of its steps."""
+
+    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
+        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise; None: it fell."""
+
+    def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
+        """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
 
 
-@kernel
-def newton(shooting: Shooting, z: Any, tolerance: float) -> tuple[int, float, float, int]:
-    """Solve P(z) = z by Newton's method with the exact derivative, halving moves that make the residual grow.
+def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome, Floats]:
+    """How a step from z (d,) ends near p, and the derivative (d,) of where it leads with respect to the parameter.
 
-    A halved move is tried without the derivative, which only a state from which Newton's method goes on needs.
-
-    z  (d,) start; overwritten with the best state found, whose derivative is left in `DP`
-
-    Returns the outcome's number of the step from z, its duration (s), the residual (largest component of P(z) - z)
-    and the steps of walking it took.
+    A difference of exact steps of second order, central, one-sided where the parameter ends: it only steers predictors
+    and Newton's method and enters no result.
     """
-    clear_counts(shooting.method)
-    best, move, DP = shooting.best, shooting.move, shooting.best_DP
-    best_status, best_period, best_residual = NO_HEEL_STRIKE, 0.0, NO_RESIDUAL
-    scale, evaluations = 1.0, 0
-    while evaluations < MOST_EVALUATIONS:
-        evaluations += 1
-        status, period, residual = step_from(shooting, shooting.walker, z, scale == 1.0)
-        if residual < best_residual and scale < 1.0:
-            status, period, residual = step_from(shooting, shooting.walker, z, True)
-        if residual < best_residual:
-            best_status, best_period, best_residual = status, period, residual
-            keep(z, shooting.DP, best, DP)
-            scale = 1.0
-            if residual <= tolerance or not newton_move(shooting, z, move):
-                break
-        else:
-            scale *= 0.5
-            if scale < SMALLEST_MOVE or best_status != WALKED or best_residual < ROUNDING:
-                break
-        for i in range(shooting.move.size):
-            z[i] = best[i] + scale * move[i]
-    keep(best, DP, z, shooting.DP)
-    return best_status, best_period, best_residual, evaluations
+    h = SPREAD * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
+    for formula in (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD)):
+        steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
+        outcomes = [step.outcome for step in steps]
+        if Outcome.REJECTED in outcomes:
+            continue
+        ended = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
+        return ended, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
+    return Outcome.REJECTED, 0.0 * z
 
 
-@inlined
-def copied(numbers: Any, to: Any) -> None:
-    """Copy numbers (d,)."""
-    for i in range(numbers.size):
-        to[i] = numbers[i]
+def no_step(outcome: Outcome, d: int) -> MappedStep:
+    """A step that did not come to its end."""
+    return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
 
 
-@inlined
-def keep(z: Any, DP: Any, z_kept: Any, DP_kept: Any) -> None:
-    """Copy a state and the derivative there."""
-    for i in range(z.size):
-        z_kept[i] = z[i]
-        for j in range(z.size):
-            DP_kept[i, j] = DP[i, j]
+@dataclass(frozen=True)
+class IteratedMap:
+    """Some steps in a row.
+
+    outcome  of the last step
+    steps    those that were taken
+    z        (d,) where they led
+    DP, Dp   derivatives of all steps together
+    """
+
+    outcome: Outcome
+    steps: tuple[MappedStep, ...]
+    z: Floats
+    DP: Floats
+    Dp: Floats
+
+    @property
+    def period_s(self) -> float:
+        """Duration of the steps."""
+        return math.fsum(step.period_s for step in self.steps)
 
 
-@inlined
-def newton_move(shooting: Shooting, z: Any, move: Any) -> bool:
-    """Newton's move (I - DP)^-1 (P(z) - z); False if the matrix is singular."""
-    for i in range(shooting.move.size):
-        move[i] = shooting.z_next[i] - z[i]
-        for j in range(shooting.move.size):
-            shooting.system[i, j] = (1.0 if i == j else 0.0) - shooting.DP[i, j]
-    if not factor(shooting.system, shooting.pivots, shooting.move.size):
-        return False
-    solve(shooting.system, shooting.pivots, move, 0, shooting.move.size)
-    return True
+def walk_steps(step_map: StepMap, z: Floats, p: float, n: int) -> IteratedMap:
+    """n steps from z (d,) at p, by the chain rule."""
+    steps: list[MappedStep] = []
+    DP, Dp = np.eye(z.size), np.zeros(z.size)
+    outcome = Outcome.WALKED
+    for _ in range(n):
+        step = step_map.step(z, p)
+        outcome, beside = (step.outcome, z) if step.outcome is not Outcome.WALKED else along_parameter(step_map, z, p)
+        if outcome is not Outcome.WALKED:
+            break
+        DP, Dp = step.DP @ DP, step.DP @ Dp + beside
+        z = step.z
+        steps.append(step)
+    return IteratedMap(outcome, tuple(steps), z, DP, Dp)
+
+
+def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
+    """Eigenvalues, largest first; of a pair the one with positive imaginary part first."""
+    values = np.linalg.eigvals(DP).astype(np.complex128)
+    order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
+    return np.asarray(values[list(order)])

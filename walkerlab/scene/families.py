@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.step_maps import RigidMap
+from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
@@ -54,10 +54,9 @@ def walkers_on_ground(
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
-    from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
     from walkerlab.scene.contact import contact_scene
 
-    on_pads = config.contact is not None and config.contact.terrain == "checkerboard"
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    like = contact_scene(config, step_length_m, step_length_m).walker
-    return ContactMap(walkers, scale, CONTACT, step_length_m, on_pads, like)
+    like = contact_scene(config, step_length_m, step_length_m)
+    return ContactMap(walkers, scale, CONTACT, step_length_m, WalkerOnGround(like.walker, like.ground))

@@ -10,33 +10,30 @@ from typing import Final
 import numpy as np
 
 from walkerlab.config.continuation import Continuation
-from walkerlab.config.reads import ContactConfig, ContinuationConfig
+from walkerlab.config.reads import ContinuationConfig
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
     Attractor,
-    AttractorBranch,
-    Lyapunov,
     close_returns,
     largest_exponent,
     left_by_flip,
     settled_elsewhere,
     swept,
 )
-from walkerlab.orbits.bifurcation_curves import CONTROL as CURVE_CONTROL
-from walkerlab.orbits.bifurcation_curves import BifurcationCurve, curve_through
-from walkerlab.orbits.continuation import Floats, StepControl
+from walkerlab.orbits.continuation import StepControl
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Limits, Seed, ValueSpan
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.regions import Regions, regions_of
+from walkerlab.orbits.newton import Floats
+from walkerlab.orbits.plane import CONTROL as CURVE_CONTROL
+from walkerlab.orbits.plane import curve_through, regions_of
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_maps import StepMap
+from walkerlab.orbits.step_map import StepMap
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.stages.continuation_motions import motions
-from walkerlab.stages.continuation_results import groups, summary
+from walkerlab.stages.continuation_results import Followed, groups, motions, summary
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
 
@@ -91,28 +88,6 @@ class FamilyQuestion:
         own = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
         return [*([own] if own in self.span else []), *(float(one) for one in spread)]
-
-
-NO_ATTRACTORS = AttractorBranch()
-
-
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """What was found of one model; no map if there was no gait to begin from.
-
-    map_of   the step map over the parameter of another config
-    curves   of bifurcations, over the plane of two parameters
-    regions  of that plane, by what walks settle on
-    """
-
-    model: str
-    step_map: StepMap | None
-    branches: tuple[GaitBranch, ...]
-    map_of: Callable[[ContactConfig], StepMap] | None = None
-    attractors: AttractorBranch = NO_ATTRACTORS
-    exponents: tuple[Lyapunov, ...] = ()
-    curves: tuple[BifurcationCurve, ...] = ()
-    regions: Regions | None = None
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -331,7 +306,7 @@ def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followe
         progress.start("continuation: branches of the contact model")
         control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
         follower = BranchFollower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
-        seed = Seed(step_map.of_section(found.gait.z, value), value)
+        seed = Seed(step_map.of_section(found.gait.z), value)
         return Followed(CONTACT, step_map, follower.family([seed], asked.periods), map_of), follower
     return Followed(CONTACT, None, ()), None
 

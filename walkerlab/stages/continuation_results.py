@@ -1,32 +1,41 @@
-"""What the stage `continuation` stores and prints of the families that it followed."""
+"""What the stage `continuation` follows, what of it is stored and printed, and how some of its gaits move."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
 from walkerlab.config.reads import ContactConfig
+from walkerlab.hybrid.recorded_walk import Samples
 from walkerlab.labels import Label
-from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
-from walkerlab.orbits.bifurcation_curves import BifurcationCurve
+from walkerlab.mechanics.rigid import knee_of
+from walkerlab.orbits.attractors import AttractorBranch, Lyapunov, feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcations import Bifurcation
-from walkerlab.orbits.families import Crossing, GaitBranch, ends_at, steps_word, strike_to_strike
-from walkerlab.orbits.regions import Regions
-from walkerlab.orbits.step_maps import IteratedMap, Monitor, StepMap
+from walkerlab.orbits.families import Crossing, GaitBranch, GaitPoint, ends_at, steps_word, strike_to_strike
+from walkerlab.orbits.plane import BifurcationCurve, Regions
+from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap
 from walkerlab.scene.endings import WHAT, causes, without_pads
 from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.stages.numerical_error import OF_EACH_STEP, SAMPLE, USUAL, evenly_spread, tightened
+from walkerlab.stages.simulate import trajectory_group
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
 
-if TYPE_CHECKING:
-    from walkerlab.stages.continuation import Followed
+MOTIONS_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
+STRIDE = 2  # steps, after which each leg is where it was
+TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
+EVERY = 3  # which samples are kept beside those at heel strikes
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -46,6 +55,28 @@ ATTRACTORS = {
     "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
     "angles": replace(STANCE, dims=("visit",)),
 }
+
+
+NO_ATTRACTORS = AttractorBranch()
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What was found of one model; no map if there was no gait to begin from.
+
+    map_of   the step map over the parameter of another config
+    curves   of bifurcations, over the plane of two parameters
+    regions  of that plane, by what walks settle on
+    """
+
+    model: str
+    step_map: StepMap | None
+    branches: tuple[GaitBranch, ...]
+    map_of: Callable[[ContactConfig], StepMap] | None = None
+    attractors: AttractorBranch = NO_ATTRACTORS
+    exponents: tuple[Lyapunov, ...] = ()
+    curves: tuple[BifurcationCurve, ...] = ()
+    regions: Regions | None = None
 
 
 def summary(
@@ -403,3 +434,40 @@ def bifurcation_group(rows: Sequence[dict[str, Any]], parameter: Parameter) -> G
             **real_and_imaginary("multiplier", multipliers, (along,), "critical multiplier"),
         }
     )
+
+
+def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
+    """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
+    return {
+        f"branch_{number}/motion_{place}": group
+        for number, branch in enumerate(branches)
+        if branch.period <= LONGEST
+        for place in evenly_spread(len(branch.points), MOTIONS_OF_BRANCH)
+        for group in motion(branch.points[place], branch.period, config, parameter)
+    }
+
+
+def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
+    """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
+    changed = parameter.config_at(config, point.value)
+    if changed is None:
+        return
+    walker = rigid_walker(changed, changed.equations)
+    unit, units = unit_walker(walker)
+    section, n = on_section(unit, point.z), len(walker.arm_x)
+    start = (*section[:n], *(rate / units.time for rate in section[n:]))
+    steps = max(period, STRIDE)
+    knee = knee_of(assembly_of(changed.walker, rigid=True))
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, states=True, energies=True, forces=True)
+    walk = scene.walk(start, steps, TOLERANCES, sampled=True)
+    if walk.steps < steps or walk.samples is None:
+        return
+    seen = trajectory_group(scene, walk, thinned(walk.samples))
+    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
+
+
+def thinned(samples: Samples) -> Samples:
+    """Every third sample, and both sides of every heel strike."""
+    changes = np.flatnonzero(np.diff(samples.step))
+    kept = np.unique(np.concatenate((np.arange(0, samples.time_s.size, EVERY), changes, changes + 1)))
+    return Samples(samples.time_s[kept], samples.state[kept], samples.step[kept], samples.bent[kept])

@@ -10,8 +10,7 @@ import numpy as np
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
-from walkerlab.orbits.fixed_point import GaitSearch, find_gaits
-from walkerlab.orbits.gait import Gait
+from walkerlab.orbits.fixed_point import Gait, GaitSearch, find_gaits
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import printed, real_and_imaginary, rows_group

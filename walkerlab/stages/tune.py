@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,16 +20,18 @@ from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import (
     TOLERANCES,
     Adjustment,
-    Margin,
     MarginSearch,
     ScaledStarts,
+    StartMap,
     StartTrial,
+    as_map,
+    contact_row,
     margins,
+    rigid_map,
     scaled_starts,
     smallest_change,
 )
-from walkerlab.orbits.start_map import StartMap, as_map, contact_row, rigid_map
-from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
+from walkerlab.paper.adams_start import adams_walk, forces_of
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
@@ -39,7 +41,7 @@ from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_T
 from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary
-from walkerlab.stages.tune_results import groups, summary, walk_summary
+from walkerlab.stages.tune_results import Procedure, TuneFindings, groups, summary, walk_summary
 from walkerlab.store.content import Content
 from walkerlab.workers import in_order
 
@@ -50,43 +52,6 @@ RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
 COMPASS_CELLS, CELLS, COARSE = 61, 21, MarginSearch(step=0.05, largest=2.0)
-
-
-@dataclass(frozen=True)
-class Procedure:
-    """The paper's procedure, step by step.
-
-    hinged    the paper's walk whose first step has a revolute joint at its stance foot, from the rigid state; None for
-              another walker than a compass
-    released  the walk without it
-    adjusted  the walk from the adjusted start; the released one if no adjustment is needed; None if there is none
-    """
-
-    rigid_state: State
-    rigid: RigidWalkResult
-    hinged: ContactWalkResult | None
-    released: ContactWalkResult
-    adjusted: ContactWalkResult | None
-
-
-@dataclass(frozen=True)
-class TuneFindings:
-    """All that the stage found."""
-
-    scene: ContactScene
-    gait: GaitAnswer
-    procedure: Procedure
-    as_it_stands: StartTrial
-    adjustment: Adjustment | None
-    margins: list[Margin]
-    contact_map: StartMap
-    rigid_map: StartMap
-    paper: AdamsWalk | None  # None for another walker than the paper's compass
-    steps: int  # asked for
-    names: tuple[str, ...]  # of the rigid start's numbers
-    errors: Mapping[str, dict[str, Any]]  # what is told of the procedure's walks beside themselves, by name
-    adjusted_state: State | None
-    gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:

@@ -13,7 +13,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
-from walkerlab.orbits.contact_section import ContactGait
+from walkerlab.orbits.contact_gait import ContactGait
 from walkerlab.orbits.rigid_limit import (
     ALL,
     ALL_POINT,

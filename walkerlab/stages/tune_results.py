@@ -1,8 +1,10 @@
-"""What `tune` stores and prints."""
+"""What `tune` finds, and what of it is stored and printed."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,23 +14,58 @@ from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_c
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
-from walkerlab.orbits.contact_section import ContactGait, angled_bodies, turning_bodies
+from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
+from walkerlab.orbits.contact_map import angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
-from walkerlab.orbits.scaled_starts import Adjustment, Margin
-from walkerlab.orbits.start_map import StartMap
+from walkerlab.orbits.scaled_starts import Adjustment, Margin, StartMap, StartTrial
 from walkerlab.paper.adams_start import AdamsWalk
 from walkerlab.paper.printed import TABLE_2, StartRow
 from walkerlab.scene.contact import ContactScene
+from walkerlab.solvers.system import State
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.stages.walk_columns import TIME, legs, of_steps, over_time
 from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Group, Variable
 
-if TYPE_CHECKING:
-    from walkerlab.stages.tune import TuneFindings
-
 WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 SWING, STANCE = "swing_factor", "stance_factor"
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """The paper's procedure, step by step.
+
+    hinged    the paper's walk whose first step has a revolute joint at its stance foot, from the rigid state; None for
+              another walker than a compass
+    released  the walk without it
+    adjusted  the walk from the adjusted start; the released one if no adjustment is needed; None if there is none
+    """
+
+    rigid_state: State
+    rigid: RigidWalkResult
+    hinged: ContactWalkResult | None
+    released: ContactWalkResult
+    adjusted: ContactWalkResult | None
+
+
+@dataclass(frozen=True)
+class TuneFindings:
+    """All that the stage found."""
+
+    scene: ContactScene
+    gait: GaitAnswer
+    procedure: Procedure
+    as_it_stands: StartTrial
+    adjustment: Adjustment | None
+    margins: list[Margin]
+    contact_map: StartMap
+    rigid_map: StartMap
+    paper: AdamsWalk | None  # None for another walker than the paper's compass
+    steps: int  # asked for
+    names: tuple[str, ...]  # of the rigid start's numbers
+    errors: Mapping[str, dict[str, Any]]  # what is told of the procedure's walks beside themselves, by name
+    adjusted_state: State | None
+    gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
 
 def summary(found: TuneFindings) -> dict[str, Any]:

@@ -1,0 +1,121 @@
+"""Newton's method, for gaits of either model and for the points of their branches alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+
+Floats = NDArray[np.float64]
+D = TypeVar("D")
+MAX_EVALUATIONS = 8
+ROUNDING = 100.0  # a residual at most this many tolerances large that a move does not halve is rounding
+
+
+@dataclass(frozen=True)
+class Evaluated(Generic[D]):
+    """The equations at a point.
+
+    outcome   WALKED if there is a value
+    value     (m,)
+    jacobian  (m, m), or a column more for a curve
+    data      what the caller wants to keep of it
+    """
+
+    outcome: Outcome
+    value: Floats
+    jacobian: Floats
+    data: D
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest component of the value; infinite where there is none."""
+        return float(np.abs(self.value).max()) if self.outcome is Outcome.WALKED else np.inf
+
+
+class Equations(Protocol[D]):
+    """m equations, in m unknowns for a point and in one more for a curve."""
+
+    def at(self, x: Floats) -> Evaluated[D]:
+        """Value and derivative at x."""
+
+
+@dataclass(frozen=True)
+class Root(Generic[D]):
+    """Where the equations hold."""
+
+    x: Floats
+    evaluated: Evaluated[D]
+    corrections: int
+
+
+@dataclass(frozen=True)
+class NotConverged:
+    """Why Newton's method found nothing.
+
+    outcome   WALKED if the equations could be evaluated
+    singular  whether the matrix of a move was: a multiplier is 1
+    """
+
+    outcome: Outcome
+    singular: bool = False
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Which moves are halved, as shares of Newton's own.
+
+    shortest  that is not halved any more
+    growth    of the residual from which on a move is
+    """
+
+    shortest: float
+    growth: float = 1.0
+
+
+UNDAMPED = Damping(1.0)
+
+
+def newton(
+    equations: Equations[D],
+    guess: Floats,
+    tolerance: float,
+    most: int = MAX_EVALUATIONS,
+    damping: Damping = UNDAMPED,
+    rounding: float = ROUNDING,
+) -> Root[D] | NotConverged:
+    """Solve m equations in m unknowns.
+
+    guess      (m,)
+    tolerance  on the residual
+    most       evaluations of the equations
+    rounding   tolerances that a residual may be large which a move does not halve
+
+    Returns the point, or with which outcome the equations could not be evaluated or did not converge.
+    """
+    x, here, corrections, evaluations = guess, equations.at(guess), 0, 1
+    while here.outcome is Outcome.WALKED and here.residual > tolerance:
+        try:
+            move = np.linalg.solve(here.jacobian, -here.value)
+        except np.linalg.LinAlgError:
+            return NotConverged(Outcome.WALKED, singular=True)
+        share = 1.0
+        while True:
+            if evaluations >= most:
+                return NotConverged(Outcome.WALKED)
+            ahead = equations.at(x + share * move)
+            evaluations += 1
+            small = min(here.residual, ahead.residual) <= rounding * tolerance
+            if ahead.outcome is Outcome.WALKED and small and ahead.residual >= 0.5 * here.residual:
+                better = ahead.residual < here.residual
+                return Root(x + share * move, ahead, corrections + 1) if better else Root(x, here, corrections)
+            if ahead.residual < damping.growth * here.residual or share <= damping.shortest:
+                break
+            share *= 0.5
+        x, here, corrections = x + share * move, ahead, corrections + 1
+    return Root(x, here, corrections) if here.outcome is Outcome.WALKED else NotConverged(here.outcome)

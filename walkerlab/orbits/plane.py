@@ -1,0 +1,292 @@
+"""Gaits over a plane of two parameters: curves of folds and flips, and what walks settle on, cell by cell.
+
+A bifurcation is a gait whose test function vanishes: P^n(z) = z and det(DP -+ 1) = 0, one equation more than for a
+gait, in one unknown more, the second parameter. The curve is continued by arclength like a branch.
+
+The cells: row by row of the second parameter, from the row that the branches are known on, the gait of one step is
+corrected from its neighbours' by Newton's method. Where it is stable walks settle on it; where it is not, or there is
+none, a walk from the attractor of a neighbouring cell, or from beside the gait, tells what they settle on.
+
+Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.attractors import settled
+from walkerlab.orbits.bifurcations import Bifurcation, Kind, critical_value, eigenvector
+from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
+from walkerlab.orbits.families import BranchEnd, BranchFollower, GaitBranch, ValueSpan, why_lost
+from walkerlab.orbits.newton import Evaluated, Floats, NotConverged
+from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
+
+REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
+CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
+MAPS = 256  # of values of the second parameter, kept
+CELLS = (72, 36)
+NOTHING = -1  # no walk goes on
+TRANSIENT, KEPT = 400, 96  # steps
+KICK = 1e-3  # away from an unstable gait, coordinates being of magnitude one
+
+
+class MapAt(Protocol):
+    """Step maps over the first parameter, by the value of the second."""
+
+    def __call__(self, second: float) -> StepMap | None:
+        """The map; None where the second parameter makes no walker."""
+
+
+class CriticalGaits:
+    """P^n(z) - z = 0 and a test function, over x = (z, first / its scale, second / its scale)."""
+
+    def __init__(self, map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> None:
+        """Bifurcations of a kind of gaits of `period` steps."""
+        self._map_at = lru_cache(MAPS)(map_at)
+        self.kind, self.period, self.scales = kind, period, scales
+
+    def cycle(self, x: Floats) -> IteratedMap | None:
+        """The steps from x; None where there is no walker or the walk ends."""
+        step_map = self._map_at(float(x[-1]) * self.scales[1])
+        if step_map is None:
+            return None
+        cycle = walk_steps(step_map, x[:-2], float(x[-2]) * self.scales[0], self.period)
+        return cycle if cycle.outcome is Outcome.WALKED else None
+
+    def at(self, x: Floats) -> Evaluated[IteratedMap | None]:
+        """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
+        d = x.size - 2
+        here = self.cycle(x)
+        beside = [[self.cycle(x + sign * REACH * unit) for sign in (1.0, -1.0)] for unit in np.eye(x.size)]
+        if here is None or any(cycle is None for pair in beside for cycle in pair):
+            return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
+        jacobian = np.zeros((d + 1, d + 2))
+        jacobian[:d, :d] = here.DP - np.eye(d)
+        jacobian[:d, d] = self.scales[0] * here.Dp
+        for column, (up, down) in enumerate(beside):
+            assert up is not None
+            assert down is not None
+            jacobian[d, column] = (critical_value(self.kind, up.DP) - critical_value(self.kind, down.DP)) / (
+                2.0 * REACH
+            )
+            if column == d + 1:
+                jacobian[:d, column] = (up.z - down.z) / (2.0 * REACH)
+        value = np.append(here.z - x[:d], critical_value(self.kind, here.DP))
+        return Evaluated(Outcome.WALKED, value, jacobian, here)
+
+
+@dataclass(frozen=True, eq=False)
+class BifurcationCurve:
+    """A curve of bifurcations over the plane.
+
+    first, second  (points,) values of the parameters along it
+    ends           where and why it ends; `value` is that of the second parameter
+    """
+
+    kind: Kind
+    period: int
+    first: Floats
+    second: Floats
+    ends: tuple[BranchEnd, BranchEnd]
+
+
+def curve_through(
+    bifurcation: Bifurcation,
+    period: int,
+    map_at: MapAt,
+    spans: tuple[ValueSpan, ValueSpan],
+    second: float,
+    points: int,
+    advance: Callable[[], None] = lambda: None,
+    control: StepControl = CONTROL,
+) -> BifurcationCurve | None:
+    """The curve through a bifurcation that was located at a value of the second parameter; None if it is lost there.
+
+    spans   of both parameters: the curve is followed inside
+    points  at most, each way
+    """
+    scales = (spans[0].size, spans[1].size)
+    equations = CriticalGaits(map_at, bifurcation.kind, period, scales)
+    x = np.append(bifurcation.point.x, second / scales[1])
+    x[-2] = bifurcation.value / scales[0]
+    at_second = np.append(np.zeros(x.size - 1), 1.0)
+    start = corrected(equations, x, at_second, control.tolerance)
+    if isinstance(start, NotConverged):
+        return None
+    halves = [
+        traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance, control)
+        for sign in (-1.0, 1.0)
+    ]
+    along = np.vstack((halves[0][0][::-1], halves[1][0][1:]))
+    return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (halves[0][1], halves[1][1]))
+
+
+def traced(
+    equations: CriticalGaits, start: Solved[IteratedMap | None], spans: tuple[ValueSpan, ValueSpan], points: int,
+    advance: Callable[[], None], control: StepControl,
+) -> tuple[Floats, BranchEnd]:  # fmt: skip
+    """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
+    scales = np.array(equations.scales)
+    values, before, last, length = [start.x[-2:] * scales], None, start, control.first
+    while len(values) < points:
+        following = stepped(equations, last, length, control, before=before)
+        if isinstance(following, NotConverged):
+            return np.array(values), BranchEnd(float(values[-1][1]), why_lost(following))
+        solved, _, length = following
+        value = solved.x[-2:] * scales
+        advance()
+        if value[0] not in spans[0] or value[1] not in spans[1]:
+            values.append(clipped(values[-1], value, spans))
+            return np.array(values), BranchEnd(float(values[-1][1]), "end of the plane")
+        values.append(value)
+        before, last = last, solved
+    return np.array(values), BranchEnd(float(values[-1][1]), f"{points} points are used up")
+
+
+def clipped(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan]) -> Floats:
+    """The last point on the way out of the plane."""
+    share = 1.0
+    for k, span in enumerate(spans):
+        edge = span.least if outside[k] < span.least else span.most
+        if outside[k] not in span:
+            share = min(share, float((edge - inside[k]) / (outside[k] - inside[k])))
+    return np.asarray(inside + share * (outside - inside))
+
+
+# ---- what walks settle on, cell by cell ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """The plane in cells.
+
+    first, second  (n,), (m,) middles of the cells
+    period         (n, m) steps after which walks that settled repeat themselves; 0 never, NOTHING if none goes on
+    """
+
+    first: Floats
+    second: Floats
+    period: NDArray[np.int64]
+
+
+class CellGait(NamedTuple):
+    """A gait of one step at a cell."""
+
+    z: Floats
+    stable: bool
+    away: Floats  # (d,) a start beside it, towards what grows
+
+
+Row = list[CellGait | None]
+Points = list[Floats | None]
+
+
+def regions_of(
+    branches: Sequence[GaitBranch],
+    map_at: MapAt,
+    spans: tuple[ValueSpan, ValueSpan],
+    own: float,
+    advance: Callable[[], None],
+) -> Regions:
+    """The regions of the plane around branches that were followed at the value `own` of the second parameter."""
+    first, second = (middles(span, cells) for span, cells in zip(spans, CELLS, strict=True))
+    period = np.full(CELLS, NOTHING, np.int64)
+    begin = int(np.argmin(np.abs(second - own)))
+    known = known_gaits(branches, first)
+    for order in (range(begin, CELLS[1]), range(begin - 1, -1, -1)):
+        gaits: Row = known
+        points: Points = [None] * len(first)
+        for row in order:
+            step_map = map_at(float(second[row]))
+            if step_map is not None:
+                gaits = corrected_row(BranchFollower(step_map, spans[0]), first, gaits)
+                period[:, row], points = settled_row(step_map, first, gaits, points)
+            advance()
+    return Regions(first, second, period)
+
+
+def middles(span: ValueSpan, cells: int) -> Floats:
+    """Middles of equal cells of a span."""
+    return span.least + span.size * (np.arange(cells) + 0.5) / cells
+
+
+def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Row:
+    """Near each value a gait of one step from the branches, a stable one if there is one."""
+    found: Row = [None] * len(values)
+    for branch in branches:
+        if branch.period > 1:
+            continue
+        for one, other in pairwise(branch.points):
+            low, high = sorted((one.value, other.value))
+            for place in np.flatnonzero((values >= low) & (values <= high) & (low < high)):
+                share = (values[place] - one.value) / (other.value - one.value)
+                z = one.z + share * (other.z - one.z)
+                present = found[place]
+                if present is None or (one.stable and not present.stable):
+                    found[place] = CellGait(z, one.stable, z)
+    return found
+
+
+def corrected_row(follower: BranchFollower, values: Floats, before: Row) -> Row:
+    """The gaits at the cells of a row, from those of the row before and from neighbours in the row itself."""
+    row: Row = [None] * len(values)
+    forwards, backwards = range(len(values)), range(len(values) - 1, -1, -1)
+    for order, step in ((forwards, -1), (backwards, 1)):
+        for place in order:
+            present = row[place]
+            if present is not None and present.stable:
+                continue
+            beside = row[place + step] if 0 <= place + step < len(values) else None
+            guesses = (before[place], beside) if step < 0 else (beside,)
+            for guess in guesses:
+                found = None if guess is None else gait_near(follower, guess.z, float(values[place]))
+                if found is not None and (present is None or found.stable):
+                    row[place] = present = found
+                if present is not None and present.stable:
+                    break
+    return row
+
+
+def gait_near(follower: BranchFollower, z: Floats, value: float) -> CellGait | None:
+    """The gait of one step that Newton's method finds from z."""
+    solved = follower.solved_at(z, value, 1)
+    if solved is None:
+        return None
+    DP, gait = solved.evaluated.data.DP, solved.x[:-1]
+    largest = multipliers_of(DP)[0]
+    return CellGait(gait, bool(abs(largest) < 1.0), gait + KICK * eigenvector(DP, largest.real))
+
+
+def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[NDArray[np.int64], Points]:
+    """The periods of a row's cells, and a point of the attractor in each.
+
+    before  those of the row before
+    """
+    periods, points = np.full(len(values), NOTHING, np.int64), list[Floats | None]()
+    for place, gait in enumerate(gaits):
+        if gait is not None and gait.stable:
+            periods[place] = 1
+            points.append(gait.z)
+            continue
+        point = None
+        for start in starts_at(place, gait, points, before):
+            here = settled(step_map, start, float(values[place]), TRANSIENT, KEPT)
+            if not isinstance(here, Outcome):
+                periods[place], point = here.period, here.last
+                break
+        points.append(point)
+    return periods, points
+
+
+def starts_at(place: int, gait: CellGait | None, points: Points, before: Points) -> Iterator[Floats]:
+    """Where walks begin at a cell: on the attractors of its neighbours, and beside its unstable gait."""
+    candidates = (points[place - 1] if place else None, before[place], None if gait is None else gait.away)
+    yield from (start for start in candidates if start is not None)
