@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.newton import Damping, Evaluated, NotConverged, Root, newton
+from walkerlab.orbits.newton import Damping, Evaluated, NotConverged, Solution, newton
 
 
 class Counted:
@@ -29,7 +29,7 @@ def flat_arc():
 def test_a_move_that_overshoots_is_halved_where_that_is_asked_for():
     # beyond 1.39 Newton's method on the arc tangent runs away
     damped = newton(flat_arc(), np.array([3.0]), 1e-14, 60, Damping(2.0**-8))
-    assert isinstance(damped, Root)
+    assert isinstance(damped, Solution)
     assert damped.x[0] == pytest.approx(0.0, abs=1e-14)
     assert isinstance(newton(flat_arc(), np.array([3.0]), 1e-14), NotConverged)
 

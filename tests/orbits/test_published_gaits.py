@@ -10,7 +10,7 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.newton import Root, newton
+from walkerlab.orbits.newton import Solution, newton
 from walkerlab.orbits.shooting import Shooting, StepEquations, on_section, section_of
 from walkerlab.solvers.registry import Tolerances
 
@@ -41,7 +41,7 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-16, 10**6)
 
 def solved(model, z):
     found = newton(StepEquations(Shooting(model, TIGHT), section_of(model)), z, 1e-13)
-    assert isinstance(found, Root)
+    assert isinstance(found, Solution)
     return found.x, found.evaluated
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Damping, Floats, NotConverged, Root, newton
+from walkerlab.orbits.newton import Damping, Floats, NotConverged, Solution, newton
 from walkerlab.orbits.shooting import EXACT, NEW, SHORTEST_STEP, Shooting, StepEquations, Steps, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
@@ -323,7 +323,7 @@ class Search:
         self.found.append(FoundGait(z, DP, gait, [by]))
         return True
 
-    def solved(self, z: Floats) -> Root[Steps] | NotConverged:
+    def solved(self, z: Floats) -> Solution[Steps] | NotConverged:
         """The fixed point near z, to rounding."""
         least, enough = self.settings.solved_residual, self.settings.residual
         return newton(self.equations, z, least, MAX_EVALUATIONS, DAMPING, enough / least)

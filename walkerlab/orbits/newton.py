@@ -46,7 +46,7 @@ class Equations(Protocol[D]):
 
 
 @dataclass(frozen=True)
-class Root(Generic[D]):
+class Solution(Generic[D]):
     """Where the equations hold."""
 
     x: Floats
@@ -88,7 +88,7 @@ def newton(
     most: int = MAX_EVALUATIONS,
     damping: Damping = UNDAMPED,
     rounding: float = ROUNDING,
-) -> Root[D] | NotConverged:
+) -> Solution[D] | NotConverged:
     """Solve m equations in m unknowns.
 
     guess      (m,)
@@ -113,9 +113,9 @@ def newton(
             small = min(here.residual, ahead.residual) <= rounding * tolerance
             if ahead.outcome is Outcome.WALKED and small and ahead.residual >= 0.5 * here.residual:
                 better = ahead.residual < here.residual
-                return Root(x + share * move, ahead, corrections + 1) if better else Root(x, here, corrections)
+                return Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, here, corrections)
             if ahead.residual < damping.growth * here.residual or share <= damping.shortest:
                 break
             share *= 0.5
         x, here, corrections = x + share * move, ahead, corrections + 1
-    return Root(x, here, corrections) if here.outcome is Outcome.WALKED else NotConverged(here.outcome)
+    return Solution(x, here, corrections) if here.outcome is Outcome.WALKED else NotConverged(here.outcome)
