@@ -259,3 +259,11 @@ def test_a_run_is_shown_under_one_name_only(toy):
     assert toy("show", "paper", "drop", "-c", "paper").returncode == 2
     assert toy("show", "paper", "paper", "drop").returncode == 2
     assert toy("show", "nowhere", "drop").returncode == 3
+    assert "advice: `walkerlab roll -c paper` computes it." in toy("show", "paper", "roll").stderr
+
+
+def test_a_damaged_result_is_called_so_once(toy):
+    toy("drop")
+    (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"half a file")
+    (line,) = (line for line in toy("status", "paper").stdout.splitlines() if line.startswith("drop"))
+    assert line.count("damaged") == 1

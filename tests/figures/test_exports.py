@@ -159,7 +159,7 @@ def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
 
 def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    for name, said in (("walk.avi", "a film cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):
+    for name, said in (("walk.avi", "an animation cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):
         with pytest.raises(ConfigError, match=said):
             write_film(run, Target(str(tmp_path / name), None), Film("simulate", 1, 10, 1.0), QUIET)
 

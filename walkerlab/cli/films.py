@@ -40,7 +40,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
 
     Raises ConfigError for a format that there is not, StaleError if there is no walk to draw, StorageError.
     """
-    path, kind = target.of("a film", f"{folder.name}-{film.model}", KINDS)
+    path, kind = target.of("an animation", f"{folder.name}-{film.model}", KINDS)
     ffmpeg = shutil.which("ffmpeg")
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")

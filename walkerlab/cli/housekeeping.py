@@ -47,11 +47,11 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"there is no stage {stage!r}; there are {', '.join(names)}", param_hint="STAGE")
         if len(runs) > 1 or (runs and request.config is not None):
             raise typer.BadParameter("one run at a time", param_hint="RUN")
-        with exit_on_failure(stage, request):
+        with exit_on_failure(stage, replace(request, config=runs[0]) if runs else request) as asked:
             from walkerlab.cli.show import print_stored
             from walkerlab.stages.runs import run_named
 
-            of_run = replace(request, config=run_named(runs[0], request.runs).given) if runs else request
+            of_run = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
             print_stored(of_run, graph, stage)
 
     @command(app, "as_json")

@@ -94,7 +94,7 @@ def state_of(step: Step) -> str:
 
 def why(step: Step) -> str:
     """Why a stage's result is in its state; nothing where the state says it."""
-    return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason
+    return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
 def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
