@@ -183,7 +183,7 @@ def test_what_follows_from_a_key_follows_it():
         (["contact=null", "model=contact"], "needs a contact block"),
         (["contact=null", "over=contact.stiffness"], "the config has none"),
         (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
-        (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is the number that gaits are followed over"),
+        (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is already the number that gaits are followed"),
         (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not touch the rigid model"),
     ],
 )  # fmt: skip
