@@ -70,6 +70,7 @@ def test_creeping_feet_need_an_adjustment_and_the_found_start_walks():
     assert found["needed"]
     assert summary["procedure"]["released"]["outcome"] == "off-pad"
     assert summary["procedure"]["adjusted"]["outcome"] == "walked"
+    assert 0.0 < summary["procedure"]["adjusted"]["numerical_error"]["step_period_s"] < 1e-5
     assert 0.0 < found["distance"] < 0.2
 
 
@@ -79,6 +80,8 @@ def test_the_map_is_what_single_walks_say():
     assert cells["outcome"].shape == (5, 5)
     walked = (cells["outcome"] == 0).sum()
     assert walked == content.summary["map"]["contact"].get("walked", 0)
+    ended = {row["outcome"]: row["walks"] for row in content.summary["map"]["endings"]}
+    assert ended == {name: many for name, many in content.summary["map"]["contact"].items() if name != "walked"}
     assert np.all(cells["steps"][cells["outcome"] == 0] == 10)
 
 

@@ -151,7 +151,7 @@ def tune(summary: Summary) -> list[str | Table]:
         else f"No own gait: {gait['reason']}."
     )
     margins = [adjustment.margins_table(summary)] if change.get("margins") else []
-    return [head, share, own, *margins]
+    return [head, share, *families.grounds(cells), own, *margins]
 
 
 def compare(summary: Summary) -> list[str | Table]:

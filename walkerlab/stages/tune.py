@@ -61,7 +61,7 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     gait = contact_gait(config, rigid_step, near)
     scene = free_scene(config, rigid_step, gait)
     found = TuneRun(config, scene, rigid_state, gait).findings(progress, jobs)
-    stored, said = groups(found), summary(found) | {"left_out": list(of_adjustment(config))}
+    stored, said = groups(found), summary(found, config) | {"left_out": list(of_adjustment(config))}
     limit = rigid_limit(config, found, inputs, progress)
     if limit is not None:
         stored |= limit_groups(limit)

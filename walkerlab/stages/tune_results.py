@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel
@@ -21,6 +22,7 @@ from walkerlab.orbits.scaled_starts import Adjustment, Margin, StartMap, StartTr
 from walkerlab.paper.adams_start import AdamsWalk
 from walkerlab.paper.printed import TABLE_2, StartRow
 from walkerlab.scene.contact import ContactScene
+from walkerlab.scene.endings import Pads, endings
 from walkerlab.solvers.system import State
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.stages.walk_columns import TIME, legs, of_steps, over_time
@@ -68,7 +70,7 @@ class TuneFindings:
     gait_factors: tuple[float, float] | None  # where the gait lies on the map, from the adjusted walk's end
 
 
-def summary(found: TuneFindings) -> dict[str, Any]:
+def summary(found: TuneFindings, config: ContactConfig) -> dict[str, Any]:
     """What the command prints."""
     procedure = found.procedure
     return {
@@ -81,7 +83,7 @@ def summary(found: TuneFindings) -> dict[str, Any]:
             "released": walk_summary(procedure.released) | found.errors["released"],
             "adjusted": procedure.adjusted and walk_summary(procedure.adjusted) | found.errors["adjusted"],
         },
-        "map": map_summary(found),
+        "map": map_summary(found, config),
         "slope_rad": found.scene.walker.slope,
         "pitch_m": found.scene.pitch_m,
     }
@@ -230,13 +232,16 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     }
 
 
-def map_summary(found: TuneFindings) -> dict[str, Any]:
-    """How many cells end how, in both models."""
+def map_summary(found: TuneFindings, config: ContactConfig) -> dict[str, Any]:
+    """How many cells end how, in both models, and what the ground has to do with the contact model's ends."""
+    pitch, ends = found.scene.pitch_m, counted(found.contact_map)
+    laid = "" if config.contact is None else str(config.contact.pad_pitch)
     return {
         "cells": int(found.contact_map.outcome.size),
         "walks_share": found.contact_map.share(),
-        "contact": counted(found.contact_map),
+        "contact": ends,
         "rigid": counted(found.rigid_map),
+        "endings": endings(ends, config, contact=True, pads=Pads((pitch, pitch), laid=laid)),
     }
 
 
