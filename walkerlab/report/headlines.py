@@ -26,7 +26,10 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "compare": ("verdicts.", "outcomes.", "steps.", "orbit_distance"),
     "accuracy": ("best.",),
     "stability": ("passed", "failed"),
-    "continuation": ("first_doubling.", "cascades.", "bifurcations."),
+    "continuation": (
+        "first_doubling.", "bifurcations.0.value", "bifurcations.1.value", "bifurcations.2.value",
+        "cascades.0.accumulates_at", "attractors.0.aperiodic_from", "attractors.0.lost_at",
+    ),
     "basin": ("share_walking", "share_walking_gaussian", "margin", "unsettled_cells", "outcomes."),
     "plot": (),
     "report": (),
