@@ -73,6 +73,12 @@ def test_every_part_of_the_package_has_its_layer():
     assert parts - {"__init__", "__main__", "__pycache__"} <= set(LAYERS)
 
 
+def test_the_docs_tell_of_the_same_layers():
+    text = (Path(__file__).parent.parent / "docs" / "pipeline.md").read_text()
+    told = text.partition("## Layers")[2].partition("Each imports")[0]
+    assert tuple(told.replace(">", " ").split()) == LAYERS
+
+
 @pytest.mark.parametrize("path", IN_LAYERS, ids=named)
 def test_imports_run_downward(path):
     own = LAYERS.index(layer_of(path))
