@@ -136,7 +136,7 @@ def reductions() -> list[Reduction]:
             ("contact", "contact, hinged"),
             (contact(strides=1), contact("contact.stance=pinned", strides=1)),
             compile=True,
-            note="both kinds of step are compiled, since the hinge is released after the first",
+            note="one compiled walk serves both kinds of step",
         ),
         Reduction(
             "tangential velocity and force: frictionless",

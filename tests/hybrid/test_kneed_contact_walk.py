@@ -1,5 +1,6 @@
 """The kneed walker on plane compliant ground: what another program measured, momentum, energy, a plain integration."""
 
+import contact_walks
 import numpy as np
 import plain_walk
 import pytest
@@ -29,6 +30,7 @@ from walkerlab.ground.knees import lock
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
 from walkerlab.hybrid.contact_run import by_channel
+from walkerlab.hybrid.contact_walk import walk_in_form
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, Particle
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
@@ -185,6 +187,14 @@ def test_a_twin_of_another_size_walks_the_same_steps():
     one, other = walked(steps=3, tolerance=1e-9), walked(steps=3, tolerance=1e-9, scale=4.0)
     np.testing.assert_allclose(other.touch_time_s / 2.0, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
+
+
+def test_one_compiled_walk_serves_straight_legs_knees_and_a_hinged_step():
+    contact_walks.walked(steps=1)
+    compiled = set(walk_in_form.signatures)
+    contact_walks.walked("contact.stance=pinned", steps=1)
+    walked(steps=1)
+    assert set(walk_in_form.signatures) == compiled
 
 
 def test_a_library_walks_it_with_as_few_bodies():
