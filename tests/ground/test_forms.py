@@ -81,6 +81,10 @@ def test_levers_of_bodies_that_are_one_are_summed():
     np.testing.assert_allclose(straight.foot_x[0, :3], expected, rtol=1e-14)
 
 
+def test_what_a_form_has_not_is_no_attribute():
+    assert not hasattr(walker_of(LEGS).whole, "weight")
+
+
 def test_more_bodies_than_a_form_has_room_for_are_refused_in_words():
     names = [f"link {k}" for k in range(9)]
     joints = (Revolute(f"hinge {k}", names[k], (0.0, 0.0), names[k + 1], (0.0, 1.0)) for k in range(8))

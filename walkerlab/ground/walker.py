@@ -62,6 +62,16 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # rad
 
+    # NumPy's own look-up of a record's field takes half as long again, and starts of walks are computed in Python
+    __getattribute__ = object.__getattribute__
+
+    def __getattr__(self, name: str) -> Any:
+        """The field of that name."""
+        try:
+            return self[name]
+        except ValueError:
+            raise AttributeError(name) from None
+
 
 SHAPES: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("A", "B", "E"), (MAX_BODIES, MAX_BODIES)),

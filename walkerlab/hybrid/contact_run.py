@@ -239,9 +239,9 @@ def new_observer(
     times = np.zeros(0) if times is None else times
     samples = times.size
     extremes = np.zeros(4)
-    system = on_ground(walker, walk_state.has_ground)
-    extremes[START_ENERGY] = total_energy(system, y)
-    extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
+    if track_energy:
+        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground), y)
+        extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
         times,
