@@ -36,9 +36,18 @@ def test_no_time_is_estimated_until_a_tenth_is_done_in_some_seconds(clock):
     line.start("tune: cells", 100)
     told = []
     for clock[0], done in ((1.0, 5), (2.0, 15), (4.0, 20), (8.0, 40), (12.0, 60)):
-        line.done = done
+        line.advance(done - line.done)
         told.append(line.seconds_left())
-    assert told == [None, None, 16.0, 12.0, 8.0]
+    assert told[:2] == [None, None]
+    assert told[2:] == pytest.approx([16.0, 14.4, 8.0])  # by the rates from 5 to 20, from 15 to 40 and from 20 to 60
+
+
+def test_a_slow_begin_does_not_count_once_the_pace_is_known(clock):
+    line = StageLine(Console(quiet=True), "sweep", "", None)
+    line.start("sweep", 400)
+    for clock[0], done in ((8.0, 2), (12.0, 42), (16.0, 82), (20.0, 122)):
+        line.advance(done - line.done)
+    assert line.seconds_left() == pytest.approx((400 - 122) / 10.0)
 
 
 def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once(clock):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import sys
 import threading
@@ -154,13 +155,14 @@ class StageLine:
         self.label, self.kernel = stage, ""
         self.total: int | None = None
         self.done = 0
+        self.progress: list[tuple[int, float]] = []  # parts done, and when: s of computing
         self.compiled_s = 0.0  # of the piece of work that runs
         self.compiling_since = 0.0
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:
         """Begin a piece of work."""
-        self.label, self.total, self.done = label, total, 0
+        self.label, self.total, self.done, self.progress = label, total, 0, []
         self.work_began, self.compiled_s = time.monotonic(), 0.0
         self.console.detail(label if total is None else f"{label} ({total})")
         self.console.refresh()
@@ -168,6 +170,7 @@ class StageLine:
     def advance(self, n: int = 1) -> None:
         """Count parts as done."""
         self.done += n
+        self.progress.append((self.done, self.computed_s()))
 
     def note(self, text: str) -> None:
         """Say one line."""
@@ -200,14 +203,23 @@ class StageLine:
         parts += [] if left is None else [f"about {left:.0f} s left"]
         return ", ".join(parts)
 
-    def seconds_left(self) -> float | None:
-        """By the rate of the piece of work, or by how long the stage took the last time; None until enough is known."""
+    def computed_s(self) -> float:
+        """How long the piece of work has run, compiling left out."""
         now = time.monotonic()
         compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
-        computed = now - self.work_began - compiled
+        return now - self.work_began - compiled
+
+    def seconds_left(self) -> float | None:
+        """By the rate of the later half of what is done, or by how long the stage took the last time.
+
+        None until enough is known, and where a stage takes longer than it did.
+        """
+        computed = self.computed_s()
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
-            return computed / self.done * (self.total - self.done)
-        left = 0.0 if self.expected_s is None else self.expected_s - (now - self.began)
+            half = bisect.bisect_left(self.progress, (self.done // 2,))
+            done, at = self.progress[half - 1] if half else (0, 0.0)
+            return (computed - at) / (self.done - done) * (self.total - self.done)
+        left = 0.0 if self.expected_s is None else self.expected_s - (time.monotonic() - self.began)
         return left if left > 0.0 else None
 
     def said(self) -> str:
