@@ -67,6 +67,12 @@ def test_a_worker_that_is_told_to_end_while_it_loads_says_nothing(tmp_path, monk
     assert capfd.readouterr().err == ""
 
 
+def test_a_worker_that_is_told_to_end_twice_says_nothing(capfd):
+    with WorkerPool(1) as one, pytest.raises(WorkerDiedError, match="SIGTERM"):
+        one.start(calls.be_told_to_end_twice).result()
+    assert capfd.readouterr().err == ""
+
+
 def test_an_error_comes_back_as_it_is_with_its_traceback(pool):
     with pytest.raises(ZeroDivisionError) as caught:
         pool.start(calls.divide_by_zero).result()

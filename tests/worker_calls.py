@@ -1,5 +1,6 @@
 """Calls that workers are given in tests."""
 
+import atexit
 import os
 import signal
 import sys
@@ -23,6 +24,12 @@ def sleep():
 
 def kill_itself():
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def be_told_to_end_twice():
+    atexit.register(os.kill, os.getpid(), signal.SIGTERM)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(600.0)
 
 
 def leave_with_3():

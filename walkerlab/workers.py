@@ -278,6 +278,8 @@ def serve(number: int, modules: Sequence[str]) -> None:
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
+    # What was begun is dropped: told once more, as by a terminal and by who started it, the process just ends.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
