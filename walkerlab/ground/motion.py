@@ -3,6 +3,7 @@
 from typing import Any
 
 from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
+from walkerlab.ground.reduction import factor_linked, gathered, solve_linked
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
@@ -13,7 +14,6 @@ from walkerlab.ground.walker import (
     sines_cosines,
 )
 from walkerlab.kernels import inlined, matrix, vector, woven
-from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
 from walkerlab.solvers.system import block, derivative, jacobian
 
 

@@ -64,10 +64,10 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
     for k in range(n):
         for l in range(n):
             factors[k, l] = M[k, l]
-    factor_linked(model.E[phase], n, factors, p)
+    factor_linked(model, phase, factors, p)
     momenta(model, M, F, U, new, 0, along, upward, p)
-    gathered(model.E[phase], n, p)
-    solve_linked(model.E[phase], n, factors, p)
+    gathered(model, phase, p)
+    solve_linked(model, phase, factors, p)
     jump, turned = vector(like), vector(like)
     for k in range(n):
         jump[k] = p[k] - new[n + k]
@@ -86,8 +86,8 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         mass_change(model, s, c, F, U, new, at, jump, jump_along, jump_upward, turned)
         for k in range(n):
             p[k] -= turned[k]
-        gathered(model.E[phase], n, p)
-        solve_linked(model.E[phase], n, factors, p)
+        gathered(model, phase, p)
+        solve_linked(model, phase, factors, p)
         for k in range(n):
             new[at + n + k] = p[k]
 

@@ -2,8 +2,8 @@
 
 Angles theta = E z with a constant E turn M alpha = r into E' M E dz = E' r. The system keeps its size: a follower's
 row and column are added to those of the bodies that it follows, and its own equation becomes trivial. The row of E of a
-follower has its weights and zero on the diagonal, any other row is that of the unit matrix. Arrays may be longer than
-the n bodies that there are.
+follower has its weights and zero on the diagonal, any other row is that of the unit matrix. A model has an E for each
+phase.
 """
 
 from typing import Any
@@ -12,41 +12,44 @@ from walkerlab.kernels import woven
 
 
 @woven
-def gathered(E: Any, n: int, r: Any) -> None:
+def gathered(model: Any, phase: int, r: Any) -> None:
     """E' r in place of r (n,), zero for the followers: what acts on a follower acts on those it follows."""
+    n = len(model.arm_x)
     for c in range(n):
-        if E[c, c] == 0.0:
+        if model.E[phase, c, c] == 0.0:
             for p in range(n):
-                r[p] += E[c, p] * r[c]
+                r[p] += model.E[phase, c, p] * r[c]
             r[c] = 0.0
 
 
 @woven
-def spread(E: Any, n: int, z: Any) -> None:
+def spread(model: Any, phase: int, z: Any) -> None:
     """E z in place of z (n,): a follower moves with those it follows."""
+    n = len(model.arm_x)
     for c in range(n):
-        if E[c, c] == 0.0:
+        if model.E[phase, c, c] == 0.0:
             total = 0.0
             for p in range(n):
-                total += E[c, p] * z[p]
+                total += model.E[phase, c, p] * z[p]
             z[c] = total
 
 
 @woven
-def factor_linked(E: Any, n: int, M: Any, r: Any) -> None:
+def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
     """E' r in place of r (n,), and L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
+    n = len(model.arm_x)
     for c in range(n):
-        if E[c, c] == 0.0:
+        if model.E[phase, c, c] == 0.0:
             for p in range(n):
                 for l in range(n):
-                    M[p, l] += E[c, p] * M[c, l]
+                    M[p, l] += model.E[phase, c, p] * M[c, l]
             for p in range(n):
                 for l in range(n):
-                    M[l, p] += E[c, p] * M[l, c]
+                    M[l, p] += model.E[phase, c, p] * M[l, c]
             for l in range(n):
                 M[c, l], M[l, c] = 0.0, 0.0
             M[c, c] = 1.0
-    gathered(E, n, r)
+    gathered(model, phase, r)
     for k in range(n):
         M[k, k] = 1.0 / M[k, k]
         for i in range(k + 1, n):
@@ -56,8 +59,9 @@ def factor_linked(E: Any, n: int, M: Any, r: Any) -> None:
 
 
 @woven
-def solve_linked(E: Any, n: int, factors: Any, b: Any) -> None:
+def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
     """E dz in place of b (n,) = E' r, of a matrix that `factor_linked` has taken apart."""
+    n = len(model.arm_x)
     for k in range(n):
         for i in range(k + 1, n):
             b[i] -= factors[k, i] * b[k]
@@ -65,4 +69,4 @@ def solve_linked(E: Any, n: int, factors: Any, b: Any) -> None:
         b[k] *= factors[k, k]
         for j in range(k + 1, n):
             b[k] -= factors[k, j] * b[j]
-    spread(E, n, b)
+    spread(model, phase, b)

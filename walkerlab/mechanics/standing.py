@@ -194,8 +194,8 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     n = len(like)
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model.E[phase], n, M, alpha)
-    solve_linked(model.E[phase], n, M, alpha)
+    factor_linked(model, phase, M, alpha)
+    solve_linked(model, phase, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
@@ -208,8 +208,8 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 for l in range(n):
                     total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
                 alpha[k] = total
-            gathered(model.E[phase], n, alpha)
-            solve_linked(model.E[phase], n, M, alpha)
+            gathered(model, phase, alpha)
+            solve_linked(model, phase, M, alpha)
             for k in range(n):
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
 
@@ -247,15 +247,15 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     by_angle, by_rate = matrix(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model.E[phase], n, M, alpha)
-    solve_linked(model.E[phase], n, M, alpha)
+    factor_linked(model, phase, M, alpha)
+    solve_linked(model, phase, M, alpha)
     torque_gradients(model, y, s, c, F, U, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0
             alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
-        gathered(model.E[phase], n, alpha)
-        solve_linked(model.E[phase], n, M, alpha)
+        gathered(model, phase, alpha)
+        solve_linked(model, phase, M, alpha)
         for k in range(n):
             J[n + k, j] = alpha[k]
 
@@ -358,5 +358,5 @@ def kinetic_energy(model: Standing, y: Any) -> float:
 def linked(model: Standing, phase: int, values: Any) -> Floats:
     """Values (n,) of all bodies, those of the followers from those that they follow."""
     every = np.array(values, float)
-    spread(model.E[phase], len(every), every)
+    spread(model, phase, every)
     return every
