@@ -32,8 +32,8 @@ def state_in_line(walker, knee):
     for thigh, shank, doing in zip(whole.thighs, whole.shanks, knee, strict=True):
         if doing == LOCKED:
             angles[shank], rates[shank] = angles[thigh], rates[thigh]
-    for body in np.flatnonzero(np.diagonal(whole.E)[:n] == 0.0):
-        angles[body], rates[body] = whole.E[body, :n] @ angles, whole.E[body, :n] @ rates
+    for body in np.flatnonzero(np.diagonal(whole.E[0])[:n] == 0.0):
+        angles[body], rates[body] = whole.E[0, body, :n] @ angles, whole.E[0, body, :n] @ rates
     return np.array([0.1, 0.6, *angles, 0.4, -0.3, *rates])
 
 

@@ -147,7 +147,7 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     form["A"][:n, :n], form["B"][:n, :n], form["mass"] = S.T @ root.tree.A @ S, S.T @ root.tree.B @ S, root.tree.mass
     for name, value in (root.rows | {"rolling": rolling}).items():
         form[name][..., :n] = value @ S
-    form["E"][:n, :n] = E
+    form["E"][0, :n, :n] = E
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, kept
     if knees:

@@ -139,8 +139,8 @@ def lock(whole: Form, form: Form, x: Any) -> Lock:
     """
     x = np.array(x, float)
     n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)
-    free = [k for k in range(form.bodies) if form.E[k, k] != 0.0]
-    Z = form.E[form.onto[:n]][:, free]
+    free = [k for k in range(form.bodies) if form.E[0, k, k] != 0.0]
+    Z = form.E[0, form.onto[:n]][:, free]
     angles, omega = x[p : p + n] + whole.slope, x[rates:]
     delta = angles[None, :] - angles[:, None]
     A, B = whole.A[:n, :n], whole.B[:n, :n]

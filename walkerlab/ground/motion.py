@@ -3,7 +3,6 @@
 from typing import Any
 
 from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
-from walkerlab.ground.reduction import factor_linked, gathered, solve_linked
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
@@ -14,6 +13,7 @@ from walkerlab.ground.walker import (
     sines_cosines,
 )
 from walkerlab.kernels import inlined, matrix, vector, woven
+from walkerlab.mechanics.links import Counted, factor_linked, gathered, solve_linked
 from walkerlab.solvers.system import block, derivative, jacobian
 
 
@@ -84,8 +84,9 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, s, c, y, r)
     tree_equations(form, s, c, y, M, r)
-    factor_linked(form.E, n, M, r)
-    solve_linked(form.E, n, M, r)
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M, r)
+    solve_linked(links, 0, M, r)
     for i in range(half):
         f[i] = y[half + i]
     if first > 0:
@@ -172,13 +173,14 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     sines_cosines(form, y, s, c)
     all_forces(system, s, c, y, alpha)
     tree_equations(form, s, c, y, M, alpha)
-    factor_linked(form.E, n, M, alpha)
-    solve_linked(form.E, n, M, alpha)
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M, alpha)
+    solve_linked(links, 0, M, alpha)
     for k in range(n):  # row k: the angular accelerations by a torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        gathered(form.E, n, by_torque[k])
-        solve_linked(form.E, n, M, by_torque[k])
+        gathered(links, 0, by_torque[k])
+        solve_linked(links, 0, M, by_torque[k])
     for foot in range(2):
         if system.has_ground[foot] != 0:
             add_ground_gradients(system, foot, s, c, y, J)

@@ -42,7 +42,7 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
     A: Floats  # (n, n) kg m^2, of mechanics.assembly
     B: Floats
-    E: Floats  # (n, n) the reduction; the row of a body that follows others has zero on the diagonal
+    E: Floats  # (1, n, n) the reduction; the row of a body that follows others has zero on the diagonal
     arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
     arm_y: Floats
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
@@ -74,7 +74,8 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
-    **dict.fromkeys(("A", "B", "E"), (MAX_BODIES, MAX_BODIES)),
+    **dict.fromkeys(("A", "B"), (MAX_BODIES, MAX_BODIES)),
+    "E": (1, MAX_BODIES, MAX_BODIES),
     **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
     **dict.fromkeys(("radius", "thighs", "shanks"), (2,)),

@@ -6,9 +6,19 @@ follower has its weights and zero on the diagonal, any other row is that of the 
 phase.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from walkerlab.kernels import woven
+
+
+class Counted(NamedTuple):
+    """What is asked of a model here, of one whose bodies are counted while it walks and not while compiling.
+
+    A model with tuples takes little more than half the time: the compiler unrolls its loops.
+    """
+
+    E: Any  # (phases, n, n)
+    arm_x: Any  # (n,)
 
 
 @woven
