@@ -9,6 +9,8 @@ from pathlib import Path
 
 from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin, builtin_names, find
 from walkerlab.config.loader import EarlierRun, Template, template
+from walkerlab.config.problems import Problem, refusal
+from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.stages.runs import config_text, find_run, read_all, stored_in
 from walkerlab.store import artifact
@@ -50,10 +52,25 @@ def resolve(
     else:
         path = None if text is None else Path(text)
         read, source = template(path, sets, strides, name=name), source_of(path, runs)
+    refuse_what_makes_no_walker(read)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
     return Asked(read, RunFolder(runs, read.base.run_name, source))
+
+
+def refuse_what_makes_no_walker(read: Template) -> None:
+    """Raise ConfigError, with its place, if the parts that a config lists make no walker."""
+    config = read.base.config
+    if not isinstance(config.walker, PartsWalker):
+        return
+    # Imported here: mechanics take long to import, and walkers of other types are right by construction.
+    from walkerlab.scene.rigid import level_walker
+
+    try:
+        level_walker(config.walker, config.gravity_m_s2)
+    except ConfigError as error:
+        raise refusal([Problem(read.tree.entries["walker"].position, error.message)], error.advice) from None
 
 
 def is_config(text: str) -> bool:

@@ -1,0 +1,26 @@
+"""What a command is asked about is refused where it stands, before anything runs."""
+
+import re
+
+import pytest
+
+from walkerlab.config.files import builtin
+from walkerlab.errors import ConfigError
+from walkerlab.stages.resolve import resolve
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("centre_m: [0.0, -0.325]", "centre_m: [0.0, -0.3]", "the two legs differ"),
+        ("child: thigh 1", "child: shank 1", "no hinge joins the legs"),
+    ],
+)
+def test_parts_that_make_no_walker_are_refused_with_their_place(tmp_path, old, new, said):
+    whole = builtin("parts").path.read_text()
+    assert old in whole
+    file = tmp_path / "mine.yaml"
+    file.write_text(whole.replace(old, new, 1))
+    line = 1 + whole[: whole.index("type: parts")].count("\n")
+    with pytest.raises(ConfigError, match=rf"^{re.escape(str(file))}:{line}:\d+: walker: .*{said}"):
+        resolve(str(file))
