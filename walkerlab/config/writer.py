@@ -47,11 +47,11 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
             continue  # the study that a built-in config redoes is not a user's own
         elif value is None and block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
-        elif isinstance(held, tuple) and held and isinstance(held[0], Block):
+        elif isinstance(held, tuple) and (listed := block_of(field)) is not None:
             yield from _comment(field.description or "", indent)
-            for inner, one in type(held[0]).model_fields.items():
+            for inner, one in listed.model_fields.items():
                 yield from _comment(f"{inner}: {_meaning(one)}", f"{indent}  ")
-            yield f"{indent}{name}:"
+            yield f"{indent}{name}:" if held else f"{indent}{name}: []"
             for item in value:
                 yield f"{indent}  - {{{', '.join(f'{key}: {_value(inner)}' for key, inner in item.items())}}}"
         else:
