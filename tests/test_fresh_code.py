@@ -50,9 +50,9 @@ def copy(tmp_path):
 
     def run():
         environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
-        done = subprocess.run(
-            [sys.executable, "-c", CALL], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
-        )
+        # -B: Python's own cache of bytecode does go by a file's time and size
+        program = [sys.executable, "-B", "-c", CALL]
+        done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         value, folder = done.stdout.split()
         return float(value), folder
 

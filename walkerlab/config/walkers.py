@@ -322,7 +322,8 @@ class PartsWalker(Block):
         key("", "a foot for either leg", bounds="blocks of two of body, centre_m, radius_m", sequence=True),
     ]
     couplings: Annotated[
-        tuple[PartCoupling, ...], key("", "bodies that follow others", bounds="blocks of body, of, weights", sequence=True)
+        tuple[PartCoupling, ...],
+        key("", "bodies that follow others", bounds="blocks of body, of, weights", sequence=True),
     ] = ()
     legs: Annotated[
         tuple[LegBodies, LegBodies],
