@@ -72,7 +72,7 @@ def trajectory(step, time, angle, velocity, level):
     return {**moving, **energies(time, level), **joints(step, stance, angle)}
 
 
-def walked(period, count):
+def walked(period, count, **more):
     """What is stored of the steps, if there are any."""
     number = np.arange(1, count + 1)
     columns = of_steps(
@@ -80,6 +80,7 @@ def walked(period, count):
         period_s=np.full(count, period),
         length_m=np.full(count, STEP_LENGTH),
         touch_along_m=STEP_LENGTH * number,
+        **{name: np.full(count, value) for name, value in more.items()},
     )
     return {"steps": Group(columns)} if count else {}
 
@@ -97,7 +98,7 @@ def contact(steps=10, period=0.71, outcome="walked", pads=True):
     """The result of `contact-sim`."""
     time, step, angle, velocity = motion(steps, period, jumps=False)
     moving = trajectory(step, time, angle, velocity, 150.0) | ground(step, time, period)
-    groups = {"trajectory": Group(moving), **walked(period, steps)}
+    groups = {"trajectory": Group(moving), **walked(period, steps, slip_m=5e-4, rolling_m=4e-4)}
     if pads:
         groups["terrain"] = pads_group(steps)
     summary = {"outcome": outcome, "steps": steps, "slope_rad": SLOPE, "pitch_m": STEP_LENGTH}

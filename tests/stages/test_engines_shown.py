@@ -7,7 +7,7 @@ from synthetic_engines import PERIOD, ROWS, content
 
 from walkerlab.benchmarks.engines.rows import EngineRow
 from walkerlab.config.loader import load
-from walkerlab.figures.canvas import styled
+from walkerlab.figures.canvas import as_file, styled
 from walkerlab.figures.costs import COLOURS, ENGINES, engines_of
 from walkerlab.labels import labels_of
 from walkerlab.report.blocks import Statements
@@ -55,6 +55,15 @@ def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
     every = list(engines_of("compass", "same-law", results))
     assert len({to_hex(one.line.get_color()) for one in every}) == len({one.engine for one in every})
     assert {one.engine for one in every} <= set(COLOURS)
+
+
+def test_a_panel_without_a_finished_walk_says_so():
+    unfinished = {"engines": content([row for row in ROWS if row.experiment == "same-law" or row.engine == "exudyn"])}
+    with styled():
+        for figure, place in ((ERRORS, 1), (PERIODS, 0)):
+            drawn = figure.plot(unfinished)
+            assert [text.get_text() for text in drawn.axes[place].texts] == ["no walk came to its end"]
+            assert as_file(drawn, "svg", figure.name, "")
 
 
 def test_captions_say_what_was_concluded_and_what_did_not_walk(results):

@@ -41,7 +41,7 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
         say(error, request.typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
-        stopped = StoppedError("interrupted", "Finished stages are kept; the same command does the rest.")
+        stopped = StoppedError("interrupted", "What is finished is kept; the same command does the rest.")
         if request.as_json:
             print_json(failed(name, request, stopped))
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)

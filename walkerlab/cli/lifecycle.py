@@ -19,7 +19,7 @@ Output = Annotated[
         "--output",
         "-o",
         metavar="FILE",
-        help="File to write; its ending gives the format. Default: named after the run.",
+        help="File to write; its ending gives the format. Default: named after the run or the config, in this folder.",
     ),
 ]
 FIRST_WALK = "default: contact-sim, or simulate where that has not run"

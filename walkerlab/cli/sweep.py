@@ -43,15 +43,15 @@ EngineName = Annotated[
 ]
 EngineOptions = Annotated[
     list[str] | None,
-    typer.Option("--engine-option", metavar="NAME=VALUE", help="Of slurm: slurm_partition, timeout_min, cluster, ..."),
+    typer.Option("--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."),
 ]
 Jobs = Annotated[
-    int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; default: all cores, of slurm 16.")
+    int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16.")
 ]
 ChunkSeconds = Annotated[
     float | None, typer.Option("--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine.")
 ]
-Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="A number to draw; may be repeated.")]
+Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")]
 AsCsv = Annotated[
     bool, typer.Option("--csv", help="Print the points with the headline numbers as a table, kept beside the result.")
 ]

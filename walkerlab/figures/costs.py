@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -32,12 +33,20 @@ METHODS_HEIGHT, ENGINES_HEIGHT = 3.9, 4.2  # in
 
 
 def decades(axes: Axes) -> None:
-    """A logarithmic axis of errors with a label at every decade, or at fewer where letters would meet."""
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(
-        LogLocator(numticks=20 if axes.figure.bbox.width > style.NARROW_BELOW * axes.figure.dpi else 8)
-    )
-    axes.yaxis.set_minor_locator(NullLocator())
+    """A logarithmic axis of errors, with labels at fewer decades where letters would meet."""
+    if np.isfinite(axes.dataLim.intervaly).all():
+        axes.set_yscale("log")
+        label_ticks(axes.yaxis, 20 if axes.figure.bbox.width > style.NARROW_BELOW * axes.figure.dpi else 8)
+
+
+def label_ticks(axis: Axis, most: int) -> None:
+    """Labels of a logarithmic axis: at every decade, at most so many, or at 1, 2 and 5 where it spans less than two."""
+    least, last = axis.get_view_interval()
+    short = last < 100.0 * least
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=most))
+    axis.set_minor_locator(NullLocator())
+    if short:
+        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
 
 
 LOOKS = {
@@ -211,7 +220,7 @@ def plot_errors(scene: str, results: Results) -> Figure:
     for axes, every in ((left, same), (right, own)):
         for one in every:
             draw_engine(axes, one, "wall_s", one.runs["error"])
-        few_ticks(axes)
+        costs(axes)
         decades(axes)
         axes.set_xlabel("run time (s)")
     left.set(ylabel="error of the end state (SI)", title="(a) ADAMS's law in each integrator")
@@ -220,15 +229,13 @@ def plot_errors(scene: str, results: Results) -> Figure:
     return figure
 
 
-def few_ticks(axes: Axes) -> None:
-    """A logarithmic axis of costs, labelled at every decade, or at 1, 2 and 5 where it spans less than two."""
-    axes.set_xscale("log")
-    least, most = axes.get_xlim()
-    short = most < 100.0 * least
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=20))
-    axes.xaxis.set_minor_locator(NullLocator())
-    if short:
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+def costs(axes: Axes) -> None:
+    """A logarithmic axis of costs; without any, the panel says so."""
+    if np.isfinite(axes.dataLim.intervalx).all():
+        axes.set_xscale("log")
+        label_ticks(axes.xaxis, 20)
+    else:
+        axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
 
 
 def draw_engine(axes: Axes, one: EngineSeries, cost: str, values: Array) -> None:
@@ -252,7 +259,7 @@ def plot_periods(scene: str, results: Results) -> Figure:
     if "rigid_period_s" in reference:
         level, look = reference["rigid_period_s"], style.RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
         levels.append(axes.axhline(level, **look, label="rigid gait"))
-    few_ticks(axes)
+    costs(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
     legend_above(figure, [*levels, *(one.line for one in every if one.walked.any())])
     return figure

@@ -269,7 +269,7 @@ def gaussian(window: Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Distance from a stable gait to the nearest cell that does not walk: a measure that no window enters.
+    """Distance from a stable gait to the nearest cell that does not walk, to within the size of a cell.
 
     In rad and sqrt(g/L). Left out if the gait is unstable, or the window holds no such cell.
     """

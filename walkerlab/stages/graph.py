@@ -201,7 +201,7 @@ PIPELINE = Graph(
     Stage(
         "tune",
         "walkerlab.stages.tune",
-        "Adjust the initial velocities until the contact model walks: whether, how much, and why.",
+        "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
         takes=TuneConfig,
         inputs=results_of("fixedpoint"),
         needs_contact=True,
@@ -228,7 +228,7 @@ PIPELINE = Graph(
     Stage(
         "engines",
         "walkerlab.stages.engines",
-        "Walk in other engines (MuJoCo, Drake, Exudyn): our law in their integrators, and their own contact.",
+        "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
         takes=SceneConfig,
         inputs=gait_for_start_or_pads,
         needs_contact=True,
@@ -239,7 +239,7 @@ PIPELINE = Graph(
     Stage(
         "known-problems",
         "walkerlab.stages.known_problems",
-        "Solve problems with known answers with the contact code, once for all scenes.",
+        "Check the contact code on problems whose answers are known, once for all scenes.",
         takes=object,
     ),
     Stage(
@@ -284,7 +284,7 @@ PIPELINE = Graph(
     Stage(
         "plot",
         "walkerlab.stages.plot",
-        "Draw the paper's figures from the stored results.",
+        "Draw the figures from the stored results.",
         takes=NamedConfig,
         inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
