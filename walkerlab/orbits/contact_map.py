@@ -79,8 +79,8 @@ def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tu
     if walker.kneed and whole.shanks[stance] not in given:
         angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
     for body in range(n):
-        if whole.E[body, body] == 0.0 and body not in given:
-            angles[body] = whole.E[body, :n] @ angles
+        if whole.E[0, body, body] == 0.0 and body not in given:
+            angles[body] = whole.E[0, body, :n] @ angles
     return angles
 
 

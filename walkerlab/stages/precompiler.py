@@ -7,7 +7,7 @@ all processes share. A stage whose kernels were not compiled ahead compiles for 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import Future
 from functools import partial
 
@@ -62,9 +62,13 @@ class Precompiler:
         if stage.name in self._begun:
             self._begun[stage.name].exception()
 
-    def raise_bugs(self) -> None:
-        """Raise what stopped a compilation; what a user can act on, the stage itself has told."""
-        for future in self._begun.values():
-            error = future.exception() if future.done() and not future.cancelled() else None
+    def raise_bugs(self, ran: Collection[str]) -> None:
+        """Raise what stopped a compilation; what a user can act on, the stage itself has told.
+
+        ran  names of the stages that ran: what is still compiled for others is not waited for
+        """
+        for name, future in self._begun.items():
+            ended = (name in ran or future.done()) and not future.cancelled()
+            error = future.exception() if ended else None
             if error is not None and not isinstance(error, WalkerlabError):
                 raise error

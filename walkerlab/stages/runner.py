@@ -205,7 +205,7 @@ class Execution:
                     self._side_by_side(stages, pool, precompiler)
                 else:
                     self._one_by_one(stages, precompiler)
-                precompiler.raise_bugs()
+                precompiler.raise_bugs({done.stage for done in self.done if done.action == "run"})
         finally:
             for begun in self.running.values():
                 begun.reporter.end("")
