@@ -56,3 +56,14 @@ def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once
     assert line.pace() == "3 s, about 2 s left"
     clock[0] = 9.0
     assert line.pace() == "9 s"
+
+
+def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
+    line = StageLine(Console(quiet=True), "engines", "", None)
+    line.start("engines", 4)
+    for clock[0] in (10.0, 20.0):
+        line.advance()
+    told = []
+    for clock[0] in (24.0, 32.0, 39.0, 41.0):
+        told.append(line.seconds_left())
+    assert told == [16.0, 8.0, 1.0, None]

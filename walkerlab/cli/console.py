@@ -212,14 +212,16 @@ class StageLine:
     def seconds_left(self) -> float | None:
         """By the rate of the later half of what is done, or by how long the stage took the last time.
 
-        None until enough is known, and where a stage takes longer than it did.
+        It comes down while a part is at work. None until enough is known, and where it takes longer than that.
         """
         computed = self.computed_s()
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             half = bisect.bisect_left(self.progress, (self.done // 2,))
             done, at = self.progress[half - 1] if half else (0, 0.0)
-            return (computed - at) / (self.done - done) * (self.total - self.done)
-        left = 0.0 if self.expected_s is None else self.expected_s - (time.monotonic() - self.began)
+            latest = self.progress[-1][1]
+            left = (latest - at) / (self.done - done) * (self.total - self.done) - (computed - latest)
+        else:
+            left = 0.0 if self.expected_s is None else self.expected_s - (time.monotonic() - self.began)
         return left if left > 0.0 else None
 
     def said(self) -> str:

@@ -135,7 +135,7 @@ def asked(
         return Question(stage, sampled(axes, sample, seed), "list")
     for one in axes:
         if not one.values:
-            raise refusal([Problem(Position(one.source, 0, 0), f"{one.key}: how many values?", FORMS)])
+            raise refusal([Problem(Position(one.source, 0, 0), f"{one.key}: it is not said how many values", FORMS)])
     if zipped and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
