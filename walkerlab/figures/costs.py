@@ -257,8 +257,8 @@ def plot_periods(scene: str, results: Results) -> Figure:
     reference = results[ENGINES_STAGE].summary["reference"][scene]
     levels = [axes.axhline(reference["period_s"], color=style.CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
-        level, look = reference["rigid_period_s"], style.RIGID.line | {"linewidth": 1.2, "linestyle": ":"}
-        levels.append(axes.axhline(level, **look, label="rigid gait"))
+        level = reference["rigid_period_s"]
+        levels.append(axes.axhline(level, color=style.GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
     costs(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
     legend_above(figure, [*levels, *(one.line for one in every if one.walked.any())])

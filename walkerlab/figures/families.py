@@ -266,12 +266,15 @@ def draw_multipliers(plane: Axes, over: Axes, branch: DrawnBranch) -> None:
 
 
 def tell_multipliers(results: Results) -> tuple[Any, ...]:
-    """Where gaits of one step bifurcate, by model and kind."""
+    """Where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes."""
     found: dict[tuple[str, str], list[float]] = {}
     for one in results[STAGE].summary["bifurcations"]:
         if one["period"] == 1:
             found.setdefault((one["model"], one["kind"]), []).append(one["value"])
-    return ({which: sorted(values) for which, values in found.items()},)
+    drawn = [branch.group for branch in branches_of(results) if branch.period == 1]
+    magnitudes = (float(np.max(np.hypot(one["multiplier_real"], one["multiplier_imag"]))) for one in drawn)
+    largest = max(magnitudes, default=0.0)
+    return {which: sorted(values) for which, values in found.items()}, largest if largest > FARTHEST else None
 
 
 CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
