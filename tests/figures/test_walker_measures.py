@@ -9,8 +9,8 @@ import pytest
 
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, draw_walker
-from walkerlab.config.walkers import Kneed, StraightLegs
-from walkerlab.figures.measures import drawn, upright
+from walkerlab.config.walkers import Kneed, PartsWalker, StraightLegs
+from walkerlab.figures.measures import drawn, of_parts, upright
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
@@ -60,3 +60,21 @@ def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
     assert path.name == "mine-walker.svg"
     assert "hip_mass_kg: 0.75" in path.read_text()
     assert draw_walker(Path("kneed"), Target("png", Path("it")), Console()).read_bytes().startswith(b"\x89PNG")
+
+
+def test_words_of_two_parts_at_one_point_stand_on_either_side_of_it():
+    legs = ("leg 1", "leg 2")
+    walker = PartsWalker(
+        type="parts",
+        bodies=[{"name": name, "mass_kg": 5, "centre_m": [0, -0.5]} for name in legs],
+        hinges=[
+            {"name": "hip", "parent": legs[1], "parent_point_m": [0, 0], "child": legs[0], "child_point_m": [0, 0]}
+        ],
+        particles=[{"name": "hip", "mass_kg": 10, "body": legs[1], "at_m": [0, 0]}],
+        feet=[{"body": name, "centre_m": [0, -1]} for name in legs],
+        legs=[[name] for name in legs],
+        leg_length_m=1.0,
+    )
+    (axes,) = of_parts(walker).axes
+    sides = [text.xyann[1] > 0.0 for text in axes.texts if text.xy == (0.0, 0.0)]
+    assert sorted(sides) == [False, True]

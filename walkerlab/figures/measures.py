@@ -243,9 +243,11 @@ def of_parts(walker: PartsWalker) -> Figure:
         axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
         marks = list(marks_of(walker, body.name, body.centre_m))
         axes.plot(*np.transpose([at for *_, at in marks]), color=BLACK, linewidth=2.0, zorder=1)
+        above: dict[Point, bool] = {}  # of the last words at a point: the next ones go to its other side
         for number, (words, colour, marker, at) in enumerate(marks):
             axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
-            aside = (12.0, 18.0 if number % 2 else -14.0)
+            above[at] = not above[at] if at in above else number % 2 == 1
+            aside = (12.0, 18.0 if above[at] else -14.0)
             axes.annotate(words, at, aside, textcoords="offset points", color=colour, fontsize=SMALL, va="center")
         for foot in walker.feet:
             if foot.body == body.name and foot.radius_m:
