@@ -5,7 +5,17 @@ import pytest
 from synthetic_families import END, FLIP, families
 
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.families import FIGURE_13, FIGURE_14, FIGURE_16, MODELS, STYLES, curve_of, region_kinds
+from walkerlab.figures.families import (
+    FIGURE_13,
+    FIGURE_14,
+    FIGURE_16,
+    MODELS,
+    STYLES,
+    Curve,
+    curve_of,
+    region_kinds,
+    stretch_of,
+)
 
 FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
 
@@ -68,3 +78,15 @@ def test_multipliers_beyond_the_axes_are_told():
     branch["multiplier_real"].flags.writeable = True
     branch["multiplier_real"][-1] = -7.25
     assert "Some lie beyond the axes, up to a magnitude of 7.25." in FIGURE_14.caption(results)
+
+
+def test_gaits_part_from_a_flip_as_the_root_of_the_distance():
+    value, parts = np.array([4.0, 4.04, 4.09]), np.array([0.0, 0.2, 0.3])
+    quantity = 0.7 + parts[:, None] * np.array([1.0, -1.0])
+    born = Curve(value, quantity, np.array([True, True]), ((0, "flip"),))
+    x, y = stretch_of(born, 0, 2)
+    np.testing.assert_allclose(y, 0.7 + np.sqrt(np.maximum(x - 4.0, 0.0))[:, None] * np.array([1.0, -1.0]), atol=1e-7)
+    assert x[0] == 4.0
+    assert set(value) <= set(x)
+    crossed = Curve(value, quantity, np.array([True, True]), ((1, "flip"),))
+    assert stretch_of(crossed, 0, 2)[0].tolist() == value.tolist()

@@ -30,6 +30,7 @@ NEED: Final = Need(STAGE, "branches", ("model", "period", "from", "to"), "no bra
 MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
 MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
+FROM_FLIP: Final = 16  # points drawn from a flip to the first gait that is born there
 OTHER: Final = GREEN
 """Of gaits that are not born of the gait of one step."""
 
@@ -111,7 +112,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
             continue
         stable = bool(curve.stable[begin])
         axes.plot(
-            curve.value[begin : end + 1], curve.quantity[begin : end + 1], color=branch.colour,
+            *stretch_of(curve, begin, end), color=branch.colour,
             linestyle=STYLES[stable], linewidth=width if stable else 0.6 * width, zorder=4 if stable else 3,
         )  # fmt: skip
     for place, kind in curve.marks:
@@ -121,6 +122,20 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
             marker=marker, markersize=2.6, color=colour, markeredgewidth=0.0, zorder=6,
         )  # fmt: skip
     return {kind for _, kind in curve.marks}
+
+
+def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and quantities to be drawn from one point of a branch to another.
+
+    From the flip that a branch is born in to its first gait, quantities part as the root of the distance from the flip.
+    """
+    value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
+    if begin or (0, "flip") not in curve.marks:
+        return value, quantity
+    root = np.linspace(0.0, 1.0, FROM_FLIP, endpoint=False)
+    parting = quantity[0] + root[:, None] * (quantity[1] - quantity[0])
+    first = value[0] + root**2 * (value[1] - value[0])
+    return np.concatenate([first, value[1:]]), np.concatenate([parting, quantity[1:]])
 
 
 def numbered(results: Results, name: str) -> Iterator[tuple[str, int, Group]]:

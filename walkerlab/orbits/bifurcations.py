@@ -118,11 +118,6 @@ class FlipForm:
     rate: float
 
     @property
-    def supercritical(self) -> bool:
-        """Whether the gait of twice the period is stable where its parent is not."""
-        return self.cubic > 0.0
-
-    @property
     def amplitude(self) -> float:
         """At which the new gait's multiplier, 1 - 4 cubic xi^2, has left 1 by FIRST_FALL."""
         return math.sqrt(0.25 * FIRST_FALL / abs(self.cubic))
