@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from numba import typeof
 from numba.core.errors import TypingError
+from numba.core.itanium_mangler import mangle_type
 
 from walkerlab import compiler
 from walkerlab.compiler import compiling
@@ -310,3 +312,11 @@ def test_a_kernel_whose_compiling_is_stopped_gives_its_lock_back(stops, tmp_path
     assert compiling == []
     monkeypatch.undo()
     assert module.inner(1.0) == 2.0
+
+
+def test_machine_code_names_records_by_their_layout_so_that_processes_agree(monkeypatch):
+    two, three = (typeof(np.zeros((), [("numbers", float, (n,))])).dtype for n in (2, 3))
+    named = mangle_type(two)
+    assert named != mangle_type(three)
+    monkeypatch.setattr(two, "_code", three._code)  # numba's own number, counted up in each process
+    assert mangle_type(two) == named

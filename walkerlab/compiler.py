@@ -57,6 +57,20 @@ JITCodeLibrary = inner_part(
 Compiler = inner_part("numba.core.compiler.Compiler", "compile_extra")
 CompilerBase = inner_part("numba.core.compiler.CompilerBase", "define_pipelines")
 DefaultPassBuilder = inner_part("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+Record = inner_part("numba.core.types.npytypes.Record", "mangling_args")
+
+
+def named_by_layout(record: Any) -> tuple[str, tuple[str, ...]]:
+    """What names a record in the symbols of machine code, in every process the same.
+
+    Numba takes a number that it counts up in each: parts of kernels that two processes compiled for records of two
+    layouts may then have one name, and a third that loads both runs one for the other.
+    """
+    return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
+
+
+if hasattr(Record, "mangling_args"):
+    Record.mangling_args = property(named_by_layout)
 
 if absent:
     warnings.warn(
