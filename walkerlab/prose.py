@@ -14,6 +14,13 @@ if TYPE_CHECKING:
 
 BLANKS = re.compile(r"[ \n]+")
 """Where a template's lines end; the narrow and the unbreakable blanks of numbers are others."""
+BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
+"""What sets the parts of a text apart, as in 'one | two'."""
+
+
+def parts(text: str) -> list[str]:
+    """The parts of a text, those that say something."""
+    return [said for part in BETWEEN_PARTS.split(text) if (said := part.strip(" \n"))]
 
 
 def f(value: float, spec: str) -> str:
@@ -58,3 +65,7 @@ class Prose:
         file, _, macro = name.partition(".")
         said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
         return BLANKS.sub(" ", said).strip()
+
+    def parts(self, name: str, *values: Any) -> list[str]:
+        """The paragraphs, or words, that a macro sets apart by |."""
+        return parts(self(name, *values))

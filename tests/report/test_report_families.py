@@ -8,6 +8,7 @@ from walkerlab.config.loader import load
 from walkerlab.report.results import Results
 from walkerlab.report.sections import families as section
 from walkerlab.report.sections.families import CLEAR, apart, gait_diagram
+from walkerlab.report.words import words
 
 
 def test_a_run_without_families_has_no_such_section():
@@ -34,8 +35,8 @@ def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
     assert "Above 3.2 deg it trips." in said
     assert "Above 3.3 deg it trips." not in said
     ended = [{"said": "3 of 9 walks slid away.", "ground": True}, {"said": "2 of 9 walks fell.", "ground": False}]
-    assert section.grounds({"endings": ended}) == ["3 of 9 walks slid away."]
-    assert section.grounds({}) == []
+    assert words.parts("basin.grounds", {"endings": ended}) == ["3 of 9 walks slid away."]
+    assert words.parts("basin.grounds", {}) == []
 
 
 def test_the_diagram_marks_gaits_whose_motion_is_stored():

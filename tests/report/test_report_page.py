@@ -210,5 +210,5 @@ def test_sentences_name_only_what_there_is(templates):
 
 
 def test_a_sentence_is_one_line_and_keeps_the_blanks_of_its_numbers():
-    assert words("models.locking", 0.3486, 0.3485).count("\u00a0s") == 2
+    assert words("gait.finding", fixedpoint().summary).count("\u00a0") == 2
     assert "\n" not in words("stability.judgement")

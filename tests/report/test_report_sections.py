@@ -15,11 +15,11 @@ from synthetic_results import (
     PAPER_ROWS,
     PERIOD,
     SLOPE,
-    column,
     compare,
     config,
     contact_sim,
     fixedpoint,
+    gait_summary,
     paper_row,
     simulate,
     stored,
@@ -30,13 +30,12 @@ from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Sec
 from walkerlab.report.registry import SECTIONS, lead, sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
-from walkerlab.report.sections.gaits import SETS, coordinate, found_gaits
+from walkerlab.report.sections.gaits import SETS, coordinate, every_gait
 from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.store.content import Group, Variable
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
@@ -424,20 +423,14 @@ def test_the_paragraph_under_the_title_lists_what_a_walker_has():
 
 
 def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
-    gaits = Group(
-        {
-            "period_s": column([0.6, 0.7], "gait"),
-            "step_length_m": column([0.3, 0.4], "gait"),
-            "state": Variable(np.zeros((2, 4)), ("gait", "coordinate"), "rad", "state"),
-            "spectral_radius": column([2.0, 0.5], "gait"),
-            "stable": column([False, True], "gait"),
-        },
-        {"chosen": 1},
-    )
-    stored_gaits = stored("fixedpoint", {"corrected/gaits": gaits, "as-printed/gaits": gaits})
-    results = Results(config(), {"fixedpoint": stored_gaits})
-    heads = [[one.title for one in found_gaits(results, sets, COORDINATES).bodies] for sets in (["corrected"], [*SETS])]
+    gait = gait_summary() | {"chosen": True, "objection": ""}
+    every = {name: [gait, gait | {"chosen": False, "objection": "it scuffs"}] for name in SETS}
+    heads = [
+        [one.title for one in every_gait({name: every[name] for name in sets}, COORDINATES).bodies]
+        for sets in (["corrected"], [*SETS])
+    ]
     assert heads == [[""], ["as printed", "corrected"]]
+    assert [row[-1].text for row in every_gait(every, COORDINATES).bodies[0].rows] == ["chosen", "it scuffs"]
 
 
 def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():

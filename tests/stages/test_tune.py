@@ -14,6 +14,7 @@ from walkerlab.orbits.rigid_limit import ALL, NORMAL, ContactFactors, Distance, 
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
+from walkerlab.report.words import words
 from walkerlab.stages import fixedpoint, tune
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
@@ -202,7 +203,7 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
     told = causes(limit)
     assert "together_s" not in told
     assert told["rest_s"] == pytest.approx(0.012)
-    said = adjustment.caused({"causes": told}).replace("\u00a0", " ")
+    said = words("adjustment.caused", told).replace("\u00a0", " ")
     assert said.startswith(
         "Its period differs from the rigid gait's by 10 ms. With each cause switched off alone, −2 ms"
     )

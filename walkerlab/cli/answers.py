@@ -10,14 +10,14 @@ from typing import Any
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import MODELS, WALKED, ends
+from walkerlab.report.outcomes import MODELS
 from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.sections import adjustment, families, gaits, stability, walks
 from walkerlab.report.sections.families import parameter
-from walkerlab.report.sections.models import CHANNELS
 from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.report.words import words
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
@@ -52,36 +52,23 @@ def laid_out(blocks: Iterable[str | Table]) -> list[str]:
 
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
-    """The gait under both sets of equations, side by side."""
-    slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
+    """The gait, under both sets of equations side by side where the digits that are shown tell their gaits apart."""
+    head = words("gait.answer", summary, math.degrees(summary["slope_rad"]))
     if "state" not in summary:
-        return [f"No gait on a slope of {slope}: {summary['reason']}."]
-    stable = "a stable gait" if summary["stable"] else "an unstable gait"
-    head = (
-        f"On a slope of {slope} there is {stable}: steps of {fixed(summary['step_length_m'], 4)} m "
-        f"in {fixed(summary['period_s'], 4)} s; the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
-    )
-    others = {name: one for name, one in summary.get("equation_sets", {}).items() if another_gait(one, summary)}
+        return [head]
+    shown = [fixed(value, 6) for value in summary["state"]]
+    others = {
+        name: one
+        for name, one in summary.get("equation_sets", {}).items()
+        if "state" in one and [fixed(value, 6) for value in one["state"]] != shown
+    }
     found = gaits.gait_table({summary["equations"]: summary, **others}, summary.get("state_names", gaits.STATE))
     return [head, found, f"{count(summary['gaits_found'], 'gait')} of one step found."]
 
 
-def another_gait(one: Summary, summary: Summary) -> bool:
-    """Whether one set of equations has a gait that is told from another one's by the digits that are shown."""
-    if "state" not in one:
-        return False
-    return any(fixed(a, 6) != fixed(b, 6) for a, b in zip(one["state"], summary["state"], strict=True))
-
-
-def told(words: str, key: str, digits: int = 4) -> Column:
+def told(title: str, key: str, digits: int = 4) -> Column:
     """A number of a walk as a whole, with its unit."""
-    return Column(words, key, lambda value: quantity(value, unit_by_name(key), digits))
-
-
-def energy_lost(summary: Summary) -> str | None:
-    """Where a walk dissipated its energy; None if nowhere."""
-    lost = (summary.get("dissipated_J") or {}).items()
-    return listed(f"{quantity(value, 'J', 3)} {CHANNELS.get(name, name)}" for name, value in lost if value) or None
+    return Column(title, key, lambda value: quantity(value, unit_by_name(key), digits))
 
 
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
@@ -89,7 +76,7 @@ OF_THE_WALK = (
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
     told("energy balance off by", "energy_balance_residual_J", 2),
-    Column("energy lost", energy_lost),
+    Column("energy lost", lambda walk: words("walks.lost", walk.get("dissipated_J") or {}) or None),
     told("least normal force", "min_normal_force_N"),
     told("largest friction ratio", "max_friction_ratio"),
     Column("largest penetration", "max_penetration_m", length),
@@ -100,18 +87,16 @@ OF_THE_WALK = (
 
 def walk(model: str, summary: Summary) -> list[str | Table]:
     """How a model's walk went, step by step."""
-    steps, periods, lengths = summary["steps"], summary["step_periods_s"], summary["step_lengths_m"]
-    head = f"The {model} {comes(steps, summary['outcome'])}"
-    if periods:
-        period = walks.of_step(periods[-1], "step_periods_s", summary)
-        head += f"; the last takes {period} s and is {walks.of_step(lengths[-1], 'step_lengths_m', summary)} m long"
     columns = [Column(title, key, numeric=True) for key, title in OF_EACH_STEP.items()]
-    taken = side_by_side("", columns, each_step(summary), head="step")
-    advised = summary.get("advice") and summary["outcome"] != WALKED
-    whole = side_by_side("", OF_THE_WALK, {"": summary}, head="")
-    error = summary.get("numerical_error")
-    told = f"numerical error: {walks.error_in_words(error)}." if error else ""
-    return [f"{head}.", taken, whole, told, f"advice: {summary['advice']}" if advised else ""]
+    error, taken = summary.get("numerical_error"), each_step(summary)
+    last = list(taken.values())[-1] if taken else {}
+    return [
+        words("walks.answer", model, summary, last.get("step_periods_s"), last.get("step_lengths_m")),
+        side_by_side("", columns, taken, head="step"),
+        side_by_side("", OF_THE_WALK, {"": summary}, head=""),
+        words("walks.error", error, "") if error else "",
+        words("walks.advice", summary),
+    ]
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
@@ -136,40 +121,23 @@ def elided(values: Sequence[Any]) -> list[Any]:
 
 def tune(summary: Summary) -> list[str | Table]:
     """Whether other initial velocities are needed, and what the contact model's own gait is."""
-    change, gait, cells = summary["adjustment"], summary["gait"], summary["map"]
-    if not change["needed"]:
-        head = "The contact model walks from the rigid gait as it stands: no adjustment is needed."
-    elif change["found"]:
-        swing, stance = number(change["scale_dtheta1"], 4), number(change["scale_dtheta2"], 4)
-        head = f"The smallest change that walks: θ̇₁ by a factor of {swing}, θ̇₂ by {stance}."
-    else:
-        head = f"No start was found that walks: {change['reason']}."
-    share = f"Of the {cells['cells']} starts on the map, {100 * cells['walks_share']:.1f} % walk."
+    gait = summary["gait"]
     own = (
         side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
         if gait["found"]
         else f"No own gait: {gait['reason']}."
     )
-    margins = [adjustment.margins_table(summary)] if change.get("margins") else []
-    return [head, share, *families.grounds(cells), own, *margins]
+    margins = [adjustment.margins_table(summary)] if summary["adjustment"].get("margins") else []
+    return [*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]), own, *margins]
 
 
 def compare(summary: Summary) -> list[str | Table]:
     """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
-    if "verdicts" not in summary:
-        return models_compared(summary)
-    verdicts = summary["verdicts"]
-    total = sum(verdicts.values())
-    head = f"Of {total} numbers that the paper prints, " + listed(
-        f"{number} {'is' if number == 1 else 'are'} {name}" for name, number in verdicts.items()
-    )
-    return [f"{head}.", numbers_table(summary["paper_numbers"]), *errors_of_models(summary)]
-
-
-def errors_of_models(summary: Summary) -> list[str]:
-    """The numerical error of each model's walk."""
     errors = summary.get("numerical_error", {})
-    return [f"numerical error of the {model} walk: {walks.error_in_words(error)}." for model, error in errors.items()]
+    told = [words("walks.error", error, model) for model, error in errors.items()]
+    if "verdicts" in summary:
+        return [words("models.paper", summary["verdicts"]), numbers_table(summary["paper_numbers"]), *told]
+    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 
 
 LAST_STEP = (
@@ -180,23 +148,18 @@ LAST_STEP = (
 )
 
 
-def models_compared(summary: Summary) -> list[str | Table]:
-    """The last steps of both models beside the gait's and, with knees, those of both instants of their release."""
-    outcomes, errors = summary["outcomes"], summary.get("numerical_error", {})
-    steps = [
-        {"name": name, "outcome": outcomes.get(name), **(with_digits(step, errors[name]) if name in errors else step)}
-        for name, step in summary["steps"].items()
-    ]
+def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
+    """The last steps of both models beside the gait's and, with knees, those of both instants of their release.
+
+    errors  numerical errors of the models' walks, by model: they leave so many digits
+    """
+    steps = []
+    for name, step in summary["steps"].items():
+        known = {"period_s": "step_period_s", "length_m": "step_length_m"} if name in errors else {}
+        left = {key: Cell(fixed(step[key], decimals_left(errors[name].get(error)))) for key, error in known.items()}
+        steps.append({"name": name, "outcome": summary["outcomes"].get(name), **step, **left})
     steps += [{"name": f"knee released at {name}", **walk} for name, walk in summary.get("releases", {}).items()]
-    rigid, contact = (ends(outcomes[model]) for model in ("rigid", "contact"))
-    rest = "and so does the contact model" if contact == rigid else f"the contact model {contact}"
-    return [f"The rigid model {rigid}, {rest}.", table("", LAST_STEP, steps), *errors_of_models(summary)]
-
-
-def with_digits(step: Summary, error: Summary) -> Summary:
-    """A step whose period and length are written with the decimals that the numerical error of its walk leaves."""
-    errors = {"period_s": error.get("step_period_s"), "length_m": error.get("step_length_m")}
-    return {**step, **{key: Cell(fixed(step[key], decimals_left(off))) for key, off in errors.items()}}
+    return table("", LAST_STEP, steps)
 
 
 def accuracy(summary: Summary) -> list[str | Table]:
@@ -231,7 +194,8 @@ def continuation(summary: Summary) -> list[str | Table]:
 
 def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
-    return [in_signs(families.shares(summary).text), *families.grounds(summary), families.attractors(summary)]
+    shares = in_signs(words("basin.shares", summary))
+    return [shares, *words.parts("basin.grounds", summary), families.attractors(summary)]
 
 
 def engines(summary: Summary) -> list[str | Table]:
@@ -276,12 +240,7 @@ def verdict(results: Mapping[str, Summary]) -> list[str]:
     """What a whole run has found, in three paragraphs at most: the gait, both walks, and what of the paper holds."""
     walked = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
     said = "; the ".join(f"{model} {comes(one['steps'], one['outcome'])}" for model, one in walked)
-    of_the_paper = "verdicts" in results.get("compare", {})
-    judged = [*(["compare"] if of_the_paper else []), *(["stability"] if "stability" in results else [])]
-    gait = headline("fixedpoint", results) if "fixedpoint" in results else ""
-    return laid_out([gait, f"The {said}." if said else "", " ".join(headline(stage, results) for stage in judged)])
-
-
-def headline(stage: str, results: Mapping[str, Summary]) -> str:
-    """What the answer of a stage begins with."""
-    return str(ANSWERS[stage](results[stage])[0])
+    of_the_paper = ("compare",) if "verdicts" in results.get("compare", {}) else ()
+    told = [stage for stage in ("fixedpoint", *of_the_paper, "stability") if stage in results]
+    heads = {stage: str(ANSWERS[stage](results[stage])[0]) for stage in told}
+    return laid_out([heads.pop("fixedpoint", ""), f"The {said}." if said else "", " ".join(heads.values())])

@@ -41,3 +41,13 @@ def walks(steps: int, outcome: str) -> str:
 def tone(outcome: str) -> Tone:
     """Whether a walk went as hoped."""
     return "good" if outcome == WALKED else "bad"
+
+
+CHANNELS = {
+    "damping": "in the ground's damping",
+    "friction": "in friction",
+    "edges": "at pads' edges",
+    "knee_strikes": "in knee strikes",
+    "knee_stop": "in the knees' stops",
+}
+"""Where a contact walk dissipates energy, by the names under which it is stored."""

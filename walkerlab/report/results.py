@@ -35,7 +35,7 @@ class Results:
     @property
     def departures(self) -> Sequence[str] | None:
         """How the scene departs from the paper's: not at all if empty; None if nobody compared them."""
-        found: Sequence[str] | None = (self.summary("compare") or {}).get("departures")
+        found: Sequence[str] | None = self.summary("compare").get("departures")
         return found
 
     @property
@@ -43,10 +43,9 @@ class Results:
         """Whether the scene is the paper's own, so that the paper's numbers are what a reader wants first."""
         return "compare" in self.stored and not self.departures
 
-    def summary(self, stage: str) -> Mapping[str, Any] | None:
-        """The summary of a stage's result; None if there is none."""
-        result = self.stored.get(stage)
-        return None if result is None else result.summary
+    def summary(self, stage: str) -> Mapping[str, Any]:
+        """The summary of a stage's result; empty if there is none."""
+        return self.stored[stage].summary if stage in self.stored else {}
 
     def group(self, stage: str, path: str) -> Group | None:
         """A group of a stage's result; None if there is no such result or group."""

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkerlab.prose import Prose
+from walkerlab.prose import Prose, parts
 from walkerlab.report import numbers
-from walkerlab.report.outcomes import ends, walks
+from walkerlab.report.outcomes import CHANNELS, ends, walks
 from walkerlab.report.symbols import in_signs
+
+
+def in_row(text: str) -> str:
+    """The parts of a text as words in a row: 'a, b and c' of 'a | b | c'."""
+    return numbers.listed(parts(text))
+
 
 WRITTEN = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
-    *(numbers.count, numbers.listed, numbers.power_of_ten, in_signs, ends, walks),
+    *(numbers.count, numbers.listed, numbers.power_of_ten, in_row, in_signs, ends, walks, len),
 )
 """What the templates may call."""
-words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, {})
+words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, {"CHANNELS": CHANNELS})

@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.figures.sweep import SweepFigure, choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.page import SweepPage, render_sweep
-from walkerlab.report.sections.walks import error_of_sample
+from walkerlab.report.words import words
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -87,7 +87,7 @@ def said_of(summary: Mapping[str, Any]) -> list[str]:
     """What a sweep says beside its numbers: what ended its walks, and how far their numbers are off."""
     ended = [str(one["said"]) for one in summary.get("endings", ())]
     error = summary.get("numerical_error")
-    return ended if error is None else [*ended, error_of_sample(error, "points")]
+    return ended if error is None else [*ended, words("error.of_sample", error, "points")]
 
 
 def spoken(values: Sequence[object]) -> str:

@@ -12,15 +12,13 @@ from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.report.words import words
 
-STAGE = "accuracy"
-
 Row = Mapping[str, Any]
 
 
 def section(results: Results) -> Section | None:
     """The table of methods for each scene, with conclusions, references, and what was not run."""
-    summary = results.summary(STAGE)
-    if summary is None or not summary.get("reference"):
+    summary = results.summary("accuracy")
+    if not summary.get("reference"):
         return None
     scenes = list(summary["reference"])
     told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in scenes}

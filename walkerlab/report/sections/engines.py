@@ -14,15 +14,14 @@ from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, Table, measured, table
 from walkerlab.report.words import words
 
-STAGE = "engines"
 ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
 Row = Mapping[str, Any]
 
 
 def section(results: Results) -> Section | None:
     """Conclusions in words, then a table for each experiment; None if the stage did not run."""
-    summary = results.summary(STAGE)
-    if summary is None or not summary.get("rows"):
+    summary = results.summary("engines")
+    if not summary.get("rows"):
         return None
     concluded = [
         Statement(f"{scene}, {ABOUT[experiment]}", text)

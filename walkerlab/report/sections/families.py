@@ -5,31 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.labels import with_unit
 from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Section, Walker
-from walkerlab.report.numbers import count, number, quantity, whole
+from walkerlab.report.numbers import number, whole
 from walkerlab.report.results import Results
 from walkerlab.report.sections.gaits import complex_number
-from walkerlab.report.sections.walks import error_of_sample
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.report.words import words
 from walkerlab.store.content import Group
 
-MODELS = ("rigid", "contact")
-
 
 def section(results: Results) -> Section | None:
     """Branches, their bifurcations and the chaos beyond; None if none were followed."""
     summary = results.summary("continuation")
-    if summary is None or not summary.get("branches"):
+    if not summary.get("branches"):
         return None
-    first, *others = findings(summary) or [f"{count(len(summary['branches']), 'branch', 'branches')} followed."]
+    first, *others = findings(summary) or [words("families.followed", summary["branches"])]
     blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
     diagram = gait_diagram(results)
     if diagram is not None:
@@ -41,30 +38,12 @@ def section(results: Results) -> Section | None:
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
     """What there is to say, sentence by sentence."""
-    unit = str(summary["unit"])
-    said = []
-    for model in MODELS:
-        stable = [one for one in summary["branches"] if one["model"] == model and one["period"] == 1]
-        ranges = [pair for one in stable for pair in one["stable_ranges"]]
-        if ranges:
-            said.append(words("families.stable", model, *max(ranges, key=lambda pair: pair[1] - pair[0]), unit))
-    doubling = summary["first_doubling"]
-    if doubling.keys() >= set(MODELS):
-        said.append(words("families.shift", doubling["contact"] - doubling["rigid"], unit))
-    cascades = [one for one in summary["cascades"] if "accumulates_at" in one]
-    said += [words("families.cascade", one, len(one["flips"]), unit) for one in cascades]
-    for one in summary["attractors"]:
-        if one["aperiodic_from"] is not None:
-            said.append(words("families.aperiodic", one["aperiodic_from"], unit))
-        if one["lost_at"] is not None:
-            said.append(words("families.lost", one, unit))
-    said += [one["said"] for one in summary.get("endings", ()) if one["period"] == 1]
-    for model, error in summary.get("numerical_error", {}).items():
-        said.append(error_of_sample(error, f"gaits of the {model} model"))
-    wild = max(summary["lyapunov"], key=lambda one: one["exponent"], default=None)
-    if wild is not None and wild["exponent"] > 3.0 * wild["uncertainty"]:
-        said.append(words("families.chaos", wild, unit))
-    return said
+    stable = {}
+    for model in ("rigid", "contact"):
+        alone = [one for one in summary["branches"] if (one["model"], one["period"]) == (model, 1)]
+        if ranges := [pair for one in alone for pair in one["stable_ranges"]]:
+            stable[model] = max(ranges, key=lambda pair: pair[1] - pair[0])
+    return words.parts("families.findings", summary, stable)
 
 
 def bifurcations(summary: Mapping[str, Any]) -> Table:
@@ -79,6 +58,11 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
     return table("Bifurcations, as zeros of their test functions", columns, summary["bifurcations"])
 
 
+def parameter(summary: Mapping[str, Any]) -> str:
+    """What the families are over; the slope is the slope in either unit."""
+    return str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
+
+
 MODEL = "rigid"
 CLEAR = 16.0
 """Between the centres of two marks, in units of the diagram: half as much again as they are wide, for fingers."""
@@ -86,13 +70,14 @@ GAP = 3.0
 """Time between samples, in those of the walk itself: a gait is looked at, not measured."""
 
 
-class DiagramAxis(NamedTuple):
-    """From numbers to places on an axis."""
+class DiagramAxis:
+    """From numbers to places between the start and the end of an axis, with a little room beside the numbers."""
 
-    least: float
-    most: float
-    start: float
-    end: float
+    def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
+        """Make room for the numbers."""
+        least, most = float(values.min()), float(values.max())
+        room = 0.04 * (most - least) or 1.0
+        self.least, self.most, self.start, self.end = least - room, most + room, start, end
 
     def place(self, value: float) -> float:
         """Where a number is."""
@@ -107,38 +92,44 @@ class DiagramAxis(NamedTuple):
         return tuple((self.place(number * step), f"{number * step:.6g}") for number in numbers)
 
 
-def scale_of(values: NDArray[np.float64], start: float, end: float) -> DiagramAxis:
-    """An axis for some numbers, with a little room at its ends."""
-    least, most = float(values.min()), float(values.max())
-    room = 0.04 * (most - least) or 1.0
-    return DiagramAxis(least - room, most + room, start, end)
-
-
 def gait_diagram(results: Results) -> Diagram | None:
     """Step periods over the parameter, with the gaits whose stored motion can be pointed at; None if there are none."""
-    summary = results.summary("continuation") or {}
-    branches = list(branches_of(results))
-    if not any(results.group("continuation", f"{path}/motion_0") for path, _ in branches):
+    summary = results.summary("continuation")
+    branches: list[Group] = []
+    while (branch := results.group("continuation", f"{MODEL}/branch_{len(branches)}")) is not None:
+        branches.append(branch)
+    moving = [
+        (branch, place, motion)
+        for number, branch in enumerate(branches)
+        for place in range(branch["value"].size)
+        if (motion := results.group("continuation", f"{MODEL}/branch_{number}/motion_{place}")) is not None
+    ]
+    if not moving:
         return None
-    value = np.concatenate([branch["value"] for _, branch in branches])
-    period = np.concatenate([branch["step_period"].ravel() for _, branch in branches])
+    value = np.concatenate([branch["value"] for branch in branches])
+    period = np.concatenate([branch["step_period"].ravel() for branch in branches])
+    across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
+    up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
+    gap, unit = GAP * sampling_gap(results.config), summary["unit"]
+    marks = []
+    for branch, place, motion in moving:
+        x, y = float(branch["value"][place]), float(branch["step_period"][place][0])
+        stable = bool(branch["stable"][place])
+        track = track_in(motion)
+        if track is not None:
+            name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
+            strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
+            walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), ())
+            marks.append(GaitMark(across.place(x), up.place(y), name, stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
-    across = scale_of(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
-    up = scale_of(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     return Diagram(
         title=f"Gaits over {over}",
-        caption="The duration of each step of the rigid model's gaits; broken lines are unstable. A mark is a gait: "
-        "chosen, it walks in the player above.",
-        titles=(f"{over} ({summary['unit']})", "duration of a step (s)"),
-        curves=tuple(curve for _, branch in branches for curve in curves(branch, across, up)),
+        caption=words("families.diagram"),
+        titles=(f"{over} ({unit})", "duration of a step (s)"),
+        curves=tuple(curve for branch in branches for curve in curves(branch, across, up)),
         ticks=(across.ticks(), up.ticks()),
-        gaits=apart(list(gaits(results, across, up))),
+        gaits=apart(marks),
     )
-
-
-def parameter(summary: Mapping[str, Any]) -> str:
-    """What the families are over; the slope is the slope in either unit."""
-    return str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
 
 
 def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
@@ -149,14 +140,6 @@ def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
         if all(math.hypot(marks[other].x - x, marks[other].y - y) >= CLEAR for other in kept):
             kept.append(place)
     return tuple(marks[place] for place in sorted(kept))
-
-
-def branches_of(results: Results) -> Iterator[tuple[str, Group]]:
-    """Path and group of each branch of the rigid model."""
-    number = 0
-    while (group := results.group("continuation", path := f"{MODEL}/branch_{number}")) is not None:
-        yield path, group
-        number += 1
 
 
 def curves(
@@ -172,28 +155,6 @@ def curves(
             yield tuple((across.place(float(x)), up.place(float(y))) for x, y in points), bool(stable[begin])
 
 
-def gaits(results: Results, across: DiagramAxis, up: DiagramAxis) -> Iterator[GaitMark]:
-    """The gaits whose motion was stored, branch by branch."""
-    unit = str((results.summary("continuation") or {})["unit"])
-    for path, branch in branches_of(results):
-        for place, value in enumerate(branch["value"].tolist()):
-            moving = results.group("continuation", f"{path}/motion_{place}")
-            track = None if moving is None else track_in(moving)
-            if moving is None or track is None:
-                continue
-            steps, stable = int(moving.attrs["steps"]), bool(branch["stable"][place])
-            said = f"{count(steps, 'step')} at {quantity(value, unit, 4)}, {'stable' if stable else 'unstable'}"
-            walker = Walker(
-                name=f"Gait of {said}",
-                style=MODEL,
-                track=track.thinned(GAP * sampling_gap(results.config)),
-                strikes=tuple(moving["time"][1:][np.diff(moving["step"]) > 0].round(6).tolist()),
-                stills=(),
-            )
-            y = up.place(float(branch["step_period"][place][0]))
-            yield GaitMark(across.place(value), y, walker.name, stable, walker, float(moving.attrs["slope_rad"]))
-
-
 ATTRACTOR_COLUMNS = (
     Column("period (steps)", "period", whole, numeric=True),
     Column("cells", "cells", whole, numeric=True),
@@ -204,26 +165,13 @@ ATTRACTOR_COLUMNS = (
 def basin(results: Results) -> Section | None:
     """What the basin came to; None if it was not asked for."""
     summary = results.summary("basin")
-    if summary is None:
+    if not summary:
         return None
-    blocks: list[PageBlock] = [shares(summary), *(Paragraph(said) for said in grounds(summary))]
+    told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
+    blocks: list[PageBlock] = [Paragraph(said) for said in told]
     if summary["attractors"]:
         blocks.append(attractors(summary))
     return Section("basin", "Basins of attraction", tuple(blocks))
-
-
-def shares(summary: Mapping[str, Any]) -> Paragraph:
-    """The share of starts that walk, which depends on the window, and what does not depend on it."""
-    window = [f"{name} from {number(low, 4)} to {number(high, 4)}" for name, (low, high) in summary["window"].items()]
-    ends = [f"{many:,} {name}" for name, many in summary["outcomes"].items()]
-    return Paragraph(words("basin.shares", summary, window, ends))
-
-
-def grounds(summary: Mapping[str, Any]) -> list[str]:
-    """What of the ground ended walks, and whether walks end alike at tighter tolerances."""
-    told = [str(one["said"]) for one in summary.get("endings", ()) if one["ground"]]
-    error = summary.get("numerical_error")
-    return told if error is None else [*told, error_of_sample(error, "starts")]
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

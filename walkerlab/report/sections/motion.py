@@ -53,7 +53,7 @@ def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
 
 def first_steps(results: Results) -> float:
     """When the first steps are over (s), of the model that takes longest; they are what is shown."""
-    touches = [(results.summary(stage) or {}).get("touch_times_s", []) for stage in MODELS]
+    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
     return max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
 
 

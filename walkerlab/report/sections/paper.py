@@ -63,7 +63,7 @@ def numbers_table(rows: Sequence[Row]) -> Table:
 
 def paper_numbers(results: Results) -> Sequence[Row]:
     """The rows that `compare` made; none without it."""
-    rows: Sequence[Row] = (results.summary("compare") or {}).get("paper_numbers", ())
+    rows: Sequence[Row] = results.summary("compare").get("paper_numbers", ())
     return rows
 
 
@@ -114,7 +114,7 @@ UNIT = "unit"
 
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
-    summary = results.summary("compare") or {}
+    summary = results.summary("compare")
     shown: list[PageBlock] = [
         paper_table(caption, summary[key], NOTES.get(key, "")) for key, caption in CAPTIONS.items() if summary.get(key)
     ]
@@ -165,9 +165,7 @@ def errors(results: Results) -> Section | None:
     return Section("errata", "Errata of the paper", (found,), finding, PAPER)
 
 
-def errata(results: Results) -> list[dict[str, str]]:
+def errata(results: Results) -> Sequence[Row]:
     """The errata that `compare` found, by the names of their parts; none without it."""
-    group = results.group("compare", "errata")
-    if group is None:
-        return []
-    return [dict(zip(PARTS, row, strict=True)) for row in zip(*(group[name].tolist() for name in PARTS), strict=True)]
+    found: Sequence[Row] = results.summary("compare").get("errata", ())
+    return found

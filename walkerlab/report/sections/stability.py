@@ -23,7 +23,7 @@ Rows = Sequence[Row]
 def section(results: Results) -> Section | None:
     """The stability table; None if the stage did not run."""
     summary = results.summary("stability")
-    if summary is None:
+    if not summary:
         return None
     cases, known = summary["cases"], summary["known"]
     blocks: list[PageBlock] = [
@@ -51,7 +51,7 @@ def failures(cases: Rows, known: Rows) -> list[PageBlock]:
 def maps(results: Results) -> Paragraph:
     """What the maps came to, or how to make them."""
     summary = results.summary("stability-maps")
-    if summary is None:
+    if not summary:
         return Paragraph(words("stability.how_to_map"))
     counted = ([f"{many} {name}" for name, many in summary[key].items()] for key in ("outcomes", "fixed_step"))
     return Paragraph(words("stability.maps", summary, *counted))

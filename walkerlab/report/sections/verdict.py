@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count
-from walkerlab.report.outcomes import CONTACT, MODELS, WALKED, tone
+from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
 from walkerlab.report.sections.paper import TONES, errata, paper_numbers
@@ -28,41 +28,25 @@ HEADLINES = {
 }
 """The errata that matter most, by how their place begins, and what they come to in a few words."""
 
-Rows = Sequence[Mapping[str, Any]]
-
 
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
     blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
-    blocks += opening(results)
-    told = (*(walk(results, stage) for stage in MODELS), gait(results), adjustment(results))
-    fared = [found for found in told if found is not None]
+    rows = paper_numbers(results) if results.of_the_paper else ()
+    walked = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
+    if walked:  # what holds, what fails and what follows
+        verdicts = Counter(row["verdict"] for row in rows)
+        misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
+        said = words("verdict.opening", walked, results.summary("fixedpoint"), verdicts, misprint)
+        blocks.append(Paragraph(said))
+    fared = sorted(how_all_fared(results), key=lambda found: found.tone != "bad")
     if fared:
-        blocks.append(Statements(tuple(sorted(fared, key=lambda found: found.tone != "bad")), "cards"))
-    departs = departure(results)
-    if departs:
+        blocks.append(Statements(tuple(fared), "cards"))
+    if departs := departure(results):
         blocks.append(Paragraph(departs))
-    rows = paper_numbers(results)
-    if rows and results.of_the_paper:
+    if rows:
         blocks += of_the_paper(results, rows)
-    elif not blocks:
-        blocks.append(Paragraph("There are no results to judge."))
-    return Section("verdict", "Verdict", tuple(blocks))
-
-
-def opening(results: Results) -> list[PageBlock]:
-    """What holds, what fails and what follows; nothing without a walk."""
-    found = {model.lower(): results.summary(stage) for stage, model in MODELS.items()}
-    walked = {model: summary for model, summary in found.items() if summary is not None}
-    if not walked:
-        return []
-    verdicts = Counter(str(row["verdict"]) for row in paper_numbers(results)) if results.of_the_paper else Counter()
-    misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
-    gait, contact = results.summary("fixedpoint"), results.summary(CONTACT)
-    slower = None
-    if gait and contact and contact["outcome"] == WALKED and gait.get("period_s"):
-        slower = 100.0 * (contact["step_periods_s"][-1] / gait["period_s"] - 1.0)
-    return [Paragraph(words("verdict.opening", walked, gait, verdicts, misprint, slower))]
+    return Section("verdict", "Verdict", tuple(blocks) or (Paragraph("There are no results to judge."),))
 
 
 def failures(results: Results) -> list[str]:
@@ -77,85 +61,50 @@ def failures(results: Results) -> list[str]:
     return [*told, *(f"{name}: {why['message'].rstrip('.')}." for name, why in said.items() if why is not None)]
 
 
-def walk(results: Results, stage: str) -> Statement | None:
-    """How the walk of a stage ended: where and when, the numbers that judged it, and what to try; None without it."""
-    summary = results.summary(stage)
-    if summary is None:
-        return None
-    outcome, config = str(summary["outcome"]), results.config
-    tau = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
-    text = words("verdict.walk", summary, 2 * config.strides, tau, *end_of(results, stage))
-    return Statement(MODELS[stage], text, outcome, tone(outcome))
+def how_all_fared(results: Results) -> Iterator[Statement]:
+    """How each walk ended, with the numbers that judged it and what to try; the gait; that no start walks."""
+    for stage, model in MODELS.items():
+        if summary := results.summary(stage):
+            config, outcome = results.config, summary["outcome"]
+            tau = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
+            text = words("verdict.walk", summary, 2 * config.strides, tau, *end_of(results, stage))
+            yield Statement(model, text, outcome, tone(outcome))
+    if gait := results.summary("fixedpoint"):
+        badge: tuple[str, Tone] = ("stable", "good") if gait["stable"] else ("unstable", "fair")
+        yield Statement("Periodic gait", words("verdict.gait", gait), *badge)
+    change = results.summary("tune").get("adjustment")
+    if change is not None and not change["found"]:
+        text = f"{change['reason'].capitalize()}. {change['advice']}"
+        yield Statement("Parameter adjustment", text, "no start helps", "bad")
 
 
 def end_of(results: Results, stage: str) -> tuple[float | None, float | None]:
     """When a walk ended (s), and how high the hip was then over the slope (m); None where that was not stored."""
-    summary, trajectory = results.stored[stage].summary, results.group(stage, "trajectory")
+    summary, trajectory = results.summary(stage), results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
         return summary.get("end_time_s"), None
     height = float(trajectory["hip_height_m"][-1]) if "hip_height_m" in trajectory.variables else None
     return summary.get("end_time_s", float(trajectory["time"][-1])), height
 
 
-def gait(results: Results) -> Statement | None:
-    """The periodic gait in a sentence; None if there is none."""
-    summary = results.summary("fixedpoint")
-    if summary is None:
-        return None
-    badge: tuple[str, Tone] = ("stable", "good") if summary["stable"] else ("unstable", "fair")
-    return Statement("Periodic gait", words("verdict.gait", summary), *badge)
-
-
-def adjustment(results: Results) -> Statement | None:
-    """That no start walks in the contact model; None if one does, or none was sought."""
-    found = (results.summary("tune") or {}).get("adjustment")
-    if found is None or found["found"]:
-        return None
-    text = f"{found['reason'].capitalize()}. {found['advice']}"
-    return Statement("Parameter adjustment", text, "no start helps", "bad")
-
-
-def of_the_paper(results: Results, rows: Rows) -> list[PageBlock]:
-    """How the paper's numbers fared, and its gravest errors."""
-    blocks: list[PageBlock] = [shares(rows), Statements(by_verdict(rows), "lines")]
-    gravest = headlines(results)
-    return [*blocks, Paragraph(words("verdict.reasons")), Statements(gravest, "columns")] if gravest else blocks
-
-
-def shares(rows: Rows) -> Shares:
-    """How many numbers came out in which way."""
-    verdicts = Counter(str(row["verdict"]) for row in rows)
-    parts = [(name, verdicts[name], TONES.get(name, "plain")) for name in dict.fromkeys([*TONES, *verdicts])]
-    title = f"Of {count(len(rows), 'number')} that the paper prints"
-    return Shares(title, tuple(part for part in parts if part[1]))
-
-
-def by_verdict(rows: Rows) -> tuple[Statement, ...]:
-    """Which numbers fared how, by where they stand."""
-    all_there = Counter(str(row["where"]) for row in rows)
-    found = []
-    for verdict, shade in TONES.items():
-        here = Counter(str(row["where"]) for row in rows if row["verdict"] == verdict)
-        if here:
-            said = "; ".join(share(where, here[where], all_there[where]) for where in here)
-            found.append(Statement(f"{verdict.capitalize()}:", f"{said}.", tone=shade))
-    return tuple(found)
-
-
-def share(where: str, some: int, every: int) -> str:
-    """How many of the numbers of one place."""
-    if some == every:
-        return where if every == 1 else f"{where} (all {every})"
-    return f"{where} ({some} of {every})"
-
-
-def headlines(results: Results) -> tuple[Statement, ...]:
-    """The gravest errata that were found, with what was measured for them."""
+def of_the_paper(results: Results, rows: Sequence[Mapping[str, Any]]) -> Iterator[PageBlock]:
+    """How the paper's numbers fared, by verdict and by where they stand, and its gravest errors."""
     found = errata(results)
-    gravest = [(said, one) for start, said in HEADLINES.items() for one in found if one["where"].startswith(start)]
-    return tuple(
-        Statement(
-            in_signs(f"{said} ({one['where']}):"), f"{in_signs(one['measured'].partition('; ')[0])}.", tone="fair"
-        )
-        for said, one in gravest
+    places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
+    parts = tuple((name, here.total(), TONES[name]) for name, here in places.items() if here)
+    yield Shares(f"Of {count(len(rows), 'number')} that the paper prints", parts)
+    every = Counter(row["where"] for row in rows)
+    told = (
+        Statement(f"{name.capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
+        for name, here in places.items()
+        if here
     )
+    yield Statements(tuple(told), "lines")
+    gravest = [(said, one) for place, said in HEADLINES.items() for one in found if one["where"].startswith(place)]
+    if gravest:
+        yield Paragraph(words("verdict.reasons"))
+        told = (
+            Statement(in_signs(f"{said} ({one['where']}):"), words("verdict.gravest", one), tone="fair")
+            for said, one in gravest
+        )
+        yield Statements(tuple(told), "columns")
