@@ -25,7 +25,7 @@ from contact_campaign import PLANE_MEASURE_M, TIGHTER, WALKERS, Drawn, ours_at
 from walkerlab.config.loader import load
 from walkerlab.scene.contact import contact_scene
 from walkerlab.stages.numerical_error import OF_EACH_STEP, change
-from walkerlab.stages.tune_results import walk_summary
+from walkerlab.stages.tune import walk_summary
 
 ERRORS = (*OF_EACH_STEP, "end_time_s")
 FACTORS = (1.5, 10.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from walkerlab.stages.walk_columns import of_steps, over_time
+from walkerlab.stages.walk import of_steps, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity

@@ -9,7 +9,7 @@ import numpy as np
 
 from walkerlab.config.loader import load
 from walkerlab.paper.errata import Erratum
-from walkerlab.stages.walk_columns import legs, over_time
+from walkerlab.stages.walk import legs, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity

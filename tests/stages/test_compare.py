@@ -14,7 +14,7 @@ from walkerlab.stages import compare, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import execute
-from walkerlab.stages.walk_columns import of_steps, over_time
+from walkerlab.stages.walk import of_steps, over_time
 from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 

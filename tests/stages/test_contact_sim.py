@@ -15,7 +15,7 @@ from walkerlab.hybrid.walk_record import WalkRecord, WalkWork
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.walk_columns import numbers_of, of_steps
+from walkerlab.stages.walk import numbers_of, of_steps
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 from walkerlab.store.key import Identity

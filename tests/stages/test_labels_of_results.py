@@ -5,7 +5,7 @@ import pytest
 from walkerlab.benchmarks import ladder
 from walkerlab.benchmarks.engines import rows as engines
 from walkerlab.labels import labels_of, unit_by_name
-from walkerlab.stages import fixedpoint, tune_limit, walk_columns
+from walkerlab.stages import fixedpoint, tune_limit, walk
 from walkerlab.verification.known import Known
 from walkerlab.verification.verdict import CaseResult
 
@@ -13,7 +13,7 @@ CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.Method
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
-    "walk": walk_columns.OVER_TIME | walk_columns.OF_STEPS,
+    "walk": walk.OVER_TIME | walk.OF_STEPS,
     "limit": tune_limit.FACTORS | tune_limit.DISTANCES | tune_limit.OF_WALKS,
 }
 

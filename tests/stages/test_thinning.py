@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.thinning import FIRST_STEPS, LAST_STEPS, MOST_BETWEEN, thinned
+from walkerlab.stages.walk import FIRST_STEPS, LAST_STEPS, MOST_BETWEEN, thinned
 
 
 @dataclass(frozen=True)
 class Samples:
-    time: NDArray[np.float64]
+    time_s: NDArray[np.float64]
     height: NDArray[np.float64]
 
 
@@ -25,24 +25,24 @@ def walk(steps, per_step=50):
 
 def test_an_ordinary_walk_is_stored_whole():
     samples, ends = walk(FIRST_STEPS + LAST_STEPS)
-    assert thinned(samples, samples.time, ends, Silent()) is samples
+    assert thinned(samples, ends, Silent()) is samples
 
 
 def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
     samples, ends = walk(20_000)
-    kept = thinned(samples, samples.time, ends, Silent())
-    assert np.isin(ends[:-1], kept.time).all()
-    assert np.isin(np.nextafter(ends, 0.0), kept.time).all()
-    assert kept.height.tolist() == np.sin(kept.time).tolist()
+    kept = thinned(samples, ends, Silent())
+    assert np.isin(ends[:-1], kept.time_s).all()
+    assert np.isin(np.nextafter(ends, 0.0), kept.time_s).all()
+    assert kept.height.tolist() == np.sin(kept.time_s).tolist()
 
 
 def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
     samples, ends = walk(20_000)
-    kept = thinned(samples, samples.time, ends, Silent())
-    first, last = samples.time < FIRST_STEPS, samples.time >= ends.size - LAST_STEPS
-    assert np.isin(samples.time[first | last], kept.time).all()
-    assert kept.time.size <= MOST_BETWEEN + 2 * ends.size + (first | last).sum()
-    assert kept.time.size < samples.time.size / 8
+    kept = thinned(samples, ends, Silent())
+    first, last = samples.time_s < FIRST_STEPS, samples.time_s >= ends.size - LAST_STEPS
+    assert np.isin(samples.time_s[first | last], kept.time_s).all()
+    assert kept.time_s.size <= MOST_BETWEEN + 2 * ends.size + (first | last).sum()
+    assert kept.time_s.size < samples.time_s.size / 8
 
 
 def test_it_is_told():
@@ -50,5 +50,5 @@ def test_it_is_told():
     progress = Silent()
     progress.note = told.append
     samples, ends = walk(1000)
-    thinned(samples, samples.time, ends, progress)
+    thinned(samples, ends, progress)
     assert told[0].startswith("1000 steps: of ")

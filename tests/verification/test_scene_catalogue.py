@@ -14,16 +14,13 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.identity import Identities
-from walkerlab.stages.known_problems import known_of, known_row
 from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.judge import CaseCell
-from walkerlab.verification.known import Known
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import TwinScale, scaled, to_twin
 from walkerlab.verification.scene_catalogue import ENDS, STOPS, scene_cases
 
-RIGHT = Known("ball", "time, s", 1.0, 1.5, "closed form", 1e-6, "tolerance", 0.1)
 OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
 GAIT = {"state": [-0.2889854602533978, 0.18818546025339777, -0.2889854602533978,
                   -0.05714810633751748, -1.1095873311765583, -0.05714810633751748],
@@ -143,7 +140,6 @@ def test_known_problems_are_answered_once_for_all_scenes():
     stage = PIPELINE["known-problems"]
     slices = [Identities().of(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
     assert slices == [{}, {}]
-    assert known_of(known_row(RIGHT)) == RIGHT
 
 
 def test_only_other_walkers_read_their_scene():

@@ -19,7 +19,7 @@ from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig, SimulateConfig
-    from walkerlab.config.schema import Equations
+    from walkerlab.config.schema import Equations, Output
 
 REMEMBERED = 16  # walkers: over a slope the same one is asked for again and again
 
@@ -32,14 +32,7 @@ class RigidScene:
     tolerances: Tolerances
     names: tuple[str, ...]  # of the state's numbers
     knee_m: tuple[float, float] | None  # the knee in its thigh's frame
-    states: bool  # whether angles and velocities in time are wanted
-    energies: bool
-    forces: bool
-
-    @property
-    def sampled(self) -> bool:
-        """Whether anything in time is wanted."""
-        return self.states or self.energies or self.forces
+    outputs: tuple[Output, ...]  # what in time is wanted
 
     def walk(
         self,
@@ -50,22 +43,18 @@ class RigidScene:
         advance: Callable[[int], None] | None = None,
     ) -> RigidWalkResult:
         """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
-        return take_walk(self.walker, tolerances, start, steps, sampled and self.sampled, advance)
+        return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance)
 
 
 def rigid_scene(config: SimulateConfig) -> RigidScene:
     """The scene of a config: its equations, its method, and of the outputs those that it asks for."""
     settings = config.solver.rigid
-    walker = rigid_walker(config, config.equations)
-    wanted = config.outputs
     return RigidScene(
-        walker=walker,
+        walker=rigid_walker(config, config.equations),
         tolerances=Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS),
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
-        states="states" in wanted,
-        energies="energies" in wanted,
-        forces="forces" in wanted,
+        outputs=config.outputs,
     )
 
 

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from walkerlab.config.reads import BasinConfig, RigidConfig
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.basin import (
@@ -32,19 +33,21 @@ from walkerlab.orbits.basin import (
     find_attractors,
     inside_cell,
 )
-from walkerlab.orbits.scaled_starts import TOLERANCES, ScaledStarts, scaled_starts
+from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.scene.contact import ContactScene, contact_gait, start_state
+from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
+from walkerlab.stages.pieces import Piece, complete
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
-from walkerlab.workers import in_order
 
-OUTCOMES: Final = 16  # more than there are
+CODES: Final = 16  # more than there are outcomes
 ATTRACTORS: Final = 4096
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
 SAMPLE = 100  # cells that are walked again
@@ -76,25 +79,32 @@ def run(
     window = window_of(config, [float(gait["state"][place]) for place in rigid.picked])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
-    clock = Stopwatch()
+    begun, shared_from = time.perf_counter(), question.shared_from
     pieces = cells_of(question, window)
-    finish(pieces, "basin", progress, parts, jobs, clock)
+    walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
     found = unpacked(np.concatenate([parts.kept[piece.name] for piece in pieces]))
     walked = found.outcome == Outcome.WALKED
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
     walking = walked.astype(float)
     if config.basin.refine > 1 and edges.size:
         pieces = edges_of(question, window, edges, config.basin.refine)
-        finish(pieces, "basin: edges", progress, parts, jobs, clock)
+        walks += complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
         walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
-    group = group_of(config.basin, window, found, walking)
+    rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
     said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
-    said["numerical_error"] = sample_again(question, window, found)
-    said["endings"] = endings(said["outcomes"], config, config.basin.model == "contact", pads_of(question, config))
-    said |= {"edge_cells": int(edges.size), **margin_of(config, window, found, gait)}
-    return Content({"basin": group}, said | clock.summary(), timed=("trajectories_per_s",))
+    pads = None
+    if isinstance(question, ContactQuestion):
+        pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(with_contact(config).pad_pitch))
+    said |= {
+        "numerical_error": sample_again(question, window, found),
+        "endings": endings(said["outcomes"], config, config.basin.model == "contact", pads),
+        "edge_cells": int(edges.size),
+        **margin_of(config, window, found, gait),
+        **rate,
+    }
+    return Content({"basin": group_of(config.basin, window, found, walking)}, said, timed=("trajectories_per_s",))
 
 
 def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[str, int]:
@@ -103,33 +113,6 @@ def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[st
     again = question.tightened().walked(window.starts(cells))
     otherwise = (again.outcome != found.outcome[cells]) | (again.attractor != found.attractor[cells])
     return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
-
-
-class Stopwatch:
-    """How many walks were walked, and in what time."""
-
-    def __init__(self) -> None:
-        """None so far."""
-        self.walks, self.started = 0, time.perf_counter()
-
-    def summary(self) -> dict[str, Any]:
-        """Walks a second, of those of this run; without it if all had been there."""
-        if self.walks == 0:
-            return {}
-        return {"trajectories_per_s": self.walks / (time.perf_counter() - self.started)}
-
-
-def finish(pieces: list[Piece], label: str, progress: Progress, parts: Parts, jobs: int, clock: Stopwatch) -> None:
-    """Compute the pieces that are not there yet."""
-    waiting = [piece for piece in pieces if piece.name not in parts.kept]
-    progress.start(label, sum(piece.walks for piece in pieces))
-    progress.advance(sum(piece.walks for piece in pieces if piece.name in parts.kept))
-    worth_sharing = sum(piece.walks for piece in waiting) >= waiting[0].question.shared_from if waiting else False
-    found = in_order([piece.run for piece in waiting], jobs if worth_sharing else 1, (0,))
-    for piece, numbers in zip(waiting, found, strict=True):
-        parts.keep(piece.name, numbers)
-        clock.walks += piece.walks
-        progress.advance(piece.walks)
 
 
 def window_of(config: BasinConfig, z: list[float]) -> Window:
@@ -166,43 +149,14 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise without_contact("basin.model: contact", config.walker, "Add one.")
     # Imported here: it brings interpolation along, which the rigid model's basin does without.
-    from walkerlab.stages.tune import BUDGET_FACTOR, LEAST_BUDGET, MAP_ATOL, MAP_RTOL, free_scene
+    from walkerlab.stages.tune import for_a_map, starts_of
 
-    gait = inputs["fixedpoint"].summary
-    state = tuple(float(number) for number in gait["state"])
-    answer = contact_gait(config, float(gait["step_length_m"]), state)
-    scene = free_scene(config, float(gait["step_length_m"]), answer)
-    own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
-
-    def start_of(swing: float, stance: float) -> tuple[float, ...]:
-        return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
-
-    starts = scaled_starts(scene.walker, scene.ground, start_of, config.basin.contact_steps, own)
-    settings = config.solver.contact
-    starts = replace(starts, tolerances=replace(TOLERANCES, rtol=settings.rtol, atol=settings.atol))
-    usual = starts.walk(1.0, 1.0).evaluations
-    return ContactQuestion(scene, rigid, starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * usual)))
-
-
-def pads_of(question: Question, config: BasinConfig) -> Pads | None:
-    """The pads of the contact model's walks."""
-    if config.contact is None or not isinstance(question, ContactQuestion):
-        return None
-    pitch = question.scene.pitch_m
-    return Pads((pitch, pitch), laid=str(config.contact.pad_pitch))
-
-
-def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
-    """Period and a state (SI) of each attractor."""
-    if isinstance(question, ContactQuestion):
-        own = question.starts.gait
-        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
-    found: Attractors = question.attractors
-    rows = []
-    for cycle in found.cycles:
-        state = list(on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist())))
-        rows.append({"period": cycle.period, "state": state, "reached_within": cycle.reach})
-    return rows
+    gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
+    step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])
+    answer = contact_gait(config, step_length_m, state)
+    scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
+    starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
+    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations))
 
 
 def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) -> Group:
@@ -224,33 +178,43 @@ def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) 
         "steps_to_settle": over(settled, "steps until the attractor was reached; 0 where none was"),
         "walking": over(walking, "share of the cell that walks; of cells at edges from their parts"),
     }
-    outcomes = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
     rest = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
-    return Group(variables, {"outcomes": outcomes, "model": settings.model, **rest})
+    return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **rest})
+
+
+def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
+    """Period and a state (SI) of each attractor."""
+    if isinstance(question, ContactQuestion):
+        own = question.starts.gait
+        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
+    rows = []
+    for cycle in question.attractors.cycles:
+        state = on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist()))
+        rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
+    return rows
 
 
 def summary(
     settings: Basin, window: Window, found: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
-    """What the command prints."""
-    numbers, counts = np.unique(found.outcome, return_counts=True)
+    """What the command prints of the grid and of the attractors that are reached."""
     walked = found.outcome == Outcome.WALKED
     for number, row in enumerate(attractors):
         there = walked & (found.attractor == number)
         row["cells"] = int(np.count_nonzero(there))
         if row["cells"]:
             row["median_steps_to_settle"] = float(np.median(found.steps[there]))
-    names = dict(zip(COORDINATES, window.rest, strict=True))
     sides = zip(settings.plane, window.lower, window.upper, strict=True)
+    rest = zip(COORDINATES, window.rest, strict=True)
     return {
         "model": settings.model,
         "plane": list(settings.plane),
         "cells": list(settings.cells),
         "window": {name: [low, high] for name, low, high in sides},
-        "held": {name: value for name, value in names.items() if name not in settings.plane},
+        "held": {name: value for name, value in rest if name not in settings.plane},
         "share_walking": float(walking.mean()),
         "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
-        "outcomes": {Outcome(int(one)).label: int(many) for one, many in zip(numbers, counts, strict=True)},
+        "outcomes": counted(found.outcome),
         "attractors": attractors,
         "aperiodic": aperiodic,
         "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == NONE))),
@@ -291,13 +255,13 @@ class WalkEnds:
 
     def packed(self) -> list[float]:
         """One number for each."""
-        code = self.outcome + OUTCOMES * (self.attractor - NONE + ATTRACTORS * self.steps)
+        code = self.outcome + CODES * (self.attractor - NONE + ATTRACTORS * self.steps)
         return [float(number) for number in code]
 
 
 def unpacked(numbers: Floats) -> WalkEnds:
     """What `packed` made numbers of."""
-    rest, outcome = np.divmod(numbers.astype(np.int64), OUTCOMES)
+    rest, outcome = np.divmod(numbers.astype(np.int64), CODES)
     steps, attractor = np.divmod(rest, ATTRACTORS)
     return WalkEnds(outcome, attractor + NONE, steps)
 
@@ -362,66 +326,33 @@ class ContactQuestion:
 Question = RigidQuestion | ContactQuestion
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """Cells of the window by their numbers, from `first` up to `last`, walked from their middles."""
-
-    name: str
-    question: Question
-    window: Window
-    first: int
-    last: int
-
-    @property
-    def walks(self) -> int:
-        """How many."""
-        return self.last - self.first
-
-    def run(self) -> list[float]:
-        """One number for each cell, see `unpacked`."""
-        return self.question.walked(self.window.starts(np.arange(self.first, self.last))).packed()
-
-
-@dataclass(frozen=True, eq=False)
-class EdgeCells:
-    """Cells at edges, walked from the middles of their parts."""
-
-    name: str
-    question: Question
-    window: Window
-    cells: tuple[int, ...]
-    refine: int
-
-    @property
-    def walks(self) -> int:
-        """How many."""
-        return len(self.cells) * int(self.refine ** len(self.window.axes))
-
-    def run(self) -> list[float]:
-        """The share of each cell that walks."""
-        inside = inside_cell(self.refine, len(self.window.axes))
-        cells = np.repeat(np.array(self.cells), len(inside))
-        found = self.question.walked(self.window.starts(cells, np.tile(inside, (len(self.cells), 1))))
-        walking = (found.outcome == Outcome.WALKED).reshape(len(self.cells), -1)
-        return [float(share) for share in walking.mean(axis=1)]
-
-
-Piece = Cells | EdgeCells
-
-
 def cells_of(question: Question, window: Window) -> list[Piece]:
-    """Every cell."""
-    many = question.cells_at_once
-    return [
-        Cells(f"cells {first}", question, window, first, min(first + many, window.size))
-        for first in range(0, window.size, many)
-    ]
+    """Every cell, walked from its middle."""
+    pieces = []
+    for first in range(0, window.size, question.cells_at_once):
+        cells = range(first, min(first + question.cells_at_once, window.size))
+        pieces.append(Piece(f"cells {first}", len(cells), partial(ends_of, question, window, cells)))
+    return pieces
+
+
+def ends_of(question: Question, window: Window, cells: range) -> list[float]:
+    """One number for each cell, see `unpacked`."""
+    return question.walked(window.starts(np.array(cells))).packed()
 
 
 def edges_of(question: Question, window: Window, edges: Integers, refine: int) -> list[Piece]:
-    """The cells at edges."""
-    many = question.edges_at_once
-    return [
-        EdgeCells(f"edge {edges[first]}", question, window, tuple(edges[first : first + many].tolist()), refine)
-        for first in range(0, len(edges), many)
-    ]
+    """The cells at edges, walked from the middles of their parts."""
+    pieces, parts = [], int(refine ** len(window.axes))
+    for first in range(0, len(edges), question.edges_at_once):
+        cells = edges[first : first + question.edges_at_once]
+        run = partial(shares_of, question, window, cells, refine)
+        pieces.append(Piece(f"edge {edges[first]}", parts * len(cells), run))
+    return pieces
+
+
+def shares_of(question: Question, window: Window, cells: Integers, refine: int) -> list[float]:
+    """The share of each cell that walks."""
+    inside = inside_cell(refine, len(window.axes))
+    found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
+    walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)
+    return [float(share) for share in walking.mean(axis=1)]

@@ -21,7 +21,7 @@ from walkerlab.hybrid.comparison import (
     orbit_distances,
 )
 from walkerlab.paper.measured import Errors, LegErrors
-from walkerlab.stages.walk_columns import LEG, STEP, TIME, legs, over_time
+from walkerlab.stages.walk import LEG, STEP, TIME, legs, over_time
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Group, Variable
 

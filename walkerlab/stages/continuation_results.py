@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from walkerlab.config.continuation import Continuation, Span
 from walkerlab.config.reads import ContactConfig
+from walkerlab.config.schema import Output
 from walkerlab.hybrid.recorded_walk import Samples
 from walkerlab.labels import Label
 from walkerlab.mechanics.rigid import knee_of
@@ -35,6 +36,7 @@ from walkerlab.store.content import Attribute, Group, Variable
 MOTIONS_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
 STRIDE = 2  # steps, after which each leg is where it was
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
+ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 EVERY = 3  # which samples are kept beside those at heel strikes
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
@@ -458,7 +460,7 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     knee = knee_of(assembly_of(changed.walker, rigid=True))
-    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, states=True, energies=True, forces=True)
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS)
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)
     if walk.steps < steps or walk.samples is None:
         return

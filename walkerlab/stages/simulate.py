@@ -8,17 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import SimulateConfig, StartConfig
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples, as_state
+from walkerlab.config.reads import SimulateConfig
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
 from walkerlab.mechanics.standing import STANCE
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.walk import content_of_walk
-from walkerlab.stages.walk_columns import COORDINATE, STEP, TIME, legs, numbers_of, of_body, over_time, steps_of
+from walkerlab.stages.walk import (
+    COORDINATE,
+    content_of_walk,
+    legs,
+    numbers_of,
+    of_body,
+    over_time,
+    rigid_start,
+    steps_of,
+)
 from walkerlab.store.content import Content, Group, Variable
 
 
@@ -27,8 +34,8 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
     again  whether the second walk, which takes about as long as two, is wanted
     """
-    scene = rigid_scene(config)
-    start, steps = start_state(config, inputs), 2 * config.strides
+    scene, steps = rigid_scene(config), 2 * config.strides
+    _, start = rigid_start(config, inputs)
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
@@ -36,12 +43,6 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
     of_scene, of_config = partial(groups, scene), partial(summary, config)
     return content_of_walk("simulate", walk, scene.tolerances, of_scene, of_config, progress, again)
-
-
-def start_state(config: StartConfig, inputs: Mapping[str, Content]) -> State:
-    """The config's start, or the fixed point."""
-    given = inputs["fixedpoint"].summary["state"] if config.start == "fixed-point" else config.start
-    return as_state(given)
 
 
 def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
@@ -65,42 +66,28 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored = {}
     if walk.steps:
-        stored["steps"] = steps_group(scene, walk)
+        set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
+        rolling = scene.walker.radius * (set_down - walk.before[:, STANCE])
+        columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
+        names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
+        stored["steps"] = Group({**columns, COORDINATE: names})
     if walk.samples is not None and walk.samples.time_s.size:
         stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
     return stored
 
 
-def steps_group(scene: RigidScene, walk: RigidWalkResult) -> Group:
-    """One row a step."""
-    set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
-    columns = steps_of(
-        walk,
-        rolling_m=scene.walker.radius * (set_down - walk.before[:, STANCE]),
-        state_before=walk.before,
-        state_after=walk.after,
-    )
-    names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
-    return Group({**columns, COORDINATE: names})
-
-
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
     """Samples of the walk, both sides of each heel strike among them: what `outputs` asks for."""
-    # leg 0 swings in even steps, leg 1 in odd ones
-    stance = 1 - samples.step % 2
-    variables = {
-        **over_time(time=samples.time_s, stance_leg=stance),
-        **legs(),
-        STEP: Variable(samples.step, (TIME,), "1", "step number"),
-    }
-    if scene.states:
-        variables |= leg_variables(samples, stance)
+    stance = stance_leg(samples)
+    variables = {**over_time(time=samples.time_s, stance_leg=stance, step=samples.step), **legs()}
+    if "states" in scene.outputs:
+        variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)
         variables |= place_variables(scene, walk, samples, stance)
-    if scene.energies:
+    if "energies" in scene.outputs:
         kinetic, potential = energies(scene.walker, samples.state).T
         variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
-    if scene.forces:
+    if "forces" in scene.outputs:
         friction, normal = (
             of_legs(np.column_stack((np.zeros_like(force), force)), stance)
             for force in reactions(scene.walker, samples.state, samples.bent).T
@@ -109,12 +96,16 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
     return Group(variables)
 
 
-def leg_variables(samples: Samples, stance: Any) -> dict[str, Variable]:
+def stance_leg(samples: Samples) -> Any:
+    """The leg that stands (samples,): leg 0 swings in even steps, leg 1 in odd ones."""
+    return 1 - samples.step % 2
+
+
+def leg_variables(samples: Samples) -> dict[str, Variable]:
     """Angles and velocities of the legs themselves, which change roles at every heel strike."""
-    n = samples.state.shape[1] // 2
-    angle = of_legs(samples.state[:, :2], stance)
-    velocity = of_legs(samples.state[:, n : n + 2], stance)
-    return over_time(angle=angle, velocity=velocity)
+    n, stance = samples.state.shape[1] // 2, stance_leg(samples)
+    by_leg = {"angle": of_legs(samples.state[:, :2], stance), "velocity": of_legs(samples.state[:, n : n + 2], stance)}
+    return over_time(**by_leg)
 
 
 def of_legs(by_role: Any, stance: Any) -> Any:
@@ -138,13 +129,10 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
 def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Where hip, knees and feet are, along the slope from the first foothold and over it."""
     at = places(scene.walker, scene.knee_m, walk, samples)
-    ground = np.zeros_like(at.contact)
-    foot_along = of_legs(np.column_stack((at.swing_foot[:, 0], at.contact)), stance)
-    foot_height = of_legs(np.column_stack((at.swing_foot[:, 1], ground)), stance)
-    found = over_time(
-        hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1], foot_along_m=foot_along, foot_height_m=foot_height
-    )
-    if at.knees is not None:
-        along, height = (of_legs(at.knees[:, :, axis], stance) for axis in range(2))
-        found |= over_time(knee_along_m=along, knee_height_m=height)
+    standing = np.column_stack((at.contact, np.zeros_like(at.contact)))
+    points = {"foot": np.stack((at.swing_foot, standing), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
+    found = over_time(hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1])
+    for name, point in points.items():
+        along, height = (of_legs(point[:, :, axis], stance) for axis in range(2))
+        found |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
     return found

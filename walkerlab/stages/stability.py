@@ -10,16 +10,14 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksCo
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_the_papers
 from walkerlab.labels import labels_of
-from walkerlab.scene.contact import pads_pitch
 from walkerlab.scene.left_out import of_verification
-from walkerlab.stages.contact_sim import own_pitch, rigid_start
-from walkerlab.stages.known_problems import known_group, known_of, known_row
+from walkerlab.stages.contact_sim import scene_on_pads
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
-from walkerlab.store.content import Content, Group
+from walkerlab.store.content import Content
 from walkerlab.verification.catalogue import judged
 from walkerlab.verification.judge import CaseCell, run_cells
-from walkerlab.verification.known import Known
 from walkerlab.verification.ordinary import CAP, FINE, Choice
 from walkerlab.verification.scene_catalogue import scene_cases
 from walkerlab.verification.verdict import CaseResult
@@ -43,16 +41,15 @@ def run(
     else:
         cells = [*map(CaseCell, judged(config.stability.cases))]
     progress.start("stability", len(cells))
-    cases: list[CaseResult] = []
-    ordinary: list[Choice] = []
-    for found in run_cells(cells, jobs):
-        cases += [item for item in found if isinstance(item, CaseResult)]
-        ordinary += [item for item in found if isinstance(item, Choice)]
+    found: list[CaseResult | Choice] = []
+    for results in run_cells(cells, jobs):
+        found += results
         progress.advance()
-    known = [known_of(row) for row in inputs["known-problems"].summary["known"]]
-    summary = summary_of(cases, known, ordinary)
-    summary["left_out"] = list(of_verification(config))
-    return Content({"cases": cases_group(cases), "known": known_group(known)}, summary | verdict(cases, known))
+    cases = [item for item in found if isinstance(item, CaseResult)]
+    known = inputs["known-problems"]
+    said = summary_of(cases, known.summary["known"], [item for item in found if isinstance(item, Choice)])
+    group = rows_group(cases, labels_of(CaseResult), "case", "number of the row")
+    return Content({"cases": group, "known": known["known"]}, {**said, "left_out": list(of_verification(config))})
 
 
 def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
@@ -67,31 +64,34 @@ def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
         return scene
-    pitch = pads_pitch(contact, step, own_pitch(config, step, start))
+    pitch = scene_on_pads(config, step, start).pitch_m
     return scene.model_copy(update={"contact": contact.model_copy(update={"pad_pitch": pitch})})
 
 
-def verdict(cases: Sequence[CaseResult], known: Sequence[Known]) -> dict[str, Any]:
-    """That there is no answer, in words, if something is not as it should be; the results are whole all the same."""
-    failed = [*(case.name for case in cases if not case.ok), *(answer.name for answer in known if not answer.ok)]
-    if not failed:
-        return {}
-    message = f"{len(failed)} of {len(cases) + len(known)} did not end as expected: {', '.join(failed)}"
-    advice = "`walkerlab report` says in red which and why; `walkerlab stability --json` has every measure."
-    return {"no_answer": {"message": message, "advice": advice}}
+def summary_of(
+    cases: Sequence[CaseResult], known: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
+) -> dict[str, Any]:
+    """What the command prints, and, if something is not as it should be, that there is no answer.
 
-
-def summary_of(cases: Sequence[CaseResult], known: Sequence[Known], ordinary: Sequence[Choice]) -> dict[str, Any]:
-    """What the command prints."""
-    return {
+    known  the known problems as their stage prints them
+    """
+    failed = [*(case.name for case in cases if not case.ok), *(one["name"] for one in known if not one["ok"])]
+    of = len(cases) + len(known)
+    said = {
         "cases": [case_row(case) for case in cases],
-        "known": [known_row(answer) for answer in known],
-        "passed": sum(case.ok for case in cases) + sum(answer.ok for answer in known),
-        "failed": sum(not case.ok for case in cases) + sum(not answer.ok for answer in known),
-        "ordinary": [ordinary_row(choice) for choice in ordinary],
+        "known": list(known),
+        "passed": of - len(failed),
+        "failed": len(failed),
+        # an ordinary method that did not arrive has no error
+        "ordinary": [{name: value for name, value in asdict(one).items() if value is not None} for one in ordinary],
         "ordinary_cap": CAP,
         "ordinary_fine": FINE,
     }
+    if failed:
+        message = f"{len(failed)} of {of} did not end as expected: {', '.join(failed)}"
+        advice = "`walkerlab report` says in red which and why; `walkerlab stability --json` has every measure."
+        said["no_answer"] = {"message": message, "advice": advice}
+    return said
 
 
 def case_row(case: CaseResult) -> dict[str, Any]:
@@ -100,13 +100,3 @@ def case_row(case: CaseResult) -> dict[str, Any]:
     told |= {name: list(told[name]) for name in ("expected", "not_measured")}
     measures = [{"measure": one.measure, "value": one.value, "limit": one.limit, "ok": one.ok} for one in case.findings]
     return {**told, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}
-
-
-def ordinary_row(choice: Choice) -> dict[str, Any]:
-    """An ordinary method on a case; without an error if it did not arrive."""
-    return {name: value for name, value in asdict(choice).items() if value is not None}
-
-
-def cases_group(cases: Sequence[CaseResult]) -> Group:
-    """The table of cases."""
-    return rows_group(cases, labels_of(CaseResult), "case", "number of the row")

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import ContactConfig, TuneConfig
+from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
-from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.contact_run import ContactWalkResult
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk, with_scaled_rates
+from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.walker import ContactWalker
+from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk, with_scaled_rates
+from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
-from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
+from walkerlab.orbits.contact_map import angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.scaled_starts import (
     TOLERANCES,
     Adjustment,
+    Margin,
     MarginSearch,
     ScaledStarts,
     StartMap,
@@ -31,62 +36,99 @@ from walkerlab.orbits.scaled_starts import (
     scaled_starts,
     smallest_change,
 )
-from walkerlab.paper.adams_start import adams_walk, forces_of
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
+from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
+from walkerlab.paper.printed import TABLE_2
+from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
+from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
-from walkerlab.stages.contact_sim import BUDGET_PER_STEP, SAMPLES_PER_PENDULUM_TIME, rigid_start
+from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME, scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.tune_limit import LimitFindings, limit_findings, limit_groups, limit_summary
-from walkerlab.stages.tune_results import Procedure, TuneFindings, groups, summary, walk_summary
-from walkerlab.store.content import Content
+from walkerlab.stages.simulate import leg_variables
+from walkerlab.stages.tune_limit import limit_findings, limit_groups, limit_summary
+from walkerlab.stages.walk import OUTCOMES, TIME, counted, legs, numbers_of, of_steps, over_time, rigid_start
+from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
+from walkerlab.store.content import Content, Group, Variable
 from walkerlab.workers import in_order
 
-# tolerances of the map: away from edges its outcomes are those of the config's (docs/adjustment.md)
+# tolerances of a map: away from edges its outcomes are those of the config's (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
 LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
 RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
 COMPASS_CELLS, CELLS, COARSE = 61, 21, MarginSearch(step=0.05, largest=2.0)
+WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
+OF_WALK = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
+"""What is printed of each of the procedure's walks."""
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Adjust the start; that none walks is an answer. Raises NoAnswer if the pads are to fit a gait there is not."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    near = tuple(float(x) for x in inputs["fixedpoint"].summary["state"])  # the start itself may be far from any gait
-    gait = contact_gait(config, rigid_step, near)
-    scene = free_scene(config, rigid_step, gait)
+    rigid_gait = inputs["fixedpoint"].summary  # the start itself may be far from any gait
+    gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
+    scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     found = TuneRun(config, scene, rigid_state, gait).findings(progress, jobs)
     stored, said = groups(found), summary(found, config) | {"left_out": list(of_adjustment(config))}
-    limit = rigid_limit(config, found, inputs, progress)
-    if limit is not None:
-        stored |= limit_groups(limit)
-        said |= limit_summary(limit)
+    if gait.gait is not None and config.tune.rigid_limit:
+        limit = limit_findings(config, scene, gait.gait, rigid_gait, found.rigid, progress)
+        if limit is not None:
+            stored |= limit_groups(limit)
+            said |= limit_summary(limit)
     return Content(stored, said)
 
 
-def free_scene(config: ContactConfig, rigid_step: float, gait: GaitAnswer) -> ContactScene:
-    """The config's scene without a hinge; raises NoAnswer if its pads are to fit a gait that there is not."""
-    contact = config.contact
-    wants_own = contact is not None and contact.pad_pitch == "own" and contact.terrain == "checkerboard"
-    if wants_own and gait.gait is None:
-        raise NoAnswer(f"tune: no contact gait to lay the pads for: {gait.reason}", gait.advice)
-    own = None if gait.gait is None else gait.gait.step.length_m
-    return replace(contact_scene(config, rigid_step, own if own is not None else rigid_step), pinned=False)
+def starts_of(
+    scene: ContactScene, rigid: Standing, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
+) -> ScaledStarts:
+    """A rigid start with its velocities scaled, in a scene, to settle on the gait if one was found."""
+    own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
+
+    def start(swing: float, stance: float) -> State:
+        return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
+
+    starts = scaled_starts(scene.walker, scene.ground, start, steps, own)
+    return replace(starts, tolerances=replace(tolerances, method=TOLERANCES.method))
 
 
-def rigid_limit(
-    config: TuneConfig, found: TuneFindings, inputs: Mapping[str, Content], progress: Progress
-) -> LimitFindings | None:
-    """What the rigid limit takes; None if it is not asked for or there is no gait to follow."""
-    if found.gait.gait is None or not config.tune.rigid_limit:
-        return None
-    rigid = inputs["fixedpoint"].summary
-    return limit_findings(config, found.scene, found.gait.gait, rigid, found.procedure.rigid, progress)
+def for_a_map(starts: ScaledStarts, evaluations: int) -> ScaledStarts:
+    """The same at tolerances of a map, with a budget by what the walk from the start as it stands evaluates."""
+    return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))
+
+
+@dataclass(frozen=True)
+class TuneFindings:
+    """All that the stage found.
+
+    rigid         the rigid model's walk from its start
+    walks         of the paper's procedure: `hinged`, of a compass, whose first step has a revolute joint at its stance
+                  foot; `released`, without it; and `adjusted`, from the adjusted start, if there is one
+    printed       of these walks
+    paper         the paper's own start; None for another walker than its compass
+    steps         asked for
+    names         of the rigid start's numbers
+    gait_factors  where the gait lies on the map, from the adjusted walk's end
+    """
+
+    scene: ContactScene
+    gait: GaitAnswer
+    rigid: RigidWalkResult
+    walks: Mapping[str, ContactWalkResult]
+    printed: Mapping[str, dict[str, Any]]
+    as_it_stands: StartTrial
+    adjustment: Adjustment | None
+    margins: list[Margin]
+    contact_map: StartMap
+    rigid_map: StartMap
+    paper: AdamsWalk | None
+    steps: int
+    names: tuple[str, ...]
+    adjusted_state: State | None
+    gait_factors: tuple[float, float] | None
 
 
 class TuneRun:
@@ -96,9 +138,10 @@ class TuneRun:
         """Nothing is walked yet."""
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.steps = 2 * config.strides
+        self.tolerances = tolerances_of(config, self.steps)
         self.rigid: Standing = rigid_walker(config, config.equations)
-        self.compass, self.of_the_paper = is_plain_compass(config.walker), is_the_papers(config.walker)
-        self.starts = self.scaled()
+        self.compass = is_plain_compass(config.walker)
+        self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
 
     def findings(self, progress: Progress, jobs: int) -> TuneFindings:
         """Procedure, margins, map, adjustment and the paper's own start."""
@@ -106,11 +149,12 @@ class TuneRun:
         cells = settings.cells or (COMPASS_CELLS if self.compass else CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        hinged = self.walk(self.rigid_state, pinned=True) if self.compass else None
-        released = self.walk(self.rigid_state)
+        walks = {"hinged": self.walk(self.rigid_state, pinned=True)} if self.compass else {}
+        walks["released"] = self.walk(self.rigid_state)
+        printed = {name: self.printed(walk, self.rigid_state, name == "hinged") for name, walk in walks.items()}
         as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
-        quick = self.starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * as_it_stands.evaluations))
+        quick = for_a_map(self.starts, as_it_stands.evaluations)
         rows = []
         for row in in_order([partial(contact_row, quick, swing, float(factor)) for factor in stance], jobs):
             rows.append(row)
@@ -118,87 +162,55 @@ class TuneRun:
         walked = as_map(swing, stance, rows)
         progress.start("tune: rigid map and margins")
         rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
-        adjustment, around = self.adjusted(as_it_stands, quick, walked)
-        search = MarginSearch() if self.compass else COARSE
-        found = margins(self.starts, around, search) if adjustment is not None else []
-        state = None if adjustment is None else self.scaled_state(adjustment.swing, adjustment.stance)
-        adjusted = None if state is None else self.walk(state)
-        errors = {"released": self.error(released, self.rigid_state)}
-        if hinged is not None:
-            errors["hinged"] = self.error(hinged, self.rigid_state, pinned=True)
-        if state is not None and adjusted is not None:
-            errors["adjusted"] = self.error(adjusted, state)
+        adjustment = self.adjusted(as_it_stands, quick, walked)
+        state, around = None, []
+        if adjustment is not None:
+            factors = adjustment.swing, adjustment.stance
+            around = margins(self.starts, factors, MarginSearch() if self.compass else COARSE)
+            state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
+            walks["adjusted"] = self.walk(state)
+            printed["adjusted"] = self.printed(walks["adjusted"], state)
         return TuneFindings(
-            self.scene,
-            self.gait,
-            Procedure(self.rigid_state, self.rigid_walk(), hinged, released, adjusted),
-            as_it_stands,
-            adjustment,
-            found,
-            walked,
-            rigid_cells,
-            adams_walk(self.rigid, self.walk, self.scene.walker) if self.of_the_paper else None,
-            self.steps,
-            coordinates(self.config),
-            errors,
-            state,
-            None if adjusted is None else self.factors_at_the_end(adjusted),
+            scene=self.scene,
+            gait=self.gait,
+            rigid=take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True),
+            walks=walks,
+            printed=printed,
+            as_it_stands=as_it_stands,
+            adjustment=adjustment,
+            margins=around,
+            contact_map=walked,
+            rigid_map=rigid_cells,
+            paper=adams_walk(self.rigid, self.walk, self.scene.walker) if is_the_papers(self.config.walker) else None,
+            steps=self.steps,
+            names=coordinates(self.config),
+            adjusted_state=state,
+            gait_factors=self.factors_at_the_end(walks["adjusted"]) if "adjusted" in walks else None,
         )
 
-    def adjusted(
-        self, as_it_stands: StartTrial, quick: ScaledStarts, cells: StartMap
-    ) -> tuple[Adjustment | None, tuple[float, float]]:
-        """The smallest change of the velocities, and the factors around which margins are asked."""
+    def adjusted(self, as_it_stands: StartTrial, quick: ScaledStarts, cells: StartMap) -> Adjustment | None:
+        """The smallest change of the velocities that walks; None if none does."""
         if as_it_stands.walks:
-            return Adjustment(*AS_IT_STANDS, as_it_stands), AS_IT_STANDS
+            return Adjustment(*AS_IT_STANDS, as_it_stands)
         if not cells.walking.size:
-            return None, AS_IT_STANDS
-        cell = (
-            float(np.ptp(cells.swing)) / (cells.swing.size - 1),
-            float(np.ptp(cells.stance)) / (cells.stance.size - 1),
-        )
-        change = smallest_change(self.starts, quick, cells.walking, cell)
-        return change, AS_IT_STANDS if change is None else (change.swing, change.stance)
-
-    def scaled(self) -> ScaledStarts:
-        """The scaled starts, walked at the config's tolerances."""
-        found = self.gait.gait
-        own = None if found is None else (found.step.period_s, found.step.length_m)
-        starts = scaled_starts(
-            self.scene.walker,
-            self.scene.ground,
-            lambda swing, stance: start_state(self.scene, self.scaled_state(swing, stance)),
-            self.steps,
-            own,
-        )
-        return replace(starts, tolerances=replace(self.tolerances, method=TOLERANCES.method))
-
-    def scaled_state(self, swing: float, stance: float) -> State:
-        """The rigid start with its velocities scaled."""
-        return with_scaled_rates(self.rigid, self.rigid_state, swing, stance)
+            return None
+        swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
+        return smallest_change(self.starts, quick, cells.walking, (swing, stance))
 
     def factors_at_the_end(self, walk: ContactWalkResult) -> tuple[float, float] | None:
         """Velocities of the last step of a walk, once the foot behind has lifted, over those of the rigid start."""
-        if walk.touch_time_s.size < 2:
-            return None
-        time, normal, _ = forces_of(walk, self.scene.walker)
-        landed = int(walk.touch_time_s.size) % 2  # leg 0 lands first
-        swing = 1 - landed
-        lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
-        if not lifted.size or walk.samples is None:
-            return None
         n = len(self.rigid_state) // 2
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
-        if 0.0 in first:
+        if walk.steps < 2 or walk.samples is None or 0.0 in first:
+            return None
+        time, normal, _ = forces_of(walk, self.scene.walker)
+        landed = walk.steps % 2  # leg 0 lands first
+        swing = 1 - landed
+        lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
+        if not lifted.size:
             return None
         rates = motion_of_legs(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
-
-    @property
-    def tolerances(self) -> Tolerances:
-        """The config's."""
-        settings = self.config.solver.contact
-        return Tolerances(settings.method, settings.rtol, settings.atol, self.steps * BUDGET_PER_STEP)
 
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
@@ -206,15 +218,229 @@ class TuneRun:
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
-    def error(self, walk: ContactWalkResult, state: State, pinned: bool = False) -> dict[str, Any]:
-        """The numerical error of such a walk, under its key; nothing for one without an answer."""
-        if not walk.outcome.answered:
-            return {}
-        error = numerical_error(
-            walk_summary(walk), self.tolerances, lambda tighter: walk_summary(self.walk(state, pinned, tighter))
-        )
-        return {"numerical_error": error}
+    def printed(self, walk: ContactWalkResult, state: State, pinned: bool = False) -> dict[str, Any]:
+        """How such a walk went, with its numerical error if it has an answer."""
+        said = walk_summary(walk)
+        if walk.outcome.answered:
+            said["numerical_error"] = numerical_error(
+                said, self.tolerances, lambda tighter: walk_summary(self.walk(state, pinned, tighter))
+            )
+        return said
 
-    def rigid_walk(self) -> RigidWalkResult:
-        """The rigid model from its start, with samples."""
-        return take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True)
+
+def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
+    """How one walk went."""
+    said = numbers_of(walk)
+    return {key: said[key] for key in OF_WALK}
+
+
+def summary(found: TuneFindings, config: TuneConfig) -> dict[str, Any]:
+    """What the command prints."""
+    paper, pitch, ends = found.paper, found.scene.pitch_m, counted(found.contact_map.outcome)
+    papers_start = (
+        {}
+        if paper is None
+        else {
+            "outcome": paper.walk.outcome.label,
+            "reason": paper.reason,
+            "steps": paper.walk.steps,
+            "state": list(paper.rigid.state),
+            "energy_J": paper.rigid.energy,
+            "weight_N": paper.rigid.weight,
+            "normal_force_N": paper.rigid.normal_force,
+            "pull_from_s": paper.rigid.pull_from,
+            "airborne_from_s": paper.airborne_from,
+            "end_time_s": paper.walk.end_time_s,
+        }
+    )
+    return {
+        "table2": table_2(found),
+        "gait": gait_summary(found),
+        "adjustment": adjustment_summary(found),
+        **({"paper_start": papers_start} if papers_start else {}),
+        "procedure": {**found.printed, "adjusted": found.printed.get("adjusted")},
+        "map": {
+            "cells": int(found.contact_map.outcome.size),
+            "walks_share": found.contact_map.share(),
+            "contact": ends,
+            "rigid": counted(found.rigid_map.outcome),
+            "endings": endings(ends, config, True, Pads((pitch, pitch), laid=str(with_contact(config).pad_pitch))),
+        },
+        "slope_rad": found.scene.walker.slope,
+        "pitch_m": pitch,
+    }
+
+
+def table_2(found: TuneFindings) -> dict[str, dict[str, Any]]:
+    """The start before and after the adjustment, of the paper's compass beside the paper's two, each on either base."""
+    rows, adjusted = {}, found.adjusted_state
+    for k, (name, value) in enumerate(zip(found.names, found.rigid.start, strict=True)):
+        row: dict[str, Any] = {"unit": "rad" if k < len(found.names) // 2 else "rad/s"}
+        if found.paper is not None:
+            matlab, adams = TABLE_2[k].matlab.value, TABLE_2[k].adams.value
+            row |= {
+                "paper_matlab": matlab,
+                "paper_adams": adams,
+                "paper_percent": TABLE_2[k].percent.value,
+                "paper_percent_of_matlab": percent(adams, matlab, matlab),
+                "paper_percent_of_adams": percent(adams, matlab, adams),
+            }
+        ours = None if adjusted is None else adjusted[k]
+        rows[name] = {
+            **row,
+            "ours_rigid": value,
+            "ours_adjusted": ours,
+            "ours_percent_of_rigid": None if ours is None else percent(ours, value, value),
+            "ours_percent_of_adjusted": None if ours is None else percent(ours, value, ours),
+        }
+    return rows
+
+
+def percent(value: float, other: float, base: float) -> float | None:
+    """How much larger in magnitude a value is than the other, in percent of a base; None for a base of zero."""
+    return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
+
+
+def gait_summary(found: TuneFindings) -> dict[str, Any]:
+    """The contact model's own gait, or why there is none."""
+    gait = found.gait.gait
+    said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
+    if gait is None:
+        return said
+    step = gait.step
+    return {
+        **said,
+        "state": gait.z.tolist(),
+        "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(found.scene)],
+        "section": "the swing foot passes the stance foot: no foot is touching or lifting there",
+        "period_s": step.period_s,
+        "step_length_m": step.length_m,
+        "multipliers": [[float(value.real), float(value.imag)] for value in gait.multipliers],
+        "spectral_radius": float(abs(gait.multipliers[0])),
+        "stable": gait.stable,
+        "slip_m": step.slip_m,
+        "residual": gait.residual,
+        "lost_J": by_channel(found.scene.walker, step.dissipated_J),
+        "height_lost_J": step.height_lost_J,
+        "balance_J": float(step.dissipated_J.sum() - step.height_lost_J),
+    }
+
+
+def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
+    """What the numbers of a gait on its section are, and their units."""
+    walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
+
+    def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
+        roles = ["stance" if body in walker.legs[STANCE_FOOT] else "swing" for body in bodies]
+        bare = [names[body].rstrip(" 0123456789") for body in bodies]
+        return [(f"{quantity} of the {role} {name}", unit) for role, name in zip(roles, bare, strict=True)]
+
+    return [
+        ("height of the centre of mass over the slope", "m"),
+        *of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
+        ("velocity of the centre of mass along the slope", "m/s"),
+        ("velocity of the centre of mass normal to the slope", "m/s"),
+        *of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
+    ]
+
+
+def adjustment_summary(found: TuneFindings) -> dict[str, Any]:
+    """The smallest change that walks, whether any is needed, and the margins around it."""
+    change = found.adjustment
+    said: dict[str, Any] = {"needed": not found.as_it_stands.walks, "found": change is not None}
+    if change is None:
+        settled = " and settled on the gait" if found.gait.gait is not None else ""
+        reason = f"none of {found.contact_map.outcome.size} starts walked {found.steps} steps{settled}"
+        return {**said, "reason": reason, "advice": found.gait.advice or WIDER}
+    around = {}
+    for margin in found.margins:
+        fails = margin.fails
+        beyond = None if fails is None else Outcome(fails.outcome)
+        around[margin.name] = {
+            "factor": margin.factor,
+            "percent": 100.0 * (margin.factor - 1.0),
+            "beyond": None if beyond is None else "not settled" if beyond is Outcome.WALKED else beyond.label,
+            "steps_beyond": None if fails is None else fails.steps,
+        }
+    return {
+        **said,
+        "scale_dtheta1": change.swing,
+        "scale_dtheta2": change.stance,
+        "distance": change.distance,
+        "walked_steps": change.trial.steps,
+        "margins": around,
+    }
+
+
+def groups(found: TuneFindings) -> dict[str, Group]:
+    """The datasets of the artifact."""
+    stored, walker = {"map": map_group(found)}, found.scene.walker
+    if found.margins:
+        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
+        stored["margins"] = rows_group(found.margins, labels, "margin", "number")
+    if found.gait.gait is not None:
+        stored["gait"] = gait_group(found.gait.gait, found.scene)
+    rigid = found.rigid.samples
+    if rigid is not None and rigid.time_s.size:
+        in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
+        stored["rigid_start"] = Group({**in_time, **of_steps(found.rigid.touch_time_s)})
+    for name, walk in found.walks.items():
+        if walk.samples is not None and walk.samples.time_s.size:
+            stored[name] = Group({**legs_in_time(walk, walker), **of_steps(walk.touch_time_s)})
+    if found.paper is not None:
+        energy = {"mechanical_J": Variable(found.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
+        forces = over_time(normal_force_N=found.paper.normal)
+        stored["paper_start"] = Group({**legs_in_time(found.paper.walk, walker), **forces, **energy})
+    return stored
+
+
+def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
+    """Angles and velocities of the legs of the contact model; nothing if nothing was sampled."""
+    if walk.samples is None:
+        return {}
+    angle, velocity = motion_of_legs(walk.samples.states, walker)
+    return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
+
+
+def map_group(found: TuneFindings) -> Group:
+    """Outcome and steps of both models over the two factors."""
+    cells, rigid, swing, stance = found.contact_map, found.rigid_map, "swing_factor", "stance_factor"
+    over = {
+        "outcome": (cells.outcome, "how the contact model's walk ended, see attribute outcomes"),
+        "steps": (cells.steps, "steps that the contact model walked"),
+        "settled": (cells.settled, "1 if the last step is the contact gait's within two percent"),
+        "rigid_outcome": (rigid.outcome, "how the rigid model's walk ended"),
+        "rigid_steps": (rigid.steps, "steps that the rigid model walked"),
+    }
+    factor = "factor on the {} leg's initial angular velocity"
+    attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": found.steps}
+    change = found.adjustment
+    if change is not None:
+        attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
+    if found.gait_factors is not None:
+        attrs |= dict(zip(("gait_swing_factor", "gait_stance_factor"), found.gait_factors, strict=True))
+    return Group(
+        {
+            swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
+            stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
+            **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
+        },
+        attrs,
+    )
+
+
+def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
+    """The contact gait on its section."""
+    coordinates = section_coordinates(scene)
+    names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
+    units = ", ".join(unit for _, unit in coordinates)
+    pairs = ("coordinate", "along")
+    return Group(
+        {
+            "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
+            "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
+            "derivative": Variable(gait.step.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+            **numbered(gait.z.size, "multiplier", "number"),
+            **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
+        }
+    )

@@ -102,7 +102,7 @@ def limit_findings(
     """
     if walk.samples is None or walk.steps == 0:
         return None
-    legs = leg_variables(walk.samples, 1 - walk.samples.step % 2)
+    legs = leg_variables(walk.samples)
     angle, velocity = legs["angle"].values, legs["velocity"].values
     seen = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
     motion = sampled_at_strikes(seen)

@@ -1,25 +1,98 @@
-"""What the stages that walk have in common: the walk, what is stored of it, and the walk again for its error."""
+"""What the stages that walk share: where a walk starts, what is stored and printed of it, and its numerical error.
+
+Both models store a walk under the same names, in the same shapes, with the same meanings; what a model has not is
+absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any, Final
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from walkerlab.config.reads import SceneConfig, SimulateConfig
 from walkerlab.errors import NoAnswer
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import as_state
+from walkerlab.hybrid.walk_record import WalkRecord
+from walkerlab.labels import Label
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import State
 from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
-from walkerlab.stages.thinning import thinned
-from walkerlab.store.content import Content, Group
+from walkerlab.store.columns import labelled, numbered
+from walkerlab.store.content import Content, Group, Variable
 
-Walk = Callable[[Tolerances, bool], Any]
-"""Takes a walk with tolerances, sampled if that is asked for, and returns it: a `WalkRecord` with `samples`."""
+FIRST_STEPS, LAST_STEPS = 200, 20
+"""Steps of which every sample is stored."""
+MOST_BETWEEN = 50_000
+"""Samples of the steps between them, at most, beside both sides of every heel strike."""
+STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
+OF_STEPS: Final = {
+    "touch_time_s": Label("s", "time of the touch that ends the step"),
+    "period_s": Label("s", "time from touch to touch"),
+    "length_m": Label("m", "distance along the slope from touch to touch"),
+    "touch_along_m": Label("m", "where that touch is, along the slope from the first foothold"),
+    "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
+    "slip_m": Label("m", "net slip of the stance foot's material from its touch to its lift"),
+    "rolling_m": Label("m", "how far the stance foot rolled from its touch to its lift"),
+    "state_before": Label("rad, rad/s", "state just before that touch", (COORDINATE,)),
+    "state_after": Label("rad, rad/s", "state just after it, roles changed", (COORDINATE,)),
+}
+WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")  # a knee may not lock, nor the last stance foot lift
+OVER_TIME: Final = {
+    "time": Label("s", "time"),
+    "step": Label("1", "step number"),
+    "stance_leg": Label("1", "leg whose touch began the step"),
+    "angle": Label("rad", "angle of the leg from the vertical"),
+    "velocity": Label("rad/s", "angular velocity of the leg"),
+    "hip_along_m": Label("m", "position of the hip along the slope"),
+    "hip_height_m": Label("m", "height of the hip over the slope"),
+    "knee_along_m": Label("m", "position of the knee along the slope"),
+    "knee_height_m": Label("m", "height of the knee over the slope"),
+    "foot_along_m": Label("m", "position of the foot along the slope"),
+    "foot_height_m": Label("m", "height of the foot's lowest point over the slope"),
+    "normal_force_N": Label("N", "normal force of the ground on the foot"),
+    "friction_force_N": Label("N", "force of the ground on the foot along the slope, positive downhill"),
+    "penetration_m": Label("m", "depth of the foot in the ground that carries it"),
+    "slip_velocity_m_s": Label("m/s", "velocity of the foot's lowest material point"),
+    "kinetic_J": Label("J", "kinetic energy"),
+    "potential_J": Label("J", "potential energy from the current stance foot"),
+    "mechanical_J": Label("J", "kinetic and potential energy from the current stance foot"),
+    "book_mechanical_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
+    "dissipated_damping_J": Label("J", "dissipated in normal direction so far"),
+    "dissipated_friction_J": Label("J", "dissipated in friction so far"),
+    "lost_at_edges_J": Label("J", "elastic energy lost at pads' edges so far"),
+    "residual_J": Label("J", "book energy plus what was lost, less the start's"),
+}
+OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
+"""What the numbers of outcomes on a map mean."""
+
+
+def counted(outcomes: NDArray[np.int64]) -> dict[str, int]:
+    """How many of a map's walks ended how."""
+    numbers, counts = np.unique(outcomes, return_counts=True)
+    return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
+
+
+def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> tuple[float, State]:
+    """Step length (m) that pads and steps are measured by, and the rigid start state: the config's, or the gait's."""
+    if "fixedpoint" in inputs:
+        gait = inputs["fixedpoint"].summary
+        state = gait["state"] if config.start == "fixed-point" else config.start
+        return float(gait["step_length_m"]), as_state(state)
+    if config.start == "fixed-point":
+        raise ValueError("neither a start state nor a fixed point")
+    state = as_state(config.start)
+    return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
 
 
 def content_of_walk(
     stage: str,
-    walk: Walk,
+    walk: Callable[[Tolerances, bool], Any],
     tolerances: Tolerances,
     groups: Callable[[Any], dict[str, Group]],
     summary: Callable[[Any], dict[str, Any]],
@@ -28,6 +101,7 @@ def content_of_walk(
 ) -> Content:
     """Take a walk and store it, long ones thinned; and take it again for the numerical error.
 
+    walk     takes it with tolerances, sampled if that is asked for, and returns a `WalkRecord` with `samples`
     groups   the datasets of a walk
     summary  what is printed of it
     again    whether the second walk is wanted, which takes about as long as two or three
@@ -36,7 +110,7 @@ def content_of_walk(
     """
     taken = walk(tolerances, True)
     if taken.samples is not None:
-        taken = replace(taken, samples=thinned(taken.samples, taken.samples.time_s, taken.touch_time_s, progress))
+        taken = replace(taken, samples=thinned(taken.samples, taken.touch_time_s, progress))
     stored, said = groups(taken), summary(taken)
     if not taken.outcome.answered:
         why = f"{stage}: {taken.outcome.label} after {taken.steps} steps, {taken.end_time_s:.4g} s"
@@ -44,3 +118,97 @@ def content_of_walk(
     if again:
         said["numerical_error"] = numerical_error(said, tolerances, lambda tighter: summary(walk(tighter, False)))
     return Content(stored, said)
+
+
+def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
+    """The samples that are stored; those of an ordinary walk themselves.
+
+    samples  a dataclass of arrays whose first axis is time, `time_s` among them
+    ends     (steps,) s, times at which steps ended
+    """
+    if ends.size <= FIRST_STEPS + LAST_STEPS:
+        return samples
+    step = np.searchsorted(ends, samples.time_s, side="right")
+    stored = (step < FIRST_STEPS) | (step >= ends.size - LAST_STEPS)
+    changes = np.flatnonzero(np.diff(step))
+    stored[changes] = stored[changes + 1] = True
+    between = np.flatnonzero(~stored)
+    stored[between[:: max(1, -(-between.size // MOST_BETWEEN))]] = True
+    progress.note(
+        f"{ends.size} steps: of {step.size} samples {np.count_nonzero(stored)} are stored, all of the first "
+        f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between; both sides of every heel strike are "
+        "among them"
+    )
+    return only_at(samples, stored)
+
+
+def only_at(samples: Any, kept: NDArray[Any]) -> Any:
+    """Samples of a walk at some of their times."""
+    return replace(samples, **{field.name: getattr(samples, field.name)[kept] for field in fields(samples)})
+
+
+def over_time(**values: ArrayLike) -> dict[str, Variable]:
+    """What the samples of a walk have, by names in `OVER_TIME`: numbers (samples,), or (samples, 2) of each leg."""
+    return {name: labelled(found, OVER_TIME[name], *(TIME, LEG)[: np.ndim(found)]) for name, found in values.items()}
+
+
+def of_body(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
+    """How a body beside the legs' own turns (samples,), or one of each leg (samples, 2): a torso, shanks."""
+    labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
+    dims = (TIME, LEG)[: np.ndim(angle)]
+    return {
+        f"{name}_angle": labelled(angle, labels[0], *dims),
+        f"{name}_velocity": labelled(velocity, labels[1], *dims),
+    }
+
+
+def legs() -> dict[str, Variable]:
+    """The legs, which keep their numbers when they change roles."""
+    return numbered(2, LEG, "leg: 0 swings first, 1 stands first")
+
+
+def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
+    """What the steps of a walk have, by names in `OF_STEPS`, a row a step; nothing of a walk without a step.
+
+    None is left out; nan, and what the last steps do not have, is a gap.
+    """
+    count = np.size(touch_time_s)
+    if count == 0:
+        return {}
+    columns = numbered(count, STEP, "step number")
+    for name, found in {"touch_time_s": touch_time_s, **values}.items():
+        if found is not None:
+            gaps = name in WITH_GAPS
+            rows = np.append(found, np.full(count - np.size(found), np.nan)) if gaps else found
+            columns[name] = labelled(rows, OF_STEPS[name], STEP, gaps=gaps)
+    return columns
+
+
+def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
+    """The steps of a walk as columns: what both models know of them, and what one of them adds."""
+    known = {
+        "period_s": walk.periods_s,
+        "length_m": walk.lengths_m,
+        "touch_along_m": walk.touch_along_m,
+        "knee_strike_time_s": walk.knee_strike_time_s,
+    }
+    return of_steps(walk.touch_time_s, **known, **values)
+
+
+def numbers_of(walk: WalkRecord) -> dict[str, Any]:
+    """What `--json` says of a walk of either model; of legs without knees it says nothing about knees."""
+    strikes = walk.knee_strike_time_s
+    known = {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
+    return {
+        "outcome": walk.outcome.label,
+        "advice": walk.advice,
+        "steps": walk.steps,
+        "step_periods_s": walk.periods_s.tolist(),
+        "step_lengths_m": walk.lengths_m.tolist(),
+        "touch_times_s": walk.touch_time_s.tolist(),
+        **known,
+        "end_time_s": walk.end_time_s,
+        "rhs_evaluations": walk.work.rhs_evaluations,
+        "accepted_steps": walk.work.accepted,
+        "rejected_steps": walk.work.rejected,
+    }
