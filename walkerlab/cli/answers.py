@@ -10,7 +10,7 @@ from typing import Any
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
-from walkerlab.report.outcomes import MODELS
+from walkerlab.report.outcomes import CHANNELS, MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.sections import adjustment, families, gaits, stability, walks
 from walkerlab.report.sections.families import parameter
@@ -53,9 +53,14 @@ def laid_out(blocks: Iterable[str | Table]) -> list[str]:
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
     """The gait, under both sets of equations side by side where the digits that are shown tell their gaits apart."""
-    head = words("gait.answer", summary, math.degrees(summary["slope_rad"]))
+    slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
-        return [head]
+        return [f"No gait on a slope of {slope}: {summary['reason']}."]
+    head = (
+        f"On a slope of {slope} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
+        f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
+        f"the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
+    )
     shown = [fixed(value, 6) for value in summary["state"]]
     others = {
         name: one
@@ -71,12 +76,17 @@ def told(title: str, key: str, digits: int = 4) -> Column:
     return Column(title, key, lambda value: quantity(value, unit_by_name(key), digits))
 
 
+def energy_lost(dissipated: Mapping[str, float]) -> str:
+    """Where a walk dissipated its energy; empty if nowhere."""
+    return listed(f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost)
+
+
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
     told("energy balance off by", "energy_balance_residual_J", 2),
-    Column("energy lost", lambda walk: words("walks.lost", walk.get("dissipated_J") or {}) or None),
+    Column("energy lost", lambda walk: energy_lost(walk.get("dissipated_J") or {}) or None),
     told("least normal force", "min_normal_force_N"),
     told("largest friction ratio", "max_friction_ratio"),
     Column("largest penetration", "max_penetration_m", length),
@@ -88,14 +98,17 @@ OF_THE_WALK = (
 def walk(model: str, summary: Summary) -> list[str | Table]:
     """How a model's walk went, step by step."""
     columns = [Column(title, key, numeric=True) for key, title in OF_EACH_STEP.items()]
-    error, taken = summary.get("numerical_error"), each_step(summary)
-    last = list(taken.values())[-1] if taken else {}
+    head, taken = f"The {model} {comes(summary['steps'], summary['outcome'])}", each_step(summary)
+    if summary["step_periods_s"]:
+        last = list(taken.values())[-1]
+        head += f"; the last takes {last['step_periods_s']} s and is {last['step_lengths_m']} m long"
+    error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED
     return [
-        words("walks.answer", model, summary, last.get("step_periods_s"), last.get("step_lengths_m")),
+        f"{head}.",
         side_by_side("", columns, taken, head="step"),
         side_by_side("", OF_THE_WALK, {"": summary}, head=""),
-        words("walks.error", error, "") if error else "",
-        words("walks.advice", summary),
+        f"numerical error: {off_by(error)}." if error else "",
+        f"advice: {summary['advice']}" if advised else "",
     ]
 
 
@@ -134,7 +147,7 @@ def tune(summary: Summary) -> list[str | Table]:
 def compare(summary: Summary) -> list[str | Table]:
     """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
-    told = [words("walks.error", error, model) for model, error in errors.items()]
+    told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
         return [words("models.paper", summary["verdicts"]), numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]

@@ -1,8 +1,11 @@
-"""The models that walk, and how a walk ends, in words."""
+"""The models that walk, how a walk ends, and how far its numbers are off, in words."""
 
 from __future__ import annotations
 
-from walkerlab.report.numbers import count
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.numbers import count, listed, quantity
 from walkerlab.report.tables import Tone
 
 RIGID, CONTACT = "simulate", "contact-sim"
@@ -51,3 +54,21 @@ CHANNELS = {
     "knee_stop": "in the knees' stops",
 }
 """Where a contact walk dissipates energy, by the names under which it is stored."""
+
+
+USUAL = "a hundred times tighter tolerances"
+"""What the second walk has, unless `by` says otherwise."""
+ERRORS = {
+    "step_period_s": ("in a period", "s"),
+    "step_length_m": ("in a length", "m"),
+    "end_time_s": ("at the end", "s"),
+}
+"""What `numerical_error` is of, in words, and its unit."""
+
+
+def off_by(error: Mapping[str, Any]) -> str:
+    """How far the numbers of a walk are off, and how that is known."""
+    if "reason" in error:
+        return f"unknown: {error['reason']}"
+    off = listed(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    return f"{off}, by a second walk with {error.get('by', USUAL)}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkerlab.prose import Prose, parts
 from walkerlab.report import numbers
-from walkerlab.report.outcomes import CHANNELS, ends, walks
+from walkerlab.report.outcomes import CHANNELS, ERRORS, USUAL, ends, off_by, walks
 from walkerlab.report.symbols import in_signs
 
 
@@ -17,7 +17,8 @@ def in_row(text: str) -> str:
 
 WRITTEN = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
-    *(numbers.count, numbers.listed, numbers.power_of_ten, in_row, in_signs, ends, walks, len),
+    *(numbers.count, numbers.listed, numbers.power_of_ten, in_row, in_signs, ends, walks, off_by, len),
 )
 """What the templates may call."""
-words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, {"CHANNELS": CHANNELS})
+KNOWN = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "USUAL": USUAL}
+words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, KNOWN)
