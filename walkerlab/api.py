@@ -12,17 +12,15 @@ from typing import Any, cast
 
 from walkerlab.cli.text import in_words
 from walkerlab.config.contact import Contact
-from walkerlab.config.fields import Block
+from walkerlab.config.fields import Block, kinds_of
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.overlay import tree_of
-from walkerlab.config.placing import on_the_slope
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.tree import Mapping as Tree
-from walkerlab.config.validation import typed
-from walkerlab.config.walkers import WALKERS
+from walkerlab.config.validation import on_the_slope, typed
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
@@ -36,7 +34,10 @@ from walkerlab.store.runfolder import RunFolder
 
 RUNS = "runs"
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
-    "walker": (tuple(WALKERS.values()), "walkerlab.compass(), kneed() and walker(type) make one."),
+    "walker": (
+        tuple(kinds_of(Config.model_fields["walker"]).values()),
+        "walkerlab.compass(), kneed() and walker(type) make one.",
+    ),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
 """Arguments that are blocks of a config: what they may be, and what makes them."""
@@ -180,7 +181,7 @@ def run(
 
     refuse_unknown_stage(stage)
     asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
-    report = execute(asked.template.base.config, stage, asked.folder, Options(force=force, jobs=jobs))
+    report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
     return result_of(stage, as_json(report), content, said, report.artifact)
@@ -234,11 +235,11 @@ def sweep(
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
-    block = found.template.base.config.sweep or SweepBlock()
+    block = found.loaded.config.sweep or SweepBlock()
     question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
     chosen, address = engine_named(engine)
-    order = Order(jobs, address, modules_of(stage, found.template.base.config, PIPELINE), found.folder.path)
-    swept = SweepRun(question, found.template, found.folder).run(SweepWork(chosen, order))
+    order = Order(jobs, address, modules_of(stage, found.loaded.config, PIPELINE), found.folder.path)
+    swept = SweepRun(question, found.loaded, found.folder).run(SweepWork(chosen, order))
     if swept.failed:
         raise swept.error()
     return dataset(swept.content[""])

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import walkerlab
-from walkerlab.config.loader import template
+from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.engines import Order, Pool, SweepEngine
 from walkerlab.sweeps.question import asked, axis_of_text
@@ -35,9 +35,9 @@ class Toy:
         self.graph = GRAPH
 
     def sweep(self, stage, *over, config=None, sets=(), **options):
-        read = template(config, sets)
+        read = load(config, sets)
         question = asked(stage, [axis_of_text(text) for text in over], **options)
-        return SweepRun(question, read, RunFolder(self.runs, read.base.run_name), self.graph)
+        return SweepRun(question, read, RunFolder(self.runs, read.run_name), self.graph)
 
     def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):
         work = SweepWork(engine, order or Order(), chunk_s, force=force, graph=AT)

@@ -64,13 +64,13 @@ def test_workers_that_cannot_start_are_told_and_not_tried_for_ever(toy):
 SWEEPER = """
 import sys
 from pathlib import Path
-from walkerlab.config.loader import template
+from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.engines import Order
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.sweep import SweepRun, SweepWork
 from toy_sweep.sweep_pipeline import GRAPH
-read = template()
+read = load()
 question = asked("deadly", [axis_of_text("seed=100:179:80")])
 sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
 order = Order(2, modules=("toy_sweep.deadly",))

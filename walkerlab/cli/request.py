@@ -18,7 +18,7 @@ from walkerlab.cli.console import Console
 
 # Help loads neither a config nor an array.
 if TYPE_CHECKING:
-    from walkerlab.config.loader import Template
+    from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
     from walkerlab.stages.resolve import Asked
     from walkerlab.store.runfolder import RunFolder
@@ -131,7 +131,7 @@ class Request:
         from walkerlab.stages.resolve import resolve
 
         found = resolve(self.config, self.sets or (), self.strides, self.runs, self.name)
-        loaded = found.template.base
+        loaded = found.loaded
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
 
@@ -147,14 +147,14 @@ class Request:
         return self.folder.path if "asked" in vars(self) else None
 
     @property
-    def template(self) -> "Template":
+    def loaded(self) -> "LoadedConfig":
         """The config, ready to be varied."""
-        return self.asked.template
+        return self.asked.loaded
 
     @property
     def resolved(self) -> "Config":
         """The config itself."""
-        return self.template.base.config
+        return self.loaded.config
 
     @property
     def folder(self) -> "RunFolder":

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
-from walkerlab.config.loader import EarlierRun, load
+from walkerlab.config.files import ConfigFile
+from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.runner import execute
@@ -25,7 +26,7 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
     stored = artifact_at(path)
     stage = stored.identity.stage
     name = path.resolve().parent.name
-    config = load(run=EarlierRun(stored.provenance.config, name, str(path))).config
+    config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
         report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=graph)
         again = None if report.artifact is None else read(report.artifact)

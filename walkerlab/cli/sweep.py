@@ -82,22 +82,22 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
             chosen, address = engine_named(engine)
-            template = request.template
+            loaded = request.loaded
             texts = [axis_of_text(text) for text in over or ()]
-            question = question_of(template.base.config.sweep, texts, stage, zipped, sample, seed)
+            question = question_of(loaded.config.sweep, texts, stage, zipped, sample, seed)
             order = Order(
                 workers=jobs,
                 address=address,
-                modules=modules_of(question.stage, template.base.config, graph),
+                modules=modules_of(question.stage, loaded.config, graph),
                 folder=request.folder.path,
                 options=options_of(engine_option or ()),
             )
             if request.dry_run:
-                asked = SweepRun(question, template, request.folder, graph)
+                asked = SweepRun(question, loaded, request.folder, graph)
                 show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
                 return
             with chosen.begun(order) as begun:
-                asked = SweepRun(question, template, request.folder, graph)
+                asked = SweepRun(question, loaded, request.folder, graph)
                 load_meanwhile("walkerlab.sweeps.drawing")
                 work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph))
                 swept = asked.run(work, request.console)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
@@ -22,48 +21,49 @@ _Bounds = tuple[_Bound, ...]  # empty: the usual window
 class Basin(Block):
     """Starts on a grid over coordinates of the section just after heel strike; the others are the gait's."""
 
-    model: Annotated[Literal["rigid", "contact"], key("", "which model walks")] = "rigid"
-    plane: Annotated[
-        tuple[Coordinate, ...],
-        key(
-            "",
-            "coordinates of the grid: two for a plane through the gait, or all three; theta_1 follows from the slope",
-            "stance angle and its rate, as in Schwab and Wisse 2001",
-            bounds=f"two or three of {', '.join(COORDINATES)}, each once",
-            sequence=True,
-        ),
-    ] = ("theta_2", "dtheta_2")
-    cells: Annotated[
-        tuple[Annotated[int, Field(ge=2, le=4000)], ...],
-        key("1", "cells along each of them", bounds="a number from 2 to 4000 for each coordinate", sequence=True),
-    ] = (400, 400)
-    lower: Annotated[
-        _Bounds,
-        key(_UNIT, "where the window begins", bounds="a number for each", default=f"below {_WIDTH}", sequence=True),
-    ] = ()
-    upper: Annotated[
-        _Bounds,
-        key(
-            _UNIT,
-            "where the window ends",
-            bounds="a number for each, above `lower`",
-            default=f"above {_WIDTH}",
-            sequence=True,
-        ),
-    ] = ()
-    refine: Annotated[
-        int, key("1", "parts along each axis that cells at edges of basins are divided into; 1: none", ge=1, le=32)
-    ] = 4
-    steps: Annotated[
-        int, key("1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
-    ] = 300
-    contact_steps: Annotated[int, key("1", "steps that the contact model walks", ge=2, le=10_000)] = 12
+    model: Literal["rigid", "contact"] = key("rigid", "", "which model walks")
+    plane: tuple[Coordinate, ...] = key(
+        ("theta_2", "dtheta_2"),
+        "",
+        "coordinates of the grid: two for a plane through the gait, or all three; theta_1 follows from the slope",
+        "stance angle and its rate, as in Schwab and Wisse 2001",
+        bounds=f"two or three of {', '.join(COORDINATES)}, each once",
+        sequence=True,
+    )
+    cells: tuple[Annotated[int, Field(ge=2, le=4000)], ...] = key(
+        (400, 400),
+        "1",
+        "cells along each of them",
+        bounds="a number from 2 to 4000 for each coordinate",
+        sequence=True,
+    )
+    lower: _Bounds = key(
+        (),
+        _UNIT,
+        "where the window begins",
+        bounds="a number for each",
+        default_in_words=f"below {_WIDTH}",
+        sequence=True,
+    )
+    upper: _Bounds = key(
+        (),
+        _UNIT,
+        "where the window ends",
+        bounds="a number for each, above `lower`",
+        default_in_words=f"above {_WIDTH}",
+        sequence=True,
+    )
+    refine: int = key(
+        4, "1", "parts along each axis that cells at edges of basins are divided into; 1: none", ge=1, le=32
+    )
+    steps: int = key(300, "1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
+    contact_steps: int = key(12, "1", "steps that the contact model walks", ge=2, le=10_000)
 
     @field_validator("plane")
     @classmethod
     def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         if len(value) not in (2, 3) or len(set(value)) != len(value):
-            raise PydanticCustomError("plane", "must be two or three coordinates, each once")
+            raise wrong("must be two or three coordinates, each once")
         return value
 
     @field_validator("cells", "lower", "upper")
@@ -71,14 +71,12 @@ class Basin(Block):
     def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
         if plane is not None and not usual and len(value) != len(plane):
-            raise PydanticCustomError(
-                "count", "must have {wanted} numbers, one for each of plane", {"wanted": len(plane)}
-            )
+            raise wrong(f"must have {len(plane)} numbers, one for each of plane")
         return value
 
     @field_validator("upper")
     @classmethod
     def _above_lower(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         if any(b <= a for a, b in zip(info.data.get("lower", ()), value, strict=False)):
-            raise PydanticCustomError("order", "must be above lower")
+            raise wrong("must be above lower")
         return value

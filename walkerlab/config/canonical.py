@@ -16,12 +16,12 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
 
     Raises KeyError if a key is not in the schema.
     """
-    part: dict[str, Any] = _part(config.model_dump(mode="json"), takes)
-    return part
 
+    def part(data: Any, takes: type | None) -> Any:
+        return data if takes is None else {name: part(data[name], inner) for name, inner in keys_of(takes).items()}
 
-def _part(data: Any, takes: type | None) -> Any:
-    return data if takes is None else {name: _part(data[name], part) for name, part in keys_of(takes).items()}
+    found: dict[str, Any] = part(config.model_dump(mode="json"), takes)
+    return found
 
 
 def canonical_json(data: Any) -> str:

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 
 MM_PER_M: Final = 1000.0
 
@@ -46,74 +45,62 @@ PadPitch = Annotated[
 class Contact(Block):
     """Contact of feet and ground: normal force, friction, terrain."""
 
-    units: Annotated[
-        Literal["adams", "si"],
-        key("", "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s", _SECTION_4),
-    ] = "adams"
-    stiffness: Annotated[
-        float, key("N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
-    ] = 1.0e5
-    exponent: Annotated[float, key("1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)] = 2.2
-    damping: Annotated[
-        float, key("N s/mm or N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)
-    ] = 90.0
-    full_damping_penetration: Annotated[
-        float, key("mm or m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0)
-    ] = 0.1
-    friction: Annotated[
-        Literal["coulomb", "none"],
-        key("", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", _SECTION_4),
-    ] = "coulomb"
-    static_friction: Annotated[
-        float, key("1", "coefficient at stiction_velocity, the largest", _SECTION_4, ge=0.0, le=100.0)
-    ] = 0.9
-    dynamic_friction: Annotated[
-        float,
-        key(
-            "1",
-            "coefficient beyond friction_velocity",
-            _SECTION_4,
-            bounds="0 to 100, not above static_friction",
-            ge=0.0,
-            le=100.0,
-        ),
-    ] = 0.7
-    stiction_velocity: Annotated[
-        float, key("mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0)
-    ] = 100.0
-    friction_velocity: Annotated[
-        float,
-        key(
-            "mm/s or m/s",
-            "slip velocity from which on friction is dynamic",
-            _ADAMS,
-            bounds="above stiction_velocity, up to 1000 m/s",
-            gt=0.0,
-        ),
-    ] = 1000.0
-    terrain: Annotated[
-        Literal["checkerboard", "after-mid-swing", "plane"],
-        key(
-            "",
-            "checkerboard: a lane of raised pads per leg; "
-            "after-mid-swing: a swing foot touches only once it has passed the stance foot; "
-            "plane: ordinary ground, for feet that clear it",
-            _SECTION_4,
-        ),
-    ] = "checkerboard"
-    pad_pitch: Annotated[
-        PadPitch,
-        key(
-            "m",
-            "pitch of the pads: step length of the rigid or the contact (own) gait, or a number, in m in any units",
-            _SECTION_4,
-            bounds="rigid, own, or 1e-6 to 1e4",
-        ),
-    ] = "rigid"
-    stance: Annotated[
-        Literal["free", "pinned"],
-        key("", "pinned: a revolute joint at the first stance foot until the first heel strike", _SECTION_4),
-    ] = "free"
+    units: Literal["adams", "si"] = key(
+        "adams",
+        "",
+        "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s",
+        _SECTION_4,
+    )
+    stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
+    exponent: float = key(2.2, "1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)
+    damping: float = key(90.0, "N s/mm or N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)
+    full_damping_penetration: float = key(
+        0.1, "mm or m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
+    )
+    friction: Literal["coulomb", "none"] = key(
+        "coulomb", "", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", _SECTION_4
+    )
+    static_friction: float = key(
+        0.9, "1", "coefficient at stiction_velocity, the largest", _SECTION_4, ge=0.0, le=100.0
+    )
+    dynamic_friction: float = key(
+        0.7,
+        "1",
+        "coefficient beyond friction_velocity",
+        _SECTION_4,
+        bounds="0 to 100, not above static_friction",
+        ge=0.0,
+        le=100.0,
+    )
+    stiction_velocity: float = key(
+        100.0, "mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0
+    )
+    friction_velocity: float = key(
+        1000.0,
+        "mm/s or m/s",
+        "slip velocity from which on friction is dynamic",
+        _ADAMS,
+        bounds="above stiction_velocity, up to 1000 m/s",
+        gt=0.0,
+    )
+    terrain: Literal["checkerboard", "after-mid-swing", "plane"] = key(
+        "checkerboard",
+        "",
+        "checkerboard: a lane of raised pads per leg; "
+        "after-mid-swing: a swing foot touches only once it has passed the stance foot; "
+        "plane: ordinary ground, for feet that clear it",
+        _SECTION_4,
+    )
+    pad_pitch: PadPitch = key(
+        "rigid",
+        "m",
+        "pitch of the pads: step length of the rigid or the contact (own) gait, or a number, in m in any units",
+        _SECTION_4,
+        bounds="rigid, own, or 1e-6 to 1e4",
+    )
+    stance: Literal["free", "pinned"] = key(
+        "free", "", "pinned: a revolute joint at the first stance foot until the first heel strike", _SECTION_4
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -137,35 +124,26 @@ class Contact(Block):
     def _friction_velocity_above_stiction(cls, value: float, info: ValidationInfo) -> float:
         stiction = info.data.get("stiction_velocity")
         if stiction is not None and value <= stiction:
-            raise PydanticCustomError("order", "must exceed stiction_velocity, {least}", {"least": f"{stiction:g}"})
+            raise wrong(f"must exceed stiction_velocity, {stiction:g}")
         return value
 
     @field_validator(*BOUNDS_SI)
     @classmethod
     def _within_bounds(cls, value: float, info: ValidationInfo) -> float:
         """Refuse a length or velocity outside its bounds, which are the same physical ones in either units."""
-        adams = info.data.get("units", "adams") == "adams"
-        scale, prefix = (MM_PER_M, "m") if adams else (1.0, "")
+        units = info.data.get("units", "adams")
+        scale, prefix = (MM_PER_M, "m") if units == "adams" else (1.0, "")
         least, most, unit = BOUNDS_SI[str(info.field_name)]
         if least * scale <= value <= most * scale:
             return value
-        raise PydanticCustomError(
-            "bounds",
-            "must be from {low} to {high} {unit}, as `units: {units}` has it",
-            {
-                "low": f"{least * scale:g}",
-                "high": f"{most * scale:g}",
-                "unit": prefix + unit,
-                "units": "adams" if adams else "si",
-            },
-        )
+        raise wrong(f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, as `units: {units}` has it")
 
     @field_validator("dynamic_friction")
     @classmethod
     def _dynamic_not_above_static(cls, value: float, info: ValidationInfo) -> float:
         static = info.data.get("static_friction")
         if static is not None and value > static:
-            raise PydanticCustomError("order", "must not exceed static_friction, {static}", {"static": f"{static:g}"})
+            raise wrong(f"must not exceed static_friction, {static:g}")
         return value
 
     @property

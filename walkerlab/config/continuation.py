@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pydantic import Field, ValidationInfo, create_model, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import ValidationInfo, create_model, field_validator
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 
 FollowedModel = Literal["rigid", "contact", "both"]
-FollowedKey = Annotated[
-    str,
-    key("", "key of the config that changes, a number such as slope_deg or walker.hip_mass_kg",
-        bounds="a key with its blocks, dotted"),
-    Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"),
-]  # fmt: skip
 _UNIT: Final = "that of the key"
-_From = Annotated[float, key(_UNIT, "where the span begins", bounds="a number below `to`")]
-_To = Annotated[float, key(_UNIT, "where the span ends", bounds="a number above `from`")]
 
 
 def _above_from(cls: type[Block], value: float, info: ValidationInfo) -> float:  # noqa: ARG001 - pydantic passes it
     least = info.data.get("from")
     if least is not None and value <= least:
-        raise PydanticCustomError("order", "must be above `from`, {least}", {"least": f"{least:g}"})
+        raise wrong(f"must be above `from`, {least:g}")
     return value
 
 
@@ -39,14 +30,23 @@ else:
         "_Span",
         __base__=Block,
         __validators__={"above_from": field_validator("to")(classmethod(_above_from))},
-        **{"from": (_From, 1.0e-4), "to": (_To, 0.1)},
+        **{
+            "from": (float, key(1.0e-4, _UNIT, "where the span begins", bounds="a number below `to`")),
+            "to": (float, key(0.1, _UNIT, "where the span ends", bounds="a number above `from`")),
+        },
     )
 
 
 class Span(_Span):
     """A key and a range of its values."""
 
-    over: FollowedKey = "slope_rad"
+    over: str = key(
+        "slope_rad",
+        "",
+        "key of the config that changes, a number such as slope_deg or walker.hip_mass_kg",
+        bounds="a key with its blocks, dotted",
+        pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$",
+    )
 
     @property
     def least(self) -> float:
@@ -63,9 +63,7 @@ class Span(_Span):
 class Continuation(Span):
     """What `walkerlab continuation` follows."""
 
-    model: Annotated[FollowedModel, key("", "which model's gaits: rigid, contact, or both on the same axes")] = "rigid"
-    periods: Annotated[int, key("1", "steps of the longest gaits that the cascade is followed to", ge=1, le=64)] = 16
-    points: Annotated[int, key("1", "points of one branch, at most", ge=2, le=100_000)] = 400
-    second: Annotated[Span | None, key("", "a second key, for the curves of folds and flips in the plane of both")] = (
-        None
-    )
+    model: FollowedModel = key("rigid", "", "which model's gaits: rigid, contact, or both on the same axes")
+    periods: int = key(16, "1", "steps of the longest gaits that the cascade is followed to", ge=1, le=64)
+    points: int = key(400, "1", "points of one branch, at most", ge=2, le=100_000)
+    second: Span | None = key(None, "", "a second key, for the curves of folds and flips in the plane of both")

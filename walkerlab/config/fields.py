@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, Tag
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from walkerlab.config.numbers import short
 from walkerlab.labels import with_unit
@@ -20,31 +21,38 @@ class Block(BaseModel):
 
 
 def key(
+    default: Any,
     unit: str,
     meaning: str,
     source: str = "this project",
     *,
     bounds: str = "",
-    default: str = "",
+    default_in_words: str = "",
     sequence: bool = False,
-    **limits: float,
+    **limits: Any,
 ) -> Any:
-    """Metadata of one key, to be put into `Annotated`.
+    """One key of a block.
 
-    unit      as it is printed, "1" for pure numbers, "" where there is none
-    meaning   one sentence
-    source    where the default comes from
-    bounds    what is allowed in words, where `limits` cannot say it
-    default   the default in words, where it follows from another key
-    sequence  a YAML list is accepted for a tuple
-    limits    gt, ge, lt, le as pydantic has them
+    default           its value, or what makes one; `...` where the config must have the key
+    unit              as it is printed, "1" for pure numbers, "" where there is none
+    meaning           one sentence
+    source            where the default comes from
+    bounds            what is allowed in words, where `limits` cannot say it
+    default_in_words  where it follows from another key
+    sequence          a YAML list is accepted for a tuple
+    limits            gt, ge, lt, le, pattern and so on, as pydantic has them
     """
-    words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default}
-    extra: dict[str, Any] = {name: text for name, text in words.items() if text}
-    settings: dict[str, Any] = {"description": meaning, "json_schema_extra": extra, **limits}
-    if sequence:
-        settings["strict"] = False
-    return Field(**settings)
+    words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
+    settings: dict[str, Any] = {"default_factory" if callable(default) else "default": default, **limits}
+    settings |= {"strict": False} if sequence else {}
+    return Field(
+        description=meaning, json_schema_extra={name: text for name, text in words.items() if text}, **settings
+    )
+
+
+def wrong(reason: str) -> PydanticCustomError:
+    """What a validator raises, with the reason, for what cannot be meant."""
+    return PydanticCustomError("meaning", reason)
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:

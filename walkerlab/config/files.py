@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,20 +64,28 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
     """
     layers: list[Mapping] = []
     seen: list[str] = []
-    current: ConfigFile | None = file
-    asked: Position | None = None
-    while current is not None:
-        text = _text_of(current, asked)
-        identity = str(current.path.resolve())
-        if identity in seen:
-            raise refusal([Problem(asked, f"extends: {current.label} extends itself")])
+    asked: Position | None = None  # where the file's name stands
+    while True:
+        root = read(_text_of(file, asked), file.label)
+        if str(file.path.resolve()) in seen:
+            raise refusal([Problem(asked, f"extends: {file.label} extends itself")])
         if len(seen) == MAX_EXTENDS:
             raise refusal([Problem(asked, f"extends: more than {MAX_EXTENDS} files deep")])
-        seen.append(identity)
-        layer = _block_of(text, current)
-        layers.insert(0, with_cases(layer.without("extends"), current.path.parent))
-        current, asked = _parent_of(layer, current)
-    return layers
+        seen.append(str(file.path.resolve()))
+        if not isinstance(root, Mapping):
+            empty = root is None or (isinstance(root, Scalar) and root.value is None)
+            held = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
+            start = root.position if root else Position(file.label, 1, 1)
+            raise refusal([Problem(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")])
+        layers.insert(0, with_cases(root.without("extends"), file.path.parent))
+        extends = root.entries.get("extends")
+        if extends is None:
+            return layers
+        asked = extends.position
+        if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
+            raise refusal([Problem(asked, "extends: is not the name of a config", _what_there_is())])
+        named = extends.value in builtin_names()  # else a path from the file's folder
+        file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
@@ -101,30 +110,8 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
     return whole
 
 
-def _parent_of(layer: Mapping, file: ConfigFile) -> tuple[ConfigFile | None, Position | None]:
-    extends = layer.entries.get("extends")
-    if extends is None:
-        return None, None
-    if isinstance(extends, Scalar) and isinstance(extends.value, str) and extends.value:
-        named = extends.value in builtin_names()  # else a path from the file's folder
-        return builtin(extends.value) if named else file_at(file.path.parent / extends.value), extends.position
-    raise refusal([Problem(extends.position, "extends: is not the name of a config", _what_there_is())])
-
-
 def _what_there_is() -> str:
     return f"a file, or one of {', '.join(builtin_names())}"
-
-
-def _block_of(text: str, file: ConfigFile) -> Mapping:
-    root = read(text, file.label)
-    if isinstance(root, Mapping):
-        return root
-    if root is None or (isinstance(root, Scalar) and root.value is None):
-        reason = "the file is empty"
-    else:
-        reason = f"the file holds a {'list' if not isinstance(root, Scalar) else 'single value'}"
-    start = root.position if root else Position(file.label, 1, 1)
-    raise refusal([Problem(start, reason, "a block of keys, e.g. `extends: paper`")])
 
 
 def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
@@ -151,29 +138,20 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise refusal([Problem(asked, f"{kind} {file.label} cannot be read: {reason.lower()}")]) from None
-    return _decoded(data, file)
-
-
-def _decoded(data: bytes, file: ConfigFile) -> str:
     if len(data) > 4 * MAX_CHARACTERS:
-        start = Position(file.label, 1, 1)
-        raise refusal([Problem(start, f"longer than {MAX_CHARACTERS} characters: not a config")])
+        raise refusal([Problem(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")])
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
-        before = data[: error.start]
-        column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8")) + 1
-        where = Position(file.label, before.count(b"\n") + 1, column)
+        lines = data[: error.start].split(b"\n")
+        where = Position(file.label, len(lines), len(lines[-1].decode("utf-8")) + 1)
         raise refusal([Problem(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?")]) from None
 
 
 def _near(file: ConfigFile) -> str:
     """What was perhaps meant by the name of a file that is not there."""
-    try:
+    beside: list[str] = []
+    with contextlib.suppress(OSError, ValueError):
         beside = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
-    except (OSError, ValueError):
-        beside = []
     found = nearest(file.path.name, beside)
-    if found:
-        return shown(str(file.path.with_name(found)), SHOWN_PATH)
-    return nearest(file.path.stem, builtin_names())
+    return shown(str(file.path.with_name(found)), SHOWN_PATH) if found else nearest(file.path.stem, builtin_names())

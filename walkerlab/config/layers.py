@@ -62,15 +62,8 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
         raise refusal([Problem(here, f"{second}: the slope is given already, as {first}{where}", "one of both")])
 
 
-def parse_settings(texts: Sequence[str]) -> list[ConfigSetting]:
-    """The `--set` options.
-
-    Raises ConfigError if one is not KEY=VALUE with a YAML value.
-    """
-    return [_setting(text) for text in texts]
-
-
-def _setting(text: str) -> ConfigSetting:
+def setting_of(text: str) -> ConfigSetting:
+    """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
     key, equals, value = text.partition("=")
     source = f"--set {shown(text)}"
     start = Position(source, 1, 1)

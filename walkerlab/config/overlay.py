@@ -7,20 +7,14 @@ from typing import Any
 
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
-from walkerlab.config.placing import on_the_slope
 from walkerlab.config.problems import Problem, refusal
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
-from walkerlab.config.validation import typed
+from walkerlab.config.validation import on_the_slope, typed
 
 
-def paper_config() -> Config:
-    """The built-in paper config."""
-    return over_paper({}, "the paper's")
-
-
-def over_paper(lines: Keys[str, Any], source: str) -> Config:
+def over_paper(lines: Keys[str, Any], source: str = "the paper's") -> Config:
     """The built-in paper config with `lines` over it.
 
     lines   keys of a config, nested, as plain values
@@ -34,8 +28,16 @@ def over_paper(lines: Keys[str, Any], source: str) -> Config:
 
 
 def block_over_paper(upper: Mapping) -> Config:
-    """The built-in paper config with a block of keys over it; ConfigError with their places if they are no config."""
-    tree = stacked([*below(upper), upper])
+    """The built-in paper config with a block of keys over it; ConfigError with their places if they are no config.
+
+    What a contact block in SI leaves out has the paper's physical value, not its number in N, mm, s.
+    """
+    layers = read_layers(builtin(DEFAULT))
+    contact = upper.entries.get("contact")
+    units = contact.entries.get("units") if isinstance(contact, Mapping) else None
+    if isinstance(units, Scalar) and units.value == "si":
+        layers = [layer.without("contact") for layer in layers]
+    tree = stacked([*layers, upper])
     tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
     return on_the_slope(typed(tree), tree)[0]
 
@@ -76,18 +78,6 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
         where = lines.keys.get("start", lines.position)
         text = f"start: case {case.name} starts with its feet together, and so pads of its step have no length"
         raise refusal([Problem(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")])
-
-
-def below(upper: Mapping) -> list[Mapping]:
-    """The layers of the paper config, without its contact block if `upper` has one in SI: its numbers are in N, mm, s.
-
-    What a block in SI leaves out has the paper's physical value all the same.
-    """
-    layers = read_layers(builtin(DEFAULT))
-    contact = upper.entries.get("contact")
-    units = contact.entries.get("units") if isinstance(contact, Mapping) else None
-    in_si = isinstance(units, Scalar) and units.value == "si"
-    return [layer.without("contact") for layer in layers] if in_si else layers
 
 
 def tree_of(value: Any, position: Position) -> Node:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any, Final
+from itertools import takewhile
+from typing import Any, Final, NoReturn
 
 from walkerlab.config.problems import Problem, refusal, shown
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
@@ -59,14 +60,10 @@ def read(text: str, source: str, column: int = 1) -> Node | None:
         raise refusal([Problem(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")])
     strange = _NOT_YAML.search(text)
     if strange:
-        where = _place(text, strange.start(), source, column)
+        lines = text[: strange.start()].split("\n")
+        where = Position(source, len(lines), len(lines[-1]) + (column if len(lines) == 1 else 1))
         raise refusal([Problem(where, f"character {shown(strange.group())} cannot be in a config, which is text")])
-    composer = _Composer(source, column)
-    for event in _events(text, source, column):
-        composer.take(event)
-    if composer.problems:
-        raise refusal(composer.problems)
-    return composer.root
+    return _Composer(source, column, _events(text, source, column)).document()
 
 
 def _events(text: str, source: str, column: int) -> Iterator[Any]:
@@ -87,90 +84,60 @@ def _position(mark: Any, source: str, column: int) -> Position:
     return Position(source, mark.line + 1, mark.column + (column if mark.line == 0 else 1))
 
 
-def _place(text: str, index: int, source: str, column: int) -> Position:
-    before = text[:index]
-    line = before.count("\n")
-    return Position(source, line + 1, index - (before.rfind("\n") + 1) + (column if line == 0 else 1))
-
-
 class _Composer:
-    """Builds the tree from events, without recursion."""
+    """Builds the tree from a parser's events, as deep as a config may be and no deeper."""
 
-    def __init__(self, source: str, column: int) -> None:
-        self.root: Node | None = None
-        self.problems: list[Problem] = []
-        self._source = source
-        self._column = column
-        self._open: list[Mapping | Sequence] = []
-        self._keys: list[Scalar | None] = []
-        self._documents = 0
+    def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
+        self._source, self._column, self._events = source, column, events
+        self._twice: list[Problem] = []
 
-    def take(self, event: Any) -> None:
-        """Take the next event of the parser."""
-        name = type(event).__name__
-        if name == "DocumentStartEvent":
-            self._start_document(event)
-        elif name == "ScalarEvent":
-            self._refuse_properties(event)
-            value = value_of(event.value) if event.implicit[0] else event.value
-            self._add(Scalar(self._at(event), value, event.value))
-        elif name == "MappingStartEvent":
-            self._descend(event, Mapping(self._at(event)))
-        elif name == "SequenceStartEvent":
-            self._descend(event, Sequence(self._at(event)))
-        elif name in ("MappingEndEvent", "SequenceEndEvent"):
-            self._open.pop()
-            self._keys.pop()
-        elif name == "AliasEvent":
+    def document(self) -> Node | None:
+        """The tree of the only document, None if there is nothing in it."""
+        root, documents = None, 0
+        for event in self._events:
+            name = type(event).__name__
+            if name == "DocumentStartEvent":
+                documents += 1
+                if documents > 1:
+                    self._refuse(event, "a second document begins: a config is one")
+                if event.version not in (None, (1, 2)):
+                    self._refuse(event, "a config is YAML 1.2")
+            elif name not in ("StreamStartEvent", "StreamEndEvent", "DocumentEndEvent"):
+                root = self._node(event, 0)
+        if self._twice:
+            raise refusal(self._twice)
+        return root
+
+    def _node(self, event: Any, depth: int) -> Node:
+        """What begins with an event."""
+        name, at = type(event).__name__, _position(event.start_mark, self._source, self._column)
+        if name == "AliasEvent":
             self._refuse(event, f"alias *{shown(event.anchor)}: a config has none; write the value out, or use extends")
-
-    def _start_document(self, event: Any) -> None:
-        self._documents += 1
-        if self._documents > 1:
-            self._refuse(event, "a second document begins: a config is one")
-        if event.version not in (None, (1, 2)):
-            self._refuse(event, "a config is YAML 1.2")
-
-    def _descend(self, event: Any, node: Mapping | Sequence) -> None:
-        self._refuse_properties(event)
-        if len(self._open) == MAX_DEPTH:
-            self._refuse(event, f"nested deeper than {MAX_DEPTH} levels")
-        self._add(node)
-        self._open.append(node)
-        self._keys.append(None)
-
-    def _add(self, node: Node) -> None:
-        if not self._open:
-            self.root = node
-            return
-        parent = self._open[-1]
-        if isinstance(parent, Sequence):
-            parent.items.append(node)
-            return
-        name = self._keys[-1]
-        if name is not None:
-            self._keys[-1] = None
-            self._enter(parent, name, node)
-        elif isinstance(node, Scalar):
-            self._keys[-1] = node
-        else:
-            raise refusal([Problem(node.position, "a key is a word, not a list or a block")])
-
-    def _enter(self, parent: Mapping, name: Scalar, node: Node) -> None:
-        first = parent.keys.get(name.text)
-        if first is None:
-            parent.put(name.text, node, name.position)
-        else:
-            self.problems.append(Problem(name.position, f"{shown(name.text)}: given a second time, first at {first}"))
-
-    def _refuse_properties(self, event: Any) -> None:
         if event.anchor is not None:
             self._refuse(event, f"anchor &{shown(event.anchor)}: a config has none; use extends to share values")
         if event.tag is not None:
             self._refuse(event, f"tag {shown(event.tag)}: a config has none; types are known from the keys")
+        if name == "ScalarEvent":
+            return Scalar(at, value_of(event.value) if event.implicit[0] else event.value, event.value)
+        if depth == MAX_DEPTH:
+            self._refuse(event, f"nested deeper than {MAX_DEPTH} levels")
+        if name == "SequenceStartEvent":
+            return Sequence(at, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
+        block = Mapping(at)
+        for word in self._until("MappingEndEvent"):
+            if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
+                self._refuse(word, "a key is a word, not a list or a block")
+            key, value = self._node(word, depth + 1), self._node(next(self._events), depth + 1)
+            assert isinstance(key, Scalar), "whatever else begins there is refused"
+            if key.text in block.keys:
+                first = block.keys[key.text]
+                self._twice.append(Problem(key.position, f"{shown(key.text)}: given a second time, first at {first}"))
+            else:
+                block.put(key.text, value, key.position)
+        return block
 
-    def _refuse(self, event: Any, reason: str) -> None:
-        raise refusal([*self.problems, Problem(self._at(event), reason)])
+    def _until(self, end: str) -> Iterator[Any]:
+        return takewhile(lambda event: type(event).__name__ != end, self._events)
 
-    def _at(self, event: Any) -> Position:
-        return _position(event.start_mark, self._source, self._column)
+    def _refuse(self, event: Any, reason: str) -> NoReturn:
+        raise refusal([*self._twice, Problem(_position(event.start_mark, self._source, self._column), reason)])

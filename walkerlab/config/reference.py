@@ -21,6 +21,7 @@ from walkerlab.errors import ConfigError
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
 """What tells a block's kinds apart in the name of a key; no config has it."""
+REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
@@ -50,22 +51,16 @@ def keys() -> Iterator[KeyReference]:
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
+    default = extra(field, "default_in_words") or ("none" if field.is_required() else _spelled(field.default))
     return KeyReference(
         key=".".join(path),
         type=kind(field.annotation),
         unit=extra(field, "unit"),
         bounds=bounds_of(field),
-        default=_default(field),
+        default=default,
         meaning=field.description or "",
         source=extra(field, "source"),
     )
-
-
-def _default(field: FieldInfo) -> str:
-    spoken = extra(field, "default_in_words")
-    if spoken or field.is_required():
-        return spoken or "none"
-    return _spelled(field.default)
 
 
 def _spelled(value: Any) -> str:
@@ -90,7 +85,13 @@ def as_paragraphs(asked: str = "") -> str:
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
-    return "\n\n".join("\n".join(_paragraph(key)) for key in asked_for(asked))
+    paragraphs = []
+    for key in asked_for(asked):
+        what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
+        facts = [", ".join(filter(None, what)), f"default: {key.default}", key.meaning, f"source: {key.source}"]
+        wrapped = [textwrap.fill(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ") for fact in facts]
+        paragraphs.append("\n".join([key.key, *filter(None, wrapped)]))
+    return "\n\n".join(paragraphs)
 
 
 def asked_for(asked: str) -> list[KeyReference]:
@@ -105,14 +106,6 @@ def asked_for(asked: str) -> list[KeyReference]:
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
     return found
-
-
-def _paragraph(key: KeyReference) -> Iterator[str]:
-    yield key.key
-    what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
-    facts = [", ".join(part for part in what if part), f"default: {key.default}", key.meaning, f"source: {key.source}"]
-    for fact in facts:
-        yield from textwrap.wrap(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ")
 
 
 def _line(cells: tuple[str, ...] | list[str], widths: list[int]) -> str:
@@ -147,7 +140,9 @@ def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
             parts = [block for block in of_kinds if block["properties"]["type"].get("const") == kind]
     unlike = list({json.dumps(part): part for part in parts}.values())
     found = unlike[0] if len(unlike) == 1 else {"anyOf": unlike}
-    needed = referred_to(found, definitions)
+    needed: set[str] = set()
+    while more := set(REFERENCE.findall(json.dumps([found, *(definitions[name] for name in needed)]))) - needed:
+        needed |= more
     return {**found, "$defs": {name: definitions[name] for name in sorted(needed)}} if needed else found
 
 
@@ -157,25 +152,6 @@ def blocks_of(part: dict[str, Any], definitions: dict[str, Any]) -> Iterator[dic
         yield part
     choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]
     if "$ref" in part:
-        choices.append(definitions[name_of(part["$ref"])])
+        choices.append(definitions[part["$ref"].rpartition("/")[2]])
     for choice in choices:
         yield from blocks_of(choice, definitions)
-
-
-def referred_to(part: Any, definitions: dict[str, Any]) -> set[str]:
-    """Names of the definitions that a part of a JSON schema refers to, in itself and in them."""
-    found: set[str] = set()
-    waiting = [part]
-    while waiting:
-        node = waiting.pop()
-        waiting += node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
-        reference = node.get("$ref") if isinstance(node, dict) else None
-        if isinstance(reference, str) and name_of(reference) not in found:
-            found.add(name_of(reference))
-            waiting.append(definitions[name_of(reference)])
-    return found
-
-
-def name_of(reference: str) -> str:
-    """The definition that a reference names."""
-    return reference.rsplit("/", 1)[-1]

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterator
 from typing import Any, Final
 
-from walkerlab.config.fields import Block, block_of
+from walkerlab.config.fields import block_of
 from walkerlab.config.numbers import short
 from walkerlab.config.schema import Config
 
@@ -24,23 +24,24 @@ def run_name(base: Config, changed: Config, slope_deg: float | None = None, run:
     """
     before, after = base.model_dump(mode="json"), changed.model_dump(mode="json")
     parts = []
-    for name, block in _added_blocks(before, after):
-        before[name] = block().model_dump(mode="json")
-        parts.append(f"{name}=added")
-    known = dict(_flat(before))
-    differing = [(key, value) for key, value in _flat(after) if key not in known or known[key] != value]
-    renamed = [value for key, value in differing if key == "name"]
-    parts += [_part(key, value, slope_deg) for key, value in differing if key != "name"]
-    whole, _, earlier = (renamed[0] if renamed else run or base.name).partition("@")
-    parts = [earlier, *parts] if earlier else parts
-    return f"{whole}@{_shortened(','.join(parts))}" if parts else str(whole)
-
-
-def _added_blocks(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, type[Block]]]:
     for name, field in Config.model_fields.items():
         block = block_of(field)
         if block is not None and before[name] is None and after[name] is not None:
-            yield name, block
+            before[name] = block().model_dump(mode="json")
+            parts.append(f"{name}=added")
+    known = dict(_flat(before))
+    differing = {key: value for key, value in _flat(after) if key not in known or known[key] != value}
+    renamed = differing.pop("name", None)
+    whole, _, earlier = (renamed or run or base.name).partition("@")
+    if slope_deg is not None and "slope_rad" in differing:
+        differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
+        differing["slope_deg"] = slope_deg
+    parts = [earlier] * bool(earlier) + parts + [f"{key}={_word(value)}" for key, value in differing.items()]
+    change = ",".join(parts)
+    if len(change) > MAX_CHANGE:
+        digest = hashlib.sha256(change.encode()).hexdigest()[:12]
+        change = f"{change[:KEPT_OF_A_LONG_CHANGE].rstrip('.,_=-')}-{digest}"
+    return f"{whole}@{change}" if change else whole
 
 
 def _flat(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -51,22 +52,9 @@ def _flat(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{name}", value
 
 
-def _part(key: str, value: Any, slope_deg: float | None) -> str:
-    if key == "slope_rad" and slope_deg is not None:
-        return f"slope_deg={short(slope_deg)}"
-    return f"{key}={_word(value)}"
-
-
 def _word(value: Any) -> str:
     if isinstance(value, list):
         return "_".join(_word(item) for item in value) or "none"
     if isinstance(value, int | float):
         return short(value)
-    return str(value) if value is not None else "none"
-
-
-def _shortened(change: str) -> str:
-    if len(change) <= MAX_CHANGE:
-        return change
-    digest = hashlib.sha256(change.encode()).hexdigest()[:12]
-    return f"{change[:KEPT_OF_A_LONG_CHANGE].rstrip('.,_=-')}-{digest}"
+    return "none" if value is None else str(value)

@@ -7,12 +7,11 @@ from importlib.util import find_spec
 from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
 
 from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, rigid_bodies, too_light_for_contact
@@ -41,16 +40,14 @@ CVODE_PACKAGE: Final = "sksundae"
 class SlopeInDegrees(Block):
     """The slope as a file or `--set` may give it instead of slope_rad; the resolved config has slope_rad only."""
 
-    slope_deg: Annotated[
-        float,
-        key(
-            "deg",
-            "slope in degrees; a file has one of slope_rad and slope_deg",
-            bounds="between -90 and 90, both excluded",
-            gt=-90.0,
-            lt=90.0,
-        ),
-    ]
+    slope_deg: float = key(
+        ...,
+        "deg",
+        "slope in degrees; a file has one of slope_rad and slope_deg",
+        bounds="between -90 and 90, both excluded",
+        gt=-90.0,
+        lt=90.0,
+    )
 
 
 SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
@@ -76,23 +73,35 @@ Factor = Annotated[float, Field(ge=-10.0, le=10.0)]
 Factors = tuple[Factor, Factor]
 
 _MEASURED: Final = "the measured error against run time"
-_Method = Annotated[Method, key("", "integration method", _MEASURED)]
-_Relative = Annotated[float, key("1", "relative tolerance", _MEASURED, ge=1e-14, le=0.1)]
-_Absolute = Annotated[float, key("rad, rad/s, m, m/s", "absolute tolerance", _MEASURED, gt=0.0, le=1.0)]
+
+
+def method(default: Method) -> Any:
+    """An integration method."""
+    return key(default, "", "integration method", _MEASURED)
+
+
+def relative(default: float) -> Any:
+    """A relative tolerance."""
+    return key(default, "1", "relative tolerance", _MEASURED, ge=1e-14, le=0.1)
+
+
+def absolute(default: float) -> Any:
+    """An absolute tolerance."""
+    return key(default, "rad, rad/s, m, m/s", "absolute tolerance", _MEASURED, gt=0.0, le=1.0)
 
 
 class SolverSettings(Block):
     """How one model is integrated."""
 
-    method: _Method = "dop853"
-    rtol: _Relative = 1.0e-10
-    atol: _Absolute = 1.0e-12
+    method: Method = method("dop853")
+    rtol: float = relative(1.0e-10)
+    atol: float = absolute(1.0e-12)
 
     @field_validator("method")
     @classmethod
     def _is_installed(cls, value: Method) -> Method:
         if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
-            raise PydanticCustomError("extra", "needs CVODE, which is not installed: pip install scikit-sundae")
+            raise wrong("needs CVODE, which is not installed: pip install scikit-sundae")
         return value
 
 
@@ -103,9 +112,9 @@ class RigidSolver(SolverSettings):
 class ContactSolver(SolverSettings):
     """How the contact model is integrated."""
 
-    method: _Method = "radau5"
-    rtol: _Relative = 1.0e-7
-    atol: _Absolute = 1.0e-9
+    method: Method = method("radau5")
+    rtol: float = relative(1.0e-7)
+    atol: float = absolute(1.0e-9)
 
 
 class Solvers(Block):
@@ -115,100 +124,93 @@ class Solvers(Block):
     contact: ContactSolver = ContactSolver()
 
 
-def factors(velocity: str) -> Any:
-    """Metadata of a range of factors."""
+def factors(least: float, most: float, velocity: str) -> Any:
+    """A range of factors on a velocity."""
     bounds = "two numbers from -10 to 10, the first below the second"
-    return key("1", f"least and largest factor on the {velocity}", bounds=bounds, sequence=True)
+    return key((least, most), "1", f"least and largest factor on the {velocity}", bounds=bounds, sequence=True)
 
 
 class Tune(Block):
     """Which starts the adjustment of the two initial angular velocities looks at."""
 
-    cells: Annotated[
-        int | None,
-        key(
-            "1",
-            "cells of the map along each of its axes, the factors on the two velocities",
-            default="61; 21 for other walkers than the paper's compass",
-            ge=2,
-            le=501,
-        ),
-    ] = None
-    swing_factors: Annotated[Factors, factors("swing leg's initial angular velocity dtheta_1")] = (0.0, 2.0)
-    stance_factors: Annotated[Factors, factors("stance leg's initial angular velocity dtheta_2")] = (0.85, 1.3)
-
-    rigid_limit: Annotated[
-        bool,
-        key(
-            "",
-            "whether the contact is also led towards the rigid limit, to see what 1e-4 takes",
-            bounds="true or false",
-        ),
-    ] = True
+    cells: int | None = key(
+        None,
+        "1",
+        "cells of the map along each of its axes, the factors on the two velocities",
+        default_in_words="61; 21 for other walkers than the paper's compass",
+        ge=2,
+        le=501,
+    )
+    swing_factors: Factors = factors(0.0, 2.0, "swing leg's initial angular velocity dtheta_1")
+    stance_factors: Factors = factors(0.85, 1.3, "stance leg's initial angular velocity dtheta_2")
+    rigid_limit: bool = key(
+        True,
+        "",
+        "whether the contact is also led towards the rigid limit, to see what 1e-4 takes",
+        bounds="true or false",
+    )
 
     @field_validator("swing_factors", "stance_factors")
     @classmethod
     def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[0] >= value[1]:
-            raise PydanticCustomError("order", "the first must be below the second")
+            raise wrong("the first must be below the second")
         return value
 
 
 class Source(Block):
     """The study that a config redoes, as the report names it."""
 
-    title: Annotated[str, key("", "title of the study", bounds="any text, not empty"), Field(min_length=1)]
-    authors: Annotated[str | None, key("", "its authors", bounds="any text")] = None
-    published: Annotated[str | None, key("", "where and when it was published", bounds="any text")] = None
-    url: Annotated[
-        str | None,
-        key("", "where it can be read", bounds="an address that begins with http:// or https://"),
-        Field(pattern=r"^https?://\S+$"),
-    ] = None
+    title: str = key(..., "", "title of the study", bounds="any text, not empty", min_length=1)
+    authors: str | None = key(None, "", "its authors", bounds="any text")
+    published: str | None = key(None, "", "where and when it was published", bounds="any text")
+    url: str | None = key(
+        None,
+        "",
+        "where it can be read",
+        bounds="an address that begins with http:// or https://",
+        pattern=r"^https?://\S+$",
+    )
 
 
 class Config(Block):
     """A scene and what is to be computed of it."""
 
-    name: Annotated[
-        str,
-        key(
-            "",
-            "name of the run folder",
-            default="the file's own name",
-            bounds="1 to 64 letters, digits, '.', '_' or '-', no '-' or '.' in front and no '.' at the end",
-        ),
-        Field(pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$"),
-    ] = "paper"
+    name: str = key(
+        "paper",
+        "",
+        "name of the run folder",
+        default_in_words="the file's own name",
+        bounds="1 to 64 letters, digits, '.', '_' or '-', no '-' or '.' in front and no '.' at the end",
+        pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$",
+    )
     source: Source | None = None
-    walker: Annotated[Walker, key("", "the walker; its keys depend on its type", "Fig. 1")] = CompassWalker()
-    gravity_m_s2: Annotated[float, key("m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)] = 9.81
-    slope_rad: Annotated[
-        float,
-        key(
-            "rad",
-            "slope, positive where it descends in the walking direction",
-            "not stated; both feet of x_p (eq. 11) stand on it",
-            bounds="between -pi/2 and pi/2, both excluded",
-            gt=-RIGHT_ANGLE,
-            lt=RIGHT_ANGLE,
-        ),
-    ] = 0.0174
-    equations: Annotated[
-        Equations,
-        key("", "corrected, or as-printed: Appendix A as the paper prints it", "Appendix A, eq. A.5: the sign of C_21"),
-    ] = "corrected"
-    start: Annotated[
-        Start,
-        key(
-            "rad, rad, rad/s, rad/s",
-            "fixed-point, or [theta_1, theta_2, dtheta_1, dtheta_2]; "
-            "theta_1 is replaced so that both feet stand on the slope",
-            "eq. 11",
-            bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
-        ),
-    ] = "fixed-point"
-    strides: Annotated[int, key("1", "strides to walk, one stride is two steps", ge=1, le=10_000)] = 5
+    walker: Walker = key(CompassWalker(), "", "the walker; its keys depend on its type", "Fig. 1")
+    gravity_m_s2: float = key(9.81, "m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)
+    slope_rad: float = key(
+        0.0174,
+        "rad",
+        "slope, positive where it descends in the walking direction",
+        "not stated; both feet of x_p (eq. 11) stand on it",
+        bounds="between -pi/2 and pi/2, both excluded",
+        gt=-RIGHT_ANGLE,
+        lt=RIGHT_ANGLE,
+    )
+    equations: Equations = key(
+        "corrected",
+        "",
+        "corrected, or as-printed: Appendix A as the paper prints it",
+        "Appendix A, eq. A.5: the sign of C_21",
+    )
+    start: Start = key(
+        "fixed-point",
+        "rad, rad, rad/s, rad/s",
+        "fixed-point, or [theta_1, theta_2, dtheta_1, dtheta_2]; "
+        "theta_1 is replaced so that both feet stand on the slope",
+        "eq. 11",
+        bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
+    )
+    strides: int = key(5, "1", "strides to walk, one stride is two steps", ge=1, le=10_000)
     contact: Contact | None = None
     solver: Solvers = Solvers()
     stability: Stability = Stability()
@@ -216,10 +218,10 @@ class Config(Block):
     continuation: Continuation = Continuation()
     basin: Basin = Basin()
     sweep: Sweep | None = None
-    outputs: Annotated[
-        tuple[Output, ...], key("", "what is stored", bounds="a list of states, energies, forces", sequence=True)
-    ] = OUTPUTS
-    seed: Annotated[int, key("1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)] = 0
+    outputs: tuple[Output, ...] = key(
+        OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces", sequence=True
+    )
+    seed: int = key(0, "1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)
 
     @field_validator("start")
     @classmethod
@@ -229,11 +231,7 @@ class Config(Block):
             return value
         numbers = 2 * rigid_bodies(walker)
         if len(value) != numbers:
-            raise PydanticCustomError(
-                "start",
-                "has {given} numbers, and this walker's state has {numbers}",
-                {"given": len(value), "numbers": numbers},
-            )
+            raise wrong(f"has {len(value)} numbers, and this walker's state has {numbers}")
         return value
 
     @field_validator("equations")
@@ -241,7 +239,7 @@ class Config(Block):
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
         walker = info.data.get("walker")
         if value == "as-printed" and walker is not None and not is_plain_compass(walker):
-            raise PydanticCustomError("printed", "as-printed are a compass's equations; this walker is another")
+            raise wrong("as-printed are a compass's equations; this walker is another")
         return value
 
     @field_validator("contact")
@@ -250,8 +248,7 @@ class Config(Block):
         walker = info.data.get("walker")
         why = "" if value is None or walker is None else too_light_for_contact(walker)
         if why:
-            advised = "leave the contact block out, or give the legs mass"
-            raise PydanticCustomError("massless", "{why}; {advised}", {"why": why, "advised": advised})
+            raise wrong(f"{why}; leave the contact block out, or give the legs mass")
         return value
 
     @field_validator("outputs")

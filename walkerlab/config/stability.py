@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
-from pydantic import Field, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 
 Fate = Literal[
     "walked",
@@ -28,52 +27,42 @@ NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
 class Case(Block):
     """One case: a few lines over the paper config, and what must become of it."""
 
-    name: Annotated[
-        str, key("", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'"), Field(pattern=NAME)
-    ]
-    family: Annotated[str, key("", "what it belongs to, for tables", bounds="as a name"), Field(pattern=NAME)] = "own"
-    model: Annotated[Literal["contact", "rigid"], key("", "which model walks")] = "contact"
-    config: Annotated[
-        dict[str, Any], key("", "keys of a config, over the paper's", bounds="a block of keys", default="none")
-    ] = Field(default_factory=dict)
-    steps: Annotated[int, key("1", "steps to walk", ge=1, le=2_000_000)] = 4
-    lowered_m: Annotated[
-        float, key("m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
-    ] = 0.0
-    expected: Annotated[
-        tuple[Fate, ...], key("", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}", sequence=True)
-    ]
-    reason: Annotated[str, key("", "why that is to be expected", bounds="a sentence")]
-    budget: Annotated[int, key("1", "right-hand sides it may evaluate", ge=1, le=100_000_000)] = 400_000
-    balance: Annotated[
-        float, key("1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
-    ] = 1e-6
-    agreement: Annotated[
-        float, key("1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", gt=0.0)
-    ] = 1e-4
-    compared_steps: Annotated[
-        int, key("1", "steps of which the times are compared: fewer where small errors grow", ge=1)
-    ] = 20
-    twin: Annotated[bool, key("", "whether a walker of another size must do the same", bounds="true or false")] = False
+    name: str = key(..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=NAME)
+    family: str = key("own", "", "what it belongs to, for tables", bounds="as a name", pattern=NAME)
+    model: Literal["contact", "rigid"] = key("contact", "", "which model walks")
+    config: dict[str, Any] = key(
+        dict, "", "keys of a config, over the paper's", bounds="a block of keys", default_in_words="none"
+    )
+    steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
+    lowered_m: float = key(0.0, "m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
+    expected: tuple[Fate, ...] = key(
+        ..., "", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}", sequence=True
+    )
+    reason: str = key(..., "", "why that is to be expected", bounds="a sentence")
+    budget: int = key(400_000, "1", "right-hand sides it may evaluate", ge=1, le=100_000_000)
+    balance: float = key(1e-6, "1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
+    agreement: float = key(
+        1e-4, "1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", gt=0.0
+    )
+    compared_steps: int = key(20, "1", "steps of which the times are compared: fewer where small errors grow", ge=1)
+    twin: bool = key(False, "", "whether a walker of another size must do the same", bounds="true or false")
 
     @field_validator("expected")
     @classmethod
     def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
         if not value:
-            raise PydanticCustomError("empty", "must name an outcome")
+            raise wrong("must name an outcome")
         return value
 
 
 class Stability(Block):
     """What `walkerlab stability` judges besides the catalogue."""
 
-    cases: Annotated[
-        tuple[Case, ...],
-        key(
-            "",
-            "cases of your own; a file that holds such a list may stand for it",
-            bounds="a list of cases, or a file",
-            sequence=True,
-        ),
-    ] = ()
-    map_cells: Annotated[int, key("1", "cells along each axis of the maps that --full makes", ge=2, le=201)] = 25
+    cases: tuple[Case, ...] = key(
+        (),
+        "",
+        "cases of your own; a file that holds such a list may stand for it",
+        bounds="a list of cases, or a file",
+        sequence=True,
+    )
+    map_cells: int = key(25, "1", "cells along each axis of the maps that --full makes", ge=2, le=201)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from pydantic import Field
-
 from walkerlab.config.fields import Block, key
 
 Values = str | list[float | int | bool | str]
@@ -14,26 +10,22 @@ Values = str | list[float | int | bool | str]
 class Sweep(Block):
     """What `walkerlab sweep` asks, unless its options say otherwise."""
 
-    stage: Annotated[str, key("", "stage whose numbers are wanted", bounds="a stage that draws nothing")] = "fixedpoint"
-    over: Annotated[
-        dict[str, Values],
-        key(
-            "",
-            "keys of a config with their values, in the key's unit; the last key changes fastest",
-            bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
-            default="none",
-        ),
-    ] = Field(default_factory=dict)
-    zip: Annotated[
-        bool, key("", "the n-th values of all keys make the n-th point, not each with each", bounds="true or false")
-    ] = False
-    sample: Annotated[
-        str,
-        key(
-            "",
-            "points drawn from the intervals instead",
-            bounds="latin-hypercube:N, sobol:N, random:N, or empty",
-            default="empty",
-        ),
-    ] = ""
-    seed: Annotated[int, key("1", "seed of that drawing", ge=0, le=2**32 - 1)] = 1
+    stage: str = key("fixedpoint", "", "stage whose numbers are wanted", bounds="a stage that draws nothing")
+    over: dict[str, Values] = key(
+        dict,
+        "",
+        "keys of a config with their values, in the key's unit; the last key changes fastest",
+        bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
+        default_in_words="none",
+    )
+    zip: bool = key(
+        False, "", "the n-th values of all keys make the n-th point, not each with each", bounds="true or false"
+    )
+    sample: str = key(
+        "",
+        "",
+        "points drawn from the intervals instead",
+        bounds="latin-hypercube:N, sobol:N, random:N, or empty",
+        default_in_words="empty",
+    )
+    seed: int = key(1, "1", "seed of that drawing", ge=0, le=2**32 - 1)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, TypeAlias
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -13,10 +13,14 @@ from pydantic_core import ErrorDetails
 from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
 from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
 from walkerlab.config.layers import stacked
+from walkerlab.config.numbers import short
 from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
 from walkerlab.config.schema import Config, SlopeInDegrees
-from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence, plain
-from walkerlab.config.walkers import PartsWalker
+from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
+from walkerlab.config.tree import Sequence as Listed
+from walkerlab.config.walkers import Kneed, PartsWalker
+
+Location: TypeAlias = tuple[int | str, ...]
 
 _REASONS: Final = {
     "float_type": "is not a number",
@@ -36,6 +40,13 @@ _REASONS: Final = {
     "union_tag_invalid": "is of no known type",
 }
 MAX_PROBLEMS: Final = 100
+NAMES_OF_BODIES: Final = {
+    "hinges": ("parent", "child"),
+    "particles": ("body",),
+    "feet": ("body",),
+    "couplings": ("body",),
+}
+MOVED_RAD: Final = 1e-12
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -62,6 +73,28 @@ def typed(tree: Mapping) -> Config:
     return config
 
 
+def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+    """`config` with theta_1 of its start such that both feet stand on the slope, theta_1 + theta_2 = -2 phi.
+
+    A start of legs with knees has both straight; a torso is on their bisector. With it what was moved, in words.
+    """
+    if isinstance(config.start, str) or isinstance(config.walker, PartsWalker):
+        return config, ()
+    given, stance, *others = config.start
+    swing = -2 * (config.slope_rad + config.walker.lean_rad) - stance
+    bodies = len(config.start) // 2
+    shank = (swing,) if isinstance(config.walker, Kneed) else ()
+    torso = (0.5 * (swing + stance),) if config.walker.torso is not None else ()
+    placed = config.model_copy(update={"start": (swing, stance, *shank, *torso, *others[bodies - 2 :])})
+    if abs(swing - given) <= MOVED_RAD:
+        return placed, ()
+    moved = (
+        f"{tree.entries['start'].position}: start: theta_1 moved from {short(given)} to {short(swing)} rad, "
+        f"so that both feet stand on the slope of {short(config.slope_rad)} rad"
+    )
+    return placed, (moved,)
+
+
 def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
     """Raise ConfigError with their places for parts that are on bodies that the walker has not, or on the wrong leg."""
     walker = config.walker
@@ -69,36 +102,31 @@ def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
         return
     bodies = [body.name for body in walker.bodies]
     problems = []
+
+    def refuse(place: Location, why: str, allowed: Sequence[str], near: str = "") -> None:
+        text = f"{'.'.join(map(str, place))}: {why}"
+        problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(allowed), near))
+
     for place, name in bodies_named(walker):
         if name not in bodies:
-            text = f"{dotted(place)}: {shown(name)} is not a body"
-            problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(bodies), nearest(name, bodies)))
+            refuse(("walker", *place), f"{shown(name)} is not a body", bodies, nearest(name, bodies))
     for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
         if foot.body in bodies and foot.body not in leg:
-            place = ("walker", "feet", k, "body")
-            text = f"{dotted(place)}: {shown(foot.body)} is not of leg {k + 1}, whose foot this is"
-            problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(leg)))
+            why = f"{shown(foot.body)} is not of leg {k + 1}, whose foot this is"
+            refuse(("walker", "feet", k, "body"), why, leg)
     if problems:
         raise refusal(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
 
 
-def bodies_named(walker: PartsWalker) -> Iterator[tuple[tuple[int | str, ...], str]]:
+def bodies_named(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
     """Where parts name a body, and which."""
-    for k, hinge in enumerate(walker.hinges):
-        yield ("walker", "hinges", k, "parent"), hinge.parent
-        yield ("walker", "hinges", k, "child"), hinge.child
-    for key in ("particles", "feet", "couplings"):
+    for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
-            yield ("walker", key, k, "body"), part.body
+            yield from (((key, k, name), getattr(part, name)) for name in names)
     for k, coupling in enumerate(walker.couplings):
-        yield from ((("walker", "couplings", k, "of", n), name) for n, name in enumerate(coupling.of))
+        yield from ((("couplings", k, "of", n), name) for n, name in enumerate(coupling.of))
     for k, leg in enumerate(walker.legs):
-        yield from ((("walker", "legs", k, n), name) for n, name in enumerate(leg))
-
-
-def dotted(place: tuple[int | str, ...]) -> str:
-    """A place in a config as a key, places in lists counted from 0."""
-    return ".".join(map(str, place))
+        yield from ((("legs", k, n), name) for n, name in enumerate(leg))
 
 
 def _place(problem: Problem) -> tuple[str, int, int]:
@@ -112,109 +140,98 @@ def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list
 
 
 def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem:
-    location = without_kinds(model, detail["loc"])
-    if detail["type"] == "union_tag_invalid":
-        return _unknown_kind(location, tree, model)
-    if detail["type"] == "extra_forbidden":
+    location, what = detail["loc"], detail["type"]
+    kinds = kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
+    if what == "union_tag_invalid":
+        node, position = _node_at(tree, (*location, "type"))
+        word = str(node.value) if isinstance(node, Scalar) else ""
+        text = f"{location[0]}.type: {shown(word)} is of no known type"
+        return Problem(position, text, f"one of {', '.join(kinds)}", nearest(word, kinds))
+    if len(location) > 1 and location[1] in kinds:  # pydantic's word for the kind that it tried
+        location = (location[0], *location[2:])
+    if what == "extra_forbidden":
         return _unknown_key(location, tree)
-    path, field = _field_at(model, location, tree)
+    path, field, _ = _along(model, location, tree)
+    assert field is not None, "a key that is wrong is a key"
+    key = ".".join(path)
     node, position = _node_at(tree, location)
-    if node is None and detail["type"] == "missing":
-        return Problem(position, f"{'.'.join(path)}: is missing", allowed(field))
+    if node is None and what == "missing":
+        return Problem(position, f"{key}: is missing", allowed(field))
     value = shown_value(node) if node else f"{detail['input']} (its default)"
-    text = f"{'.'.join(path)}: {value} {_REASONS.get(detail['type'], detail['msg'])}"
+    reason = _REASONS.get(what, detail["msg"])
+    units = _node_at(tree, ("contact", "units"))[1]
+    if (
+        what not in _REASONS
+        and path[0] == "contact"
+        and units.source.startswith("--")
+        and units.source != position.source
+    ):
+        return Problem(units, f"contact.units: {key} stays {value}, as {position.source} has it, and {reason}")
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field)) if word else ""
-    return Problem(position, text, allowed(field) if detail["type"] in _REASONS else "", meant if meant != word else "")
+    right = allowed(field) if what in _REASONS else ""
+    return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 
 
-def without_kinds(model: type[Block], location: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """A location without the words that tell a block's kinds apart, which pydantic puts into it."""
-    path: list[int | str] = []
+def _along(
+    model: type[Block], location: Location, tree: Mapping
+) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
+    """Key and field that a location is in, and the block that it holds in this tree, by the block's `type`.
+
+    What lies deeper (an item of a list, a kind of value) is left away.
+    """
+    path: list[str] = []
+    field: FieldInfo | None = None
     block: type[Block] | None = model
-    kinds: dict[str, type[Block]] = {}
     for part in location:
-        if part in kinds:
-            block, kinds = kinds[str(part)], {}
-            continue
-        path.append(part)
-        if isinstance(part, str) and block is not None and part in block.model_fields:
-            field = block.model_fields[part]
-            block, kinds = block_of(field), kinds_of(field)
-    return tuple(path)
+        if isinstance(part, int) and block is not None:
+            continue  # an item of a list of blocks
+        if block is None or str(part) not in block.model_fields:
+            break
+        path.append(str(part))
+        field = block.model_fields[str(part)]
+        node, _ = _node_at(tree, tuple(path))
+        chosen = node.entries.get("type") if isinstance(node, Mapping) else None
+        kind = str(chosen.value) if isinstance(chosen, Scalar) else ""
+        block = kinds_of(field).get(kind) or block_of(field)
+    return path, field, block
 
 
-def _kinds_in(tree: Mapping, path: tuple[int | str, ...], field: FieldInfo) -> type[Block] | None:
-    """The block that a key holds in this tree, by its `type`."""
-    kinds = kinds_of(field)
-    node, _ = _node_at(tree, path)
-    if not kinds or not isinstance(node, Mapping):
-        return block_of(field)
-    chosen = node.entries.get("type")
-    return kinds.get(str(chosen.value) if isinstance(chosen, Scalar) else "", block_of(field))
-
-
-def _unknown_kind(location: tuple[int | str, ...], tree: Mapping, model: type[Block]) -> Problem:
-    kinds = kinds_of(model.model_fields[str(location[0])])
-    node, position = _node_at(tree, (*location, "type"))
-    word = str(node.value) if isinstance(node, Scalar) else ""
-    text = f"{location[0]}.type: {shown(word)} is of no known type"
-    return Problem(position, text, f"one of {', '.join(kinds)}", nearest(word, kinds))
-
-
-def _unknown_key(location: tuple[int | str, ...], tree: Mapping) -> Problem:
-    path = tuple(part for part in location if isinstance(part, str))  # without places in lists
-    block: type[Block] = Config
-    for depth, above in enumerate(path[:-1]):
-        if above in block.model_fields:
-            field = block.model_fields[above]
-            block = _kinds_in(tree, path[: depth + 1], field) or block
-            if depth == len(path) - 2 and any(path[-1] in kind.model_fields for kind in kinds_of(field).values()):
-                return _key_of_another_kind(path, tree, block, kinds_of(field))
-    name = path[-1]
+def _unknown_key(location: Location, tree: Mapping) -> Problem:
+    above, field, held = _along(Config, location[:-1], tree)
+    name, block = str(location[-1]), held or Config
+    kinds = {} if field is None else kinds_of(field)
     parent, _ = _node_at(tree, location[:-1])
-    position = parent.keys[name] if isinstance(parent, Mapping) else tree.position
-    node, _ = _node_at(tree, location)
-    if path == ("extends",):
-        return Problem(position, "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
+    assert isinstance(parent, Mapping), "it holds the key"
+    if any(name in kind.model_fields for kind in kinds.values()):
+        return _keys_of_another_kind(".".join(above), parent, parent.keys[name].source, block, kinds)
+    if location == ("extends",):
+        return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
     beside = nearest(name, siblings) if "." not in name else ""
-    meant = ".".join((*path[:-1], beside)) if beside else _elsewhere(name, exactly=len(path) > 1)
-    value = f" ({shown_value(node)})" if node else ""
-    text = f"{shown('.'.join(path))}: unknown key{value}"
-    return Problem(position, text, ", ".join(siblings), meant)
+    meant = ".".join((*above, beside)) if beside else _elsewhere(name, exactly=bool(above))
+    text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
+    return Problem(parent.keys[name], text, ", ".join(siblings), meant)
 
 
-def _key_of_another_kind(
-    path: tuple[str, ...], tree: Mapping, block: type[Block], kinds: dict[str, type[Block]]
+def _keys_of_another_kind(
+    above: str, given: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
 ) -> Problem:
-    """What to say of a key that another type of the block has; the same for all such keys of one source."""
-    given, _ = _node_at(tree, path[:-1])
-    assert isinstance(given, Mapping), "it holds the key"
-    source = given.keys[path[-1]].source
+    """What to say of keys that another type of a block has; the same for all such keys of one source."""
     others = {key for one in kinds.values() for key in one.model_fields} - {*block.model_fields}
     strange = {key: place for key, place in given.keys.items() if key in others and place.source == source}
     where = next(iter(strange.values()))
     chosen = next(kind for kind, one in kinds.items() if one is block)
     other = next(kind for kind, one in kinds.items() if next(iter(strange)) in one.model_fields)
-    above, keys = ".".join(path[:-1]), ", ".join(strange)
     type_at = given.keys.get("type", where)
+    has_no = f"has no {', '.join(strange)} (of type {other})"
     if source.startswith("--") or type_at.source in (source, builtin(DEFAULT).label):
-        text = f"{above}.type is {chosen}, which has no {keys} (of type {other})"
-        return Problem(where, text, ", ".join(block.model_fields))
-    text = f"{above}.type: {chosen} has no {keys} (of type {other}), given at {where}"
-    begin = builtin_of_type(above, chosen)
+        return Problem(where, f"{above}.type is {chosen}, which {has_no}", ", ".join(block.model_fields))
+    layers = {name: stacked(read_layers(builtin(name))) for name in (DEFAULT, *builtin_names())}
+    types = {name: _node_at(tree, (above, "type"))[0] for name, tree in layers.items()}
+    begin = next(name for name, node in types.items() if isinstance(node, Scalar) and node.value == chosen)
     instead = f"`-c {begin}`, in a file `extends: {begin}`; or the whole {above} block in a file without `extends`"
-    return Problem(type_at, text, instead)
-
-
-def builtin_of_type(block: str, kind: str) -> str:
-    """The first built-in config whose block is of that type."""
-    for name in (DEFAULT, *builtin_names()):
-        node, _ = _node_at(stacked(read_layers(builtin(name))), (block, "type"))
-        if isinstance(node, Scalar) and node.value == kind:
-            return name
-    raise AssertionError("each type has a built-in config")
+    return Problem(type_at, f"{above}.type: {chosen} {has_no}, given at {where}", instead)
 
 
 def _elsewhere(name: str, exactly: bool) -> str:
@@ -227,22 +244,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
     return paths.get(found, "")
 
 
-def _field_at(model: type[Block], location: tuple[int | str, ...], tree: Mapping) -> tuple[list[str], FieldInfo]:
-    """Key and field that a location is in; what lies deeper (an item of a list, a kind of value) is left away."""
-    path = [str(location[0])]
-    field = model.model_fields[path[0]]
-    for part in location[1:]:
-        block = _kinds_in(tree, tuple(path), field)
-        if isinstance(part, int) and block is not None:
-            continue  # an item of a list of blocks
-        if block is None or str(part) not in block.model_fields:
-            break
-        path.append(str(part))
-        field = block.model_fields[str(part)]
-    return path, field
-
-
-def _node_at(tree: Mapping, location: tuple[int | str, ...]) -> tuple[Node | None, Position]:
+def _node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
     """The value at a location and its position; for a key that is not in the tree None and the block it is missing in.
 
     Parts of the location that are not in the tree, such as the kind of value pydantic tried, are passed over.
@@ -254,7 +256,7 @@ def _node_at(tree: Mapping, location: tuple[int | str, ...]) -> tuple[Node | Non
             if part not in node.entries:
                 return None, position
             position, node = node.keys[part], node.entries[part]
-        elif isinstance(node, Sequence) and isinstance(part, int) and part < len(node.items):
+        elif isinstance(node, Listed) and isinstance(part, int) and part < len(node.items):
             node = node.items[part]
             position = node.position
     return node, node.position

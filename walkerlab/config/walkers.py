@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.numbers import same
 from walkerlab.errors import ConfigError
 
@@ -25,77 +26,113 @@ Point = tuple[Metres, Metres]
 LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
-def length(meaning: str, source: str = "this project") -> Any:
-    """Metadata of a length."""
-    return key("m", meaning, source, ge=1e-3, le=LONGEST)
+def length(default: Any, meaning: str, source: str = "this project") -> Any:
+    """A length."""
+    return key(default, "m", meaning, source, ge=1e-3, le=LONGEST)
 
 
-def mass(meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
-    """Metadata of a mass."""
-    return key("kg", meaning, source, ge=least, le=HEAVIEST)
+def mass(default: Any, meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
+    """A mass."""
+    return key(default, "kg", meaning, source, ge=least, le=HEAVIEST)
 
 
-def offset(meaning: str, source: str) -> Any:
-    """Metadata of a place beside another one."""
-    return key("m", meaning, source, ge=-LONGEST, le=LONGEST)
+def offset(default: Any, meaning: str, source: str) -> Any:
+    """A place beside another one."""
+    return key(default, "m", meaning, source, ge=-LONGEST, le=LONGEST)
 
 
-def inertia(of: str, source: str = "a point mass") -> Any:
-    """Metadata of an inertia."""
-    return key("kg m^2", f"inertia of {of} about its own centre of mass", source, ge=0.0, le=1e9)
+def inertia(default: Any, of: str, source: str = "a point mass") -> Any:
+    """An inertia."""
+    return key(default, "kg m^2", f"inertia of {of} about its own centre of mass", source, ge=0.0, le=1e9)
 
 
 def point(meaning: str) -> Any:
-    """Metadata of a point in a body's frame."""
-    return key("m", meaning, bounds="two numbers, ahead and up", sequence=True)
+    """A point in a body's frame."""
+    return key(..., "m", meaning, bounds="two numbers, ahead and up", sequence=True)
 
 
-def refuse(kind: str, reason: str) -> PydanticCustomError:
-    """What cannot be meant, with the reason."""
-    return PydanticCustomError("walker", reason.replace("{", "(").replace("}", ")"), {"kind": kind})
+def named(meaning: str) -> Any:
+    """A name of a part."""
+    return key(..., "", meaning, bounds="any text")
+
+
+def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -> Any:
+    """A list of blocks."""
+    bounds = f"blocks of {number}{', '.join(of.model_fields)}"
+    return key(default, "", meaning, bounds=bounds, sequence=True)
+
+
+def below(name: str, limit: Callable[[dict[str, Any]], float]) -> Any:
+    """A check that a foot's arc is smaller than what it belongs to, which the keys above it say."""
+
+    def arc(value: float, info: ValidationInfo) -> float:
+        with suppress(KeyError):  # what is wrong with the key above is told
+            if value >= (longest := limit(info.data)):
+                raise wrong(f"must be below {name}, {longest:g}")
+        return value
+
+    return field_validator("foot_radius_m")(arc)
+
+
+def turns(inertia: str, why: str, *places: str) -> Any:
+    """A check that a part with its mass on the hinge above it, as the keys of `places` say, has an inertia."""
+
+    def some(value: float, info: ValidationInfo) -> float:
+        if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
+            raise wrong(f"is 0 with {why} would be massless")
+        return value
+
+    return field_validator(inertia)(some)
 
 
 class Torso(Block):
     """An upper body at the hip, kept on the bisector of the legs."""
 
-    mass_kg: Annotated[float, mass("mass of the torso")]
-    above_hip_m: Annotated[float, key("m", "its centre of mass above the hip", ge=0.0, le=LONGEST)]
-    inertia_kg_m2: Annotated[float, inertia("the torso")] = 0.0
-    held: Annotated[
-        Literal["bisecting"], key("", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)")
-    ] = "bisecting"
+    mass_kg: float = mass(..., "mass of the torso")
+    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=LONGEST)
+    inertia_kg_m2: float = inertia(0.0, "the torso")
+    held: Literal["bisecting"] = key(
+        "bisecting", "", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"
+    )
 
 
-class CompassWalker(Block):
+class _Legged(Block):
+    """What walkers have in common."""
+
+    @property
+    def lean_rad(self) -> float:
+        """Angle of the line from hip to foot centre in an upright leg; of parts a start is taken as given."""
+        return 0.0
+
+
+class CompassWalker(_Legged):
     """Two straight legs, each with a mass on it, and a mass at the hip."""
 
-    type: Annotated[Literal["compass"], key("", "kind of walker", "Fig. 1")] = "compass"
-    leg_length_m: Annotated[float, length("L, from foot to hip", "Table 1")] = 1.0
-    foot_to_mass_m: Annotated[
-        float,
-        key(
-            "m",
-            "a, from foot to leg mass; b = L - a is the rest",
-            "section 2: 'in the middle of the legs'",
-            bounds="from 0 to below leg_length_m",
-            default="leg_length_m / 2",
-            ge=0.0,
-        ),
-    ] = Field(default_factory=lambda data: data.get("leg_length_m", 1.0) / 2)
-    leg_mass_kg: Annotated[float, mass("m, mass of one leg", "Table 1")] = 5.0
-    hip_mass_kg: Annotated[float, mass("M_H, mass at the hip", "Table 1", 0.0)] = 10.0
-    leg_inertia_kg_m2: Annotated[float, inertia("one leg", "section 4: point masses")] = 0.0
-    foot_radius_m: Annotated[
-        float,
-        key(
-            "m",
-            "radius of the ball foot of the contact model, 0 is a point; its centre is L - r from the hip",
-            "section 4: 'beveled with a radius of 1 mm'",
-            bounds="from 0 to below leg_length_m / 2",
-            ge=0.0,
-        ),
-    ] = 0.001
+    type: Literal["compass"] = key("compass", "", "kind of walker", "Fig. 1")
+    leg_length_m: float = length(1.0, "L, from foot to hip", "Table 1")
+    foot_to_mass_m: float = key(
+        lambda data: data.get("leg_length_m", 1.0) / 2,
+        "m",
+        "a, from foot to leg mass; b = L - a is the rest",
+        "section 2: 'in the middle of the legs'",
+        bounds="from 0 to below leg_length_m",
+        default_in_words="leg_length_m / 2",
+        ge=0.0,
+    )
+    leg_mass_kg: float = mass(5.0, "m, mass of one leg", "Table 1")
+    hip_mass_kg: float = mass(10.0, "M_H, mass at the hip", "Table 1", 0.0)
+    leg_inertia_kg_m2: float = inertia(0.0, "one leg", "section 4: point masses")
+    foot_radius_m: float = key(
+        0.001,
+        "m",
+        "radius of the ball foot of the contact model, 0 is a point; its centre is L - r from the hip",
+        "section 4: 'beveled with a radius of 1 mm'",
+        bounds="from 0 to below leg_length_m / 2",
+        ge=0.0,
+    )
     torso: Torso | None = None
+
+    _arc = below("half of leg_length_m", lambda data: data["leg_length_m"] / 2)
 
     @field_validator("foot_to_mass_m")
     @classmethod
@@ -104,14 +141,7 @@ class CompassWalker(Block):
         if length is None or value < length:
             return value
         massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
-        reason = f"{massless if value == length else ''}must be below leg_length_m, {{length}}"
-        raise PydanticCustomError("off-leg", reason, {"length": f"{length:g}"})
-
-    @field_validator("foot_radius_m")
-    @classmethod
-    def _foot_is_smaller_than_half_a_leg(cls, value: float, info: ValidationInfo) -> float:
-        length = info.data.get("leg_length_m")
-        return arc_within(value, length and length / 2, "half of leg_length_m")
+        raise wrong(f"{massless if value == length else ''}must be below leg_length_m, {length:g}")
 
     @property
     def mass_to_hip_m(self) -> float:
@@ -123,39 +153,27 @@ class CompassWalker(Block):
         """Two legs, the hip and a torso, kg."""
         return 2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso)
 
-    @property
-    def lean_rad(self) -> float:
-        """Angle of the line from hip to foot in an upright leg."""
-        return 0.0
 
-
-class StraightLegs(Block):
+class StraightLegs(_Legged):
     """Two straight legs of any distribution of mass, whose feet are arcs that roll in both models."""
 
-    type: Annotated[Literal["straight-legs"], key("", "kind of walker", WISSE)] = "straight-legs"
-    leg_length_m: Annotated[float, length("hip to sole, foot included", WISSE)] = 0.4
-    leg_mass_kg: Annotated[float, mass("mass of one leg", WISSE)] = 1.0
-    leg_mass_below_hip_m: Annotated[float, offset("a leg's centre of mass below the hip", WISSE)] = 0.1
-    leg_mass_ahead_m: Annotated[float, offset("a leg's centre of mass ahead of its line, leg upright", WISSE)] = 0.0
-    leg_inertia_kg_m2: Annotated[float, inertia("one leg")] = 0.01
-    hip_mass_kg: Annotated[float, mass("mass at the hip", WISSE, 0.0)] = 0.0
-    foot_radius_m: Annotated[
-        float, key("m", "radius of the sole's arc, 0 is a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0)
-    ] = 0.1
-    foot_centre_ahead_m: Annotated[float, offset("the arc's centre ahead of the leg's line", WISSE)] = 0.0
+    type: Literal["straight-legs"] = key("straight-legs", "", "kind of walker", WISSE)
+    leg_length_m: float = length(0.4, "hip to sole, foot included", WISSE)
+    leg_mass_kg: float = mass(1.0, "mass of one leg", WISSE)
+    leg_mass_below_hip_m: float = offset(0.1, "a leg's centre of mass below the hip", WISSE)
+    leg_mass_ahead_m: float = offset(0.0, "a leg's centre of mass ahead of its line, leg upright", WISSE)
+    leg_inertia_kg_m2: float = inertia(0.01, "one leg")
+    hip_mass_kg: float = mass(0.0, "mass at the hip", WISSE, 0.0)
+    foot_radius_m: float = key(
+        0.1, "m", "radius of the sole's arc, 0 is a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0
+    )
+    foot_centre_ahead_m: float = offset(0.0, "the arc's centre ahead of the leg's line", WISSE)
     torso: Torso | None = None
 
-    @field_validator("leg_inertia_kg_m2")
-    @classmethod
-    def _turns(cls, value: float, info: ValidationInfo) -> float:
-        if value == 0.0 and info.data.get("leg_mass_below_hip_m") == 0.0 and info.data.get("leg_mass_ahead_m") == 0.0:
-            raise refuse("massless", "is 0 with the leg's mass at the hip: the swing leg would be massless")
-        return value
-
-    @field_validator("foot_radius_m")
-    @classmethod
-    def _arc_fits(cls, value: float, info: ValidationInfo) -> float:
-        return arc_within(value, info.data.get("leg_length_m"), "leg_length_m")
+    _arc = below("leg_length_m", lambda data: data["leg_length_m"])
+    _inertia = turns(
+        "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
+    )
 
     @property
     def total_mass_kg(self) -> float:
@@ -171,68 +189,58 @@ class StraightLegs(Block):
 class Thigh(Block):
     """The upper half of a leg with a knee."""
 
-    length_m: Annotated[float, length("hip to knee", HSU_CHEN)] = 0.5
-    mass_kg: Annotated[float, mass("mass of one thigh", HSU_CHEN)] = 0.5
-    mass_below_hip_m: Annotated[float, offset("its centre of mass below the hip", HSU_CHEN)] = 0.325
-    mass_ahead_m: Annotated[float, offset("its centre of mass ahead", HSU_CHEN)] = 0.0
-    inertia_kg_m2: Annotated[float, inertia("one thigh")] = 0.0
+    length_m: float = length(0.5, "hip to knee", HSU_CHEN)
+    mass_kg: float = mass(0.5, "mass of one thigh", HSU_CHEN)
+    mass_below_hip_m: float = offset(0.325, "its centre of mass below the hip", HSU_CHEN)
+    mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
+    inertia_kg_m2: float = inertia(0.0, "one thigh")
 
 
 class Shank(Block):
     """The lower half of a leg with a knee, foot included."""
 
-    length_m: Annotated[float, length("knee to sole", HSU_CHEN)] = 0.5
-    mass_kg: Annotated[float, mass("mass of one shank", HSU_CHEN)] = 0.05
-    mass_below_knee_m: Annotated[float, offset("its centre of mass below the knee", HSU_CHEN)] = 0.125
-    mass_ahead_m: Annotated[float, offset("its centre of mass ahead", HSU_CHEN)] = 0.0
-    inertia_kg_m2: Annotated[float, inertia("one shank")] = 0.0
+    length_m: float = length(0.5, "knee to sole", HSU_CHEN)
+    mass_kg: float = mass(0.05, "mass of one shank", HSU_CHEN)
+    mass_below_knee_m: float = offset(0.125, "its centre of mass below the knee", HSU_CHEN)
+    mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
+    inertia_kg_m2: float = inertia(0.0, "one shank")
 
-    @field_validator("inertia_kg_m2")
-    @classmethod
-    def _turns(cls, value: float, info: ValidationInfo) -> float:
-        if value == 0.0 and info.data.get("mass_below_knee_m") == 0.0 and info.data.get("mass_ahead_m") == 0.0:
-            raise refuse("massless", "is 0 with the shank's mass at the knee: the shank would be massless")
-        return value
+    _inertia = turns("inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m")
 
 
 class KneeJoint(Block):
     """How knees lock and are released."""
 
-    lock: Annotated[
-        Literal["ideal", "compliant"],
-        key("", "ideal: a plastic impact, then one body; compliant: a one-sided stop, then latched", HSU_CHEN),
-    ] = "ideal"
-    at_heel_strike: Annotated[
-        Literal["locked", "free"],
-        key("", "the trailing knee during the heel strike: locked and released just after it, or free", HSU_CHEN),
-    ] = "locked"
-    release: Annotated[
-        Literal["compression", "touch"],
-        key("", "contact model: released when the leading foot stops sinking in, or at its first touch"),
-    ] = "compression"
-    stop_stiffness: Annotated[float, key("N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)] = 1.0e5
-    stop_damping: Annotated[float, key("N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)] = 90.0
+    lock: Literal["ideal", "compliant"] = key(
+        "ideal", "", "ideal: a plastic impact, then one body; compliant: a one-sided stop, then latched", HSU_CHEN
+    )
+    at_heel_strike: Literal["locked", "free"] = key(
+        "locked",
+        "",
+        "the trailing knee during the heel strike: locked and released just after it, or free",
+        HSU_CHEN,
+    )
+    release: Literal["compression", "touch"] = key(
+        "compression", "", "contact model: released when the leading foot stops sinking in, or at its first touch"
+    )
+    stop_stiffness: float = key(1.0e5, "N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)
+    stop_damping: float = key(90.0, "N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)
 
 
-class Kneed(Block):
+class Kneed(_Legged):
     """Two legs with knees that lock straight before the foot comes down."""
 
-    type: Annotated[Literal["kneed"], key("", "kind of walker", HSU_CHEN)] = "kneed"
+    type: Literal["kneed"] = key("kneed", "", "kind of walker", HSU_CHEN)
     thigh: Thigh = Thigh()
     shank: Shank = Shank()
-    hip_mass_kg: Annotated[float, mass("mass at the hip", HSU_CHEN, 0.0)] = 0.5
-    foot_radius_m: Annotated[
-        float,
-        key("m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below shank.length_m", ge=0.0),
-    ] = 0.0
+    hip_mass_kg: float = mass(0.5, "mass at the hip", HSU_CHEN, 0.0)
+    foot_radius_m: float = key(
+        0.0, "m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below shank.length_m", ge=0.0
+    )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
 
-    @field_validator("foot_radius_m")
-    @classmethod
-    def _arc_fits(cls, value: float, info: ValidationInfo) -> float:
-        shank = info.data.get("shank")
-        return arc_within(value, None if shank is None else shank.length_m, "shank.length_m")
+    _arc = below("shank.length_m", lambda data: data["shank"].length_m)
 
     @property
     def leg_length_m(self) -> float:
@@ -244,92 +252,65 @@ class Kneed(Block):
         """Two legs, the hip and a torso, kg."""
         return 2 * (self.thigh.mass_kg + self.shank.mass_kg) + self.hip_mass_kg + torso_mass(self.torso)
 
-    @property
-    def lean_rad(self) -> float:
-        """Angle of the line from hip to foot in an upright leg."""
-        return 0.0
-
 
 class PartBody(Block):
     """A rigid body with a frame of its own, upright as the walker stands."""
 
-    name: Annotated[str, key("", "name of the body", bounds="any text")]
-    mass_kg: Annotated[float, mass("its mass", least=0.0)]
-    centre_m: Annotated[Point, point("its centre of mass")]
-    inertia_kg_m2: Annotated[float, inertia("the body")] = 0.0
+    name: str = named("name of the body")
+    mass_kg: float = mass(..., "its mass", least=0.0)
+    centre_m: Point = point("its centre of mass")
+    inertia_kg_m2: float = inertia(0.0, "the body")
 
 
 class PartHinge(Block):
     """A frictionless hinge between points of two bodies."""
 
-    name: Annotated[str, key("", "name of the hinge", bounds="any text")]
-    parent: Annotated[str, key("", "one body", bounds="any text")]
-    parent_point_m: Annotated[Point, point("the hinge in its frame")]
-    child: Annotated[str, key("", "the other body", bounds="any text")]
-    child_point_m: Annotated[Point, point("the hinge in its frame")]
-    locks: Annotated[
-        bool, key("", "whether it is a knee, parent the thigh and child the shank", bounds="true or false")
-    ] = False
+    name: str = named("name of the hinge")
+    parent: str = named("one body")
+    parent_point_m: Point = point("the hinge in its frame")
+    child: str = named("the other body")
+    child_point_m: Point = point("the hinge in its frame")
+    locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank", bounds="true or false")
 
 
 class PartParticle(Block):
     """A point mass fixed to a body."""
 
-    name: Annotated[str, key("", "name of the particle", bounds="any text")]
-    mass_kg: Annotated[float, mass("its mass", least=0.0)]
-    body: Annotated[str, key("", "the body it is fixed to", bounds="any text")]
-    at_m: Annotated[Point, point("where, in its frame")]
+    name: str = named("name of the particle")
+    mass_kg: float = mass(..., "its mass", least=0.0)
+    body: str = named("the body it is fixed to")
+    at_m: Point = point("where, in its frame")
 
 
 class PartFoot(Block):
     """A foot: an arc about a point of a body."""
 
-    body: Annotated[str, key("", "the body it belongs to", bounds="any text")]
-    centre_m: Annotated[Point, point("the arc's centre in its frame")]
-    radius_m: Annotated[float, key("m", "radius of the arc, 0 is a point", ge=0.0, le=LONGEST)] = 0.0
+    body: str = named("the body it belongs to")
+    centre_m: Point = point("the arc's centre in its frame")
+    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=LONGEST)
 
 
 class PartCoupling(Block):
     """A body whose angle is a weighted sum of others' angles."""
 
-    body: Annotated[str, key("", "the body that follows", bounds="any text")]
-    of: Annotated[tuple[str, ...], key("", "the bodies that it follows", bounds="a list of names", sequence=True)]
-    weights: Annotated[tuple[float, ...], key("1", "their weights", bounds="a list of numbers", sequence=True)]
+    body: str = named("the body that follows")
+    of: tuple[str, ...] = key(..., "", "the bodies that it follows", bounds="a list of names", sequence=True)
+    weights: tuple[float, ...] = key(..., "1", "their weights", bounds="a list of numbers", sequence=True)
 
 
-class PartsWalker(Block):
+class PartsWalker(_Legged):
     """A walker described by its bodies, hinges, particles, feet and couplings."""
 
-    type: Annotated[Literal["parts"], key("", "kind of walker")]
-    bodies: Annotated[
-        tuple[PartBody, ...],
-        key("", "the bodies", bounds="blocks of name, mass_kg, centre_m, inertia_kg_m2", sequence=True),
-    ]
-    hinges: Annotated[
-        tuple[PartHinge, ...],
-        key(
-            "",
-            "the hinges, without closed loops",
-            bounds="blocks of name, parent, parent_point_m, child, child_point_m, locks",
-            sequence=True,
-        ),
-    ]
-    particles: Annotated[
-        tuple[PartParticle, ...], key("", "point masses", bounds="blocks of name, mass_kg, body, at_m", sequence=True)
-    ] = ()
-    feet: Annotated[
-        tuple[PartFoot, PartFoot],
-        key("", "a foot for either leg", bounds="blocks of two of body, centre_m, radius_m", sequence=True),
-    ]
-    couplings: Annotated[
-        tuple[PartCoupling, ...],
-        key("", "bodies that follow others", bounds="blocks of body, of, weights", sequence=True),
-    ] = ()
-    legs: Annotated[
-        tuple[LegBodies, LegBodies],
-        key("", "bodies of either leg, hip down", bounds="two lists of names", sequence=True),
-    ]
-    leg_length_m: Annotated[float, length("hip to sole as the parts have it: what lengths and falls are measured by")]
+    type: Literal["parts"] = key(..., "", "kind of walker")
+    bodies: tuple[PartBody, ...] = parts(PartBody, "the bodies")
+    hinges: tuple[PartHinge, ...] = parts(PartHinge, "the hinges, without closed loops")
+    particles: tuple[PartParticle, ...] = parts(PartParticle, "point masses", ())
+    feet: tuple[PartFoot, PartFoot] = parts(PartFoot, "a foot for either leg", number="two of ")
+    couplings: tuple[PartCoupling, ...] = parts(PartCoupling, "bodies that follow others", ())
+    legs: tuple[LegBodies, LegBodies] = key(
+        ..., "", "bodies of either leg, hip down", bounds="two lists of names", sequence=True
+    )
+    leg_length_m: float = length(..., "hip to sole as the parts have it: what lengths and falls are measured by")
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
 
@@ -341,8 +322,8 @@ class PartsWalker(Block):
         found = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
         if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
             return value
-        reason = "is not what the parts have: upright, from the hip's hinge to the first leg's sole, it is {found} m"
-        raise PydanticCustomError("soles", reason, {"found": f"{found:.9g}"})
+        upright = f"upright, from the hip's hinge to the first leg's sole, it is {found:.9g} m"
+        raise wrong(f"is not what the parts have: {upright}")
 
     @property
     def foot_radius_m(self) -> float:
@@ -352,13 +333,8 @@ class PartsWalker(Block):
     @property
     def total_mass_kg(self) -> float:
         """Everything, kg."""
-        parts = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
-        return sum(parts) + torso_mass(self.torso)
-
-    @property
-    def lean_rad(self) -> float:
-        """Not told by single keys; a start is taken as given."""
-        return 0.0
+        masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
+        return sum(masses) + torso_mass(self.torso)
 
 
 def hip_to_sole(
@@ -429,13 +405,6 @@ def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:
     return ConfigError(f"{asked} needs a contact block, and the config has none.", instead)
 
 
-def arc_within(radius: float, longest: float | None, name: str) -> float:
-    """The radius; refused if the arc is larger than what it belongs to."""
-    if longest is not None and radius >= longest:
-        raise PydanticCustomError("foot", "must be below {name}, {longest}", {"name": name, "longest": f"{longest:g}"})
-    return radius
-
-
 Walker = Annotated[
     Annotated[CompassWalker, Tag("compass")]
     | Annotated[StraightLegs, Tag("straight-legs")]
@@ -445,9 +414,3 @@ Walker = Annotated[
         lambda data: data.get("type", "compass") if isinstance(data, dict) else getattr(data, "type", "compass")
     ),
 ]
-WALKERS: Final[dict[str, type[Block]]] = {
-    "compass": CompassWalker,
-    "straight-legs": StraightLegs,
-    "kneed": Kneed,
-    "parts": PartsWalker,
-}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.config.canonical import slice_of
-from walkerlab.config.overlay import paper_config
+from walkerlab.config.overlay import over_paper
 from walkerlab.config.schema import Config
 from walkerlab.sources import Sources
 from walkerlab.stages.graph import Stage
@@ -47,7 +47,7 @@ def fixed_slice(stage: Stage) -> dict[str, Any]:
     """
     fixed: dict[str, Any] = {}
     if stage.takes_of_paper is not None:
-        fixed["paper"] = slice_of(paper_config(), stage.takes_of_paper)
+        fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
     if stage.programs is not None:
         fixed["programs"] = dict(stage.programs())
     return fixed

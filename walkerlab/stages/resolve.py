@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, builtin, builtin_names, find
-from walkerlab.config.loader import EarlierRun, Template, template
+from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, ConfigFile, builtin, builtin_names, find
+from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.problems import Problem, refusal
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
@@ -24,7 +24,7 @@ SUFFIX = ".h5"
 class Asked:
     """A config, ready to be varied, and its run folder."""
 
-    template: Template
+    loaded: LoadedConfig
     folder: RunFolder
 
 
@@ -48,20 +48,20 @@ def resolve(
     run = None if text is None or is_config(text) else artifact_at(Path(text)) or run_at(text, runs)
     if run is not None:
         folder, earlier = run
-        read, runs, source = template(None, sets, strides, earlier, name), folder.runs_dir, folder.source
+        read, runs, source = load(earlier, sets, strides, name), folder.runs_dir, folder.source
     else:
         path = None if text is None else Path(text)
-        read, source = template(path, sets, strides, name=name), source_of(path, runs)
+        read, source = load(path, sets, strides, name), source_of(path, runs)
     refuse_what_makes_no_walker(read)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
-    return Asked(read, RunFolder(runs, read.base.run_name, source))
+    return Asked(read, RunFolder(runs, read.run_name, source))
 
 
-def refuse_what_makes_no_walker(read: Template) -> None:
+def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
     """Raise ConfigError, with its place, if the parts that a config lists make no walker."""
-    config = read.base.config
+    config = read.config
     if not isinstance(config.walker, PartsWalker):
         return
     # Imported here: mechanics take long to import, and walkers of other types are right by construction.
@@ -78,7 +78,7 @@ def is_config(text: str) -> bool:
     return text in builtin_names() or (Path(text).is_file() and Path(text).suffix != SUFFIX)
 
 
-def artifact_at(path: Path) -> tuple[RunFolder, EarlierRun] | None:
+def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
     """The run of an artifact, with the config that it was made with; None if there is no such file."""
     if path.suffix != SUFFIX or not path.is_file():
         return None
@@ -90,10 +90,10 @@ def artifact_at(path: Path) -> tuple[RunFolder, EarlierRun] | None:
             f"{path} is damaged, and no config can be taken from it: {error}.",
             f"`-c {folder.typed}` takes the one of its folder.",
         ) from None
-    return folder, EarlierRun(stored.provenance.config, folder.name, str(path))
+    return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config)
 
 
-def run_at(text: str, runs: Path) -> tuple[RunFolder, EarlierRun] | None:
+def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
     """The run of a name or a folder, with its config; None if there is none."""
     folder = find_run(text, runs)
     if folder is None:
@@ -104,7 +104,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, EarlierRun] | None:
         raise ConfigError(
             f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )
-    return folder, EarlierRun(config, folder.name, str(folder.path))
+    return folder, ConfigFile(Path(folder.name), str(folder.path), config)
 
 
 def source_of(path: Path | None, runs: Path) -> str:

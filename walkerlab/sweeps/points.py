@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from walkerlab.config.loader import Template
+from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.problems import SHOWN_PROBLEMS
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
@@ -16,10 +16,10 @@ from walkerlab.sweeps.question import Question
 class Points:
     """The configs and keys of a question's points, made when they are asked for: a million are never held at once."""
 
-    def __init__(self, question: Question, template: Template, graph: Graph) -> None:
+    def __init__(self, question: Question, loaded: LoadedConfig, graph: Graph) -> None:
         """Check nothing yet."""
         self.question = question
-        self.template = template
+        self.loaded = loaded
         self._keys = Keys(graph)
 
     def __len__(self) -> int:
@@ -28,7 +28,7 @@ class Points:
 
     def config(self, index: int) -> Config:
         """One point's config; ConfigError if it is none."""
-        return self.template.variant(self.question.settings(index))
+        return self.loaded.variant(self.question.settings(index))
 
     def keys(self, config: Config) -> dict[str, str]:
         """The stage keys of a point and of what it needs."""
@@ -74,6 +74,6 @@ class Points:
             return None
         settings[number] = axis.setting(len(axis.values) - 1)
         try:
-            return self.template.variant(settings)
+            return self.loaded.variant(settings)
         except ConfigError:
             return None

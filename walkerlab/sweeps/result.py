@@ -65,7 +65,7 @@ class Merge:
         points   the sweep's `Points`
         inverse  which result each point has
         """
-        parameters = dict(coordinates(question, points.template.base.config))
+        parameters = dict(coordinates(question, points.loaded.config))
         statuses = self.own["status"][inverse]
         summary = {
             "of": question.stage,
@@ -77,7 +77,7 @@ class Merge:
             "outcomes": counted(self.own["outcome"][inverse]),
             **numerical_error(self.columns, inverse),
         }
-        ended = self.endings(question, points.template.base.config, inverse)
+        ended = self.endings(question, points.loaded.config, inverse)
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.loader import Template
+from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.stages.graph import PIPELINE, Graph
@@ -134,14 +134,14 @@ class Foreseen:
 class SweepRun:
     """One question, its points checked."""
 
-    def __init__(self, question: Question, template: Template, folder: RunFolder, graph: Graph = PIPELINE) -> None:
+    def __init__(self, question: Question, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
         """Check every point by the schema.
 
         Raises ConfigError for points that are no configs and for a stage that has no result without files.
         """
         refuse_unknown_stage(question.stage, graph)
-        self.question, self.folder, self.config = question, folder, template.base.config
-        self.points = Points(question, template, graph)
+        self.question, self.folder, self.config = question, folder, loaded.config
+        self.points = Points(question, loaded, graph)
         keys = np.frombuffer(b"".join(self.points.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
         self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
