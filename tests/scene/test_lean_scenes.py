@@ -21,7 +21,7 @@ from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.runner import execute, preview
+from walkerlab.stages.runner import Options, execute
 from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.6, -0.86)
@@ -197,6 +197,6 @@ def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
     """A preview knows it from the config; nothing has run."""
     found = load(None, (*sets, "strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714"))
     folder = RunFolder(tmp_path, found.run_name)
-    before = preview(found.config, "contact-sim", folder).left_out
+    before = execute(found.config, "contact-sim", folder, Options(dry=True)).left_out
     assert execute(found.config, "contact-sim", folder).left_out == before
     assert any(entry.saves for entry in before)

@@ -10,7 +10,7 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.stages.runner import Options, execute, plan, preview
+from walkerlab.stages.runner import Options, execute, plan
 from walkerlab.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent
@@ -42,7 +42,7 @@ class Toy:
 
     def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)
-        return preview(loaded, target, folder, Options(**options), self.graph)
+        return execute(loaded, target, folder, Options(**options, dry=True), graph=self.graph)
 
     def edit(self, module, old, new):
         """Change the source of a toy stage; this process goes on with what it has imported."""

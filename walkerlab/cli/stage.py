@@ -14,17 +14,17 @@ from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.runner import Options, StageReport, execute, preview, told_once
+from walkerlab.stages.runner import Options, StageReport, execute, told_once
 
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
-    options = Options(request.force, not request.no_wait, request.processes, full)
+    options = Options(request.force, not request.no_wait, request.processes, full, request.dry_run)
     config, folder = request.resolved, request.folder
-    if request.dry_run:
-        report = preview(config, stage.name, folder, options, graph)
+    if options.dry:
+        report = execute(config, stage.name, folder, options, graph=graph)
         show(request, as_json(report) | {"dry_run": True}, planned(report))
         return
     report = execute(config, stage.name, folder, options, request.console, graph)

@@ -6,24 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.config.reads import (
-    BasinConfig,
-    CompassCasesConfig,
-    ContactConfig,
-    ContactSimConfig,
-    ContinuationConfig,
-    FixedPointConfig,
-    MapsConfig,
-    NamedConfig,
-    RigidConfig,
-    SceneCasesConfig,
-    SceneConfig,
-    SimulateConfig,
-    StartConfig,
-    TuneConfig,
-    WalksConfig,
-    dotted_keys,
-)
+from walkerlab.config import reads
+from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_paper, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
@@ -82,8 +66,8 @@ class Stage:
     if_current     the stages whose results it takes if they happen to be there and current
     needs_contact  whether it is left out when the config has no contact block
     draws          whether it writes files beside its artifact, from whatever results there are
-    walks          whether `--strides` means something to it
-    walks_again    whether it walks a second time for the numerical error, which its `run` can leave out: `again`
+    walks          whether `--strides` means something to it; its `run` walks a second time for the numerical error,
+                   unless told not to: `again`
     has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
@@ -104,7 +88,6 @@ class Stage:
     needs_contact: bool = False
     draws: bool = False
     walks: bool = False
-    walks_again: bool = False
     has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
@@ -122,7 +105,7 @@ class Stage:
     def reads(self) -> tuple[str, ...]:
         """The keys of the config that its result depends on, dotted."""
         if self.takes is not None:
-            return tuple(dotted_keys(self.takes))
+            return tuple(reads.dotted_keys(self.takes))
         from walkerlab.config.schema import Config  # not for the help of the command line
 
         return tuple(Config.model_fields)
@@ -130,6 +113,10 @@ class Stage:
     def takes_under(self, config: RigidConfig) -> type | None:
         """What its result depends on under a config."""
         return self.takes if self.takes_of_scene is None or of_the_paper(config.walker) else self.takes_of_scene
+
+    def results(self, config: Config) -> tuple[str, ...]:
+        """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
+        return (*self.inputs(config), *self.if_current)
 
     @property
     def command(self) -> str:
@@ -169,136 +156,74 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.campaign_of == target)
 
 
+WALKED = ("fixedpoint", "simulate", "contact-sim")
 PIPELINE = Graph(
     Stage(
-        "fixedpoint",
-        "walkerlab.stages.fixedpoint",
-        "Find the periodic gait of the rigid model and its multipliers.",
-        takes=FixedPointConfig,
+        "fixedpoint", "walkerlab.stages.fixedpoint",
+        "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
     ),
     Stage(
-        "simulate",
-        "walkerlab.stages.simulate",
-        "Walk the rigid model.",
-        takes=SimulateConfig,
-        inputs=gait_unless_start_is_given,
-        walks=True,
-        walks_again=True,
-        does_without=of_rigid_walk,
+        "simulate", "walkerlab.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
+        gait_unless_start_is_given, walks=True, does_without=of_rigid_walk,
     ),
     Stage(
-        "contact-sim",
-        "walkerlab.stages.contact_sim",
-        "Walk the contact model, its contact forces as in ADAMS.",
-        takes=ContactSimConfig,
-        inputs=gait_for_start_or_pads,
-        needs_contact=True,
-        walks=True,
-        walks_again=True,
-        compiles_long=True,
+        "contact-sim", "walkerlab.stages.contact_sim", "Walk the contact model, its contact forces as in ADAMS.",
+        reads.ContactSimConfig, gait_for_start_or_pads, needs_contact=True, walks=True, compiles_long=True,
         does_without=of_contact_walk,
     ),
     Stage(
-        "tune",
-        "walkerlab.stages.tune",
+        "tune", "walkerlab.stages.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
-        takes=TuneConfig,
-        inputs=results_of("fixedpoint"),
-        needs_contact=True,
-        has_cells=True,
-        does_without=of_adjustment,
+        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True, has_cells=True, does_without=of_adjustment,
     ),
     Stage(
-        "compare",
-        "walkerlab.stages.compare",
-        "Compare both models with each other and with every number of the paper.",
-        takes=ContactConfig,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim"),
-        needs_contact=True,
+        "compare", "walkerlab.stages.compare",
+        "Compare both models with each other and with every number of the paper.", reads.ContactConfig,
+        results_of(*WALKED), needs_contact=True,
     ),
     Stage(
-        "accuracy",
-        "walkerlab.stages.accuracy",
-        "Measure error against run time, method by method.",
-        takes=SceneConfig,
-        inputs=gait_for_start_or_pads,
-        has_cells=True,
-        alone=True,
+        "accuracy", "walkerlab.stages.accuracy", "Measure error against run time, method by method.",
+        reads.SceneConfig, gait_for_start_or_pads, has_cells=True, alone=True,
     ),
     Stage(
-        "engines",
-        "walkerlab.stages.engines",
+        "engines", "walkerlab.stages.engines",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
-        takes=SceneConfig,
-        inputs=gait_for_start_or_pads,
-        needs_contact=True,
-        has_cells=True,
-        on_demand=True,
+        reads.SceneConfig, gait_for_start_or_pads, needs_contact=True, has_cells=True, on_demand=True,
         programs=engines_installed,
     ),
     Stage(
-        "known-problems",
-        "walkerlab.stages.known_problems",
-        "Check the contact code on problems whose answers are known, once for all scenes.",
-        takes=object,
+        "known-problems", "walkerlab.stages.known_problems",
+        "Check the contact code on problems whose answers are known, once for all scenes.", object,
     ),
     Stage(
-        "stability",
-        "walkerlab.stages.stability",
-        "Verify extreme cases and problems with known answers.",
-        takes=CompassCasesConfig,
-        takes_of_scene=SceneCasesConfig,
-        takes_of_paper=WalksConfig,
-        inputs=known_and_start,
-        has_cells=True,
-        does_without=of_verification,
+        "stability", "walkerlab.stages.stability", "Verify extreme cases and problems with known answers.",
+        reads.CompassCasesConfig, known_and_start, has_cells=True, does_without=of_verification,
+        takes_of_scene=reads.SceneCasesConfig, takes_of_paper=reads.WalksConfig,
     ),
     Stage(
-        "stability-maps",
-        "walkerlab.stages.stability_maps",
+        "stability-maps", "walkerlab.stages.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
-        takes=MapsConfig,
-        takes_of_paper=WalksConfig,
-        has_cells=True,
-        campaign_of="stability",
-        keeps_parts=True,
+        reads.MapsConfig, has_cells=True, campaign_of="stability", keeps_parts=True, takes_of_paper=reads.WalksConfig,
     ),
     Stage(
-        "continuation",
-        "walkerlab.stages.continuation",
+        "continuation", "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
-        takes=ContinuationConfig,
-        on_demand=True,
-        follows=True,
+        reads.ContinuationConfig, on_demand=True, follows=True,
     ),
     Stage(
-        "basin",
-        "walkerlab.stages.basin",
+        "basin", "walkerlab.stages.basin",
         "Map which starts reach which attractor, and which fall; resumes where it was interrupted.",
-        takes=BasinConfig,
-        inputs=results_of("fixedpoint"),
-        has_cells=True,
-        on_demand=True,
-        keeps_parts=True,
+        reads.BasinConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
     ),
     Stage(
-        "plot",
-        "walkerlab.stages.plot",
-        "Draw the figures from the stored results.",
-        takes=NamedConfig,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim", "compare"),
+        "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,
+        results_of(*WALKED, "compare"), draws=True,
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
-        draws=True,
     ),
     Stage(
-        "report",
-        "walkerlab.stages.report",
-        "Write the report, one HTML file.",
-        takes=None,
-        inputs=results_of("fixedpoint", "simulate", "contact-sim", "tune", "compare", "accuracy", "stability", "plot"),
+        "report", "walkerlab.stages.report", "Write the report, one HTML file.", None,
+        results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), draws=True, early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin"),
-        draws=True,
-        early_with=("fixedpoint", "simulate", "contact-sim"),
     ),
-)
+)  # fmt: skip
 STAGES = PIPELINE.stages

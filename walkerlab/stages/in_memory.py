@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.identity import Identities
-from walkerlab.stages.plan import why_unsuited
+from walkerlab.stages.plan import refuse_unsuited
 from walkerlab.stages.progress import Progress, Silent
-from walkerlab.stages.task import task_of
+from walkerlab.stages.task import StageAnswer, task_of
 from walkerlab.store.content import Content
 
 REMEMBERED = 256
@@ -57,23 +56,10 @@ class Keys:
         keys: dict[str, str] = {}
         for stage in self.graph.needed_for(target, config):
             refuse_files(stage)
-            unsuited = why_unsuited(stage, config)
-            if unsuited is not None:
-                raise ConfigError(
-                    f"{target} is not available: {unsuited}.",
-                    "Add one to the config; `walkerlab schema` lists its keys.",
-                )
+            refuse_unsuited(target, stage, config)
             given = {name: keys[name] for name in stage.inputs(config)}
             keys[stage.name] = self._identities.of(stage, config, given).key
         return keys
-
-
-@dataclass(frozen=True)
-class StageAnswer:
-    """What a stage said: its content, which is partial if there is no answer and `no_answer` says why."""
-
-    content: Content
-    no_answer: NoAnswer | None = None
 
 
 class InMemory:
@@ -104,7 +90,7 @@ class InMemory:
         for stage in self.graph.needed_for(target, config):
             if stage.name == target:
                 return self._computed(stage, config, results, progress, again)
-            found = self._remembered(stage, config, results, progress, (keys[stage.name], again and stage.walks_again))
+            found = self._remembered(stage, config, results, progress, (keys[stage.name], again and stage.walks))
             if found.no_answer is not None:
                 said = NoAnswer(f"it needs {stage.name}: {found.no_answer.message}", found.no_answer.advice)
                 return StageAnswer(Content(), said)
@@ -128,8 +114,4 @@ class InMemory:
     ) -> StageAnswer:
         inputs = {name: results[name] for name in stage.inputs(config)}
         task = task_of(stage, config, inputs, jobs=1, parts=PartsInMemory(), again=again)
-        try:
-            return StageAnswer(task.run(progress))
-        except NoAnswer as error:
-            partial = error.partial if isinstance(error.partial, Content) else Content()
-            return StageAnswer(partial, error)
+        return task.run(progress)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
+from walkerlab.config.walkers import without_contact
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.identity import Identities
@@ -31,6 +32,12 @@ def why_unsuited(stage: Stage, config: Config) -> str | None:
     if stage.needs_contact and config.contact is None:
         return NO_CONTACT
     return None
+
+
+def refuse_unsuited(asked: str, stage: Stage, config: Config) -> None:
+    """Raise ConfigError if a stage that is asked for, or that this needs, means nothing under a config."""
+    if why_unsuited(stage, config) is not None:
+        raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
 
 def left_out(stage: str, why: str) -> LeftOut:
@@ -131,13 +138,13 @@ class Planner:
 
     def inputs(self, stage: Stage) -> dict[str, Stored]:
         """The results that a stage gets: those it needs, and those it takes if they are there."""
-        wanted = (*stage.inputs(self.config), *stage.if_current)
-        return {name: self.results[name] for name in wanted if name in self.results and name not in self.left_out}
+        there = self.results.keys() - self.left_out.keys()
+        return {name: self.results[name] for name in stage.results(self.config) if name in there}
 
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
         """The results that a stage does without, and why."""
-        wanted = (*stage.inputs(self.config), *stage.if_current)
-        return tuple(left_out(name, self._why_absent(name)) for name in wanted if name not in self._keys)
+        missing = (name for name in stage.results(self.config) if name not in self._keys)
+        return tuple(left_out(name, self._why_absent(name)) for name in missing)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
         why = self._why_left_out(stage)
@@ -185,8 +192,7 @@ class Planner:
 
     def _input_keys(self, stage: Stage) -> dict[str, str]:
         """The keys of a stage's inputs; what a drawing says about those left out depends on why they are."""
-        given = {name: self._keys[name] for name in stage.inputs(self.config) if name in self._keys}
-        given |= {name: self._keys[name] for name in stage.if_current if name in self._keys}
+        given = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
         return given | {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
 
     def _why_run(self, stage: Stage, identity: Identity, verdict: Verdict) -> str | None:

@@ -7,14 +7,13 @@ import importlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import without_contact
 from walkerlab.errors import NoAnswer
 from walkerlab.kernel_cache import watched
 from walkerlab.scene.left_out import LeftOut
@@ -27,22 +26,22 @@ from walkerlab.stages.plan import (
     left_out,
     no_answer,
     plan,
+    refuse_unsuited,
     why_unsuited,
 )
 from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.runs import claim, refuse_another_config
-from walkerlab.stages.task import StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.stages.task import StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import Stored
-from walkerlab.store.content import Content
 from walkerlab.store.elsewhere import take_over
 from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
 
-__all__ = ["StageDone", "StageReport", "execute", "plan", "preview"]
+__all__ = ["StageDone", "StageReport", "execute", "plan"]
 
 
 @dataclass(frozen=True)
@@ -90,12 +89,14 @@ class Options:
     wait   for another process that works in the folder, and reuse what it made
     jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
     full   run its campaigns too
+    dry    only say what would be done, as the report before anything has run; touches nothing
     """
 
     force: bool = False
     wait: bool = True
     jobs: int = 1
     full: bool = False
+    dry: bool = False
 
 
 USUAL = Options()
@@ -116,11 +117,15 @@ def execute(
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
-    stages = asked_for(target, config, graph, options.full)
+    refuse_unsuited(target, graph[target], config)
+    stages = graph.needed_for(target, config) + (graph.campaigns_of(target) if options.full else ())
     planner = Planner(config, folder, graph, options.force)
     steps = planner.plan(stages)
     run = Execution(planner, reporter or Silent(), options.jobs)
-    if writes(steps):
+    changes = any(step.action == "run" or step.origin is not None for step in steps)
+    if changes and options.dry:
+        refuse_another_config(folder, config)
+    if changes and not options.dry:
         reused = "" if options.force else ", and its results will be reused"
         with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
@@ -131,40 +136,6 @@ def execute(
         for step in steps:
             run.skip(step)
     return run.report(graph[target], time.perf_counter() - started)
-
-
-def preview(
-    config: Config, target: str, folder: RunFolder, options: Options = USUAL, graph: Graph = PIPELINE
-) -> StageReport:
-    """What `execute` would do, as the report it would give before anything has run; touches nothing.
-
-    Raises ConfigError as `execute` would.
-    """
-    started = time.perf_counter()
-    stages = asked_for(target, config, graph, options.full)
-    run = Execution(Planner(config, folder, graph, options.force), Silent(), options.jobs)
-    steps = run.planner.plan(stages)
-    if writes(steps):
-        refuse_another_config(folder, config)
-    for step in steps:
-        run.skip(step)
-    return run.report(graph[target], time.perf_counter() - started)
-
-
-def writes(steps: Sequence[Step]) -> bool:
-    """Whether anything is written into the run's folder."""
-    return any(step.action == "run" or step.origin is not None for step in steps)
-
-
-def asked_for(target: str, config: Config, graph: Graph, full: bool) -> tuple[Stage, ...]:
-    """The stages that asking for a target means, in the order in which they run.
-
-    Raises ConfigError if the config leaves the target out.
-    """
-    if why_unsuited(graph[target], config) is not None:
-        raise without_contact(target, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
-    stages = graph.needed_for(target, config)
-    return (*stages, *graph.campaigns_of(target)) if full else stages
 
 
 @dataclass(frozen=True)
@@ -239,12 +210,9 @@ class Execution:
 
     def _run_here(self, begun: Begun) -> None:
         self.running[None] = begun
-        try:
-            with watched(begun.reporter.compiling):
-                content, complete = begun.task.run(begun.reporter), True
-        except NoAnswer as error:
-            content, complete = unanswered(error), False
-        self._settle(self.running.pop(None), content, complete)
+        with watched(begun.reporter.compiling):
+            answer = begun.task.run(begun.reporter)
+        self._settle(self.running.pop(None), answer)
 
     def _side_by_side(self, stages: Sequence[Stage], pool: WorkerPool, precompiler: Precompiler) -> None:
         while self.waiting or self.running:
@@ -287,18 +255,17 @@ class Execution:
         """Store what a stage has returned; True, since a process is free."""
         self.working.remove(future)
         if future in self.running:
-            try:
-                content, complete = future.result(), True
-            except NoAnswer as error:
-                content, complete = unanswered(error), False
-            self._settle(self.running.pop(future), content, complete)
+            answer = future.result()
+            self._settle(self.running.pop(future), answer)
         return True
 
     def _ready(self, stage: Stage, stages: Sequence[Stage]) -> bool:
         """Whether all that a stage takes is there, or known not to come."""
-        taken = {*stage.inputs(self.planner.config), *stage.if_current}
-        unsettled = {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
-        return not taken & unsettled & {one.name for one in stages}
+        return not {*stage.results(self.planner.config)} & self._unsettled() & {one.name for one in stages}
+
+    def _unsettled(self) -> set[str]:
+        """The stages that wait or run."""
+        return {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
 
     def _decided(self, stage: Stage, stages: Sequence[Stage]) -> Step:
         self.planner.look_at_current(stage, stages)
@@ -330,13 +297,15 @@ class Execution:
         reporter = self.reporter.begin(stage.name, ", ".join(place + why), seconds_taken(step.found))
         return Begun(step, task, provenance.begin(self.planner.config, digests), reporter, time.perf_counter())
 
-    def _settle(self, begun: Begun, content: Content, complete: bool) -> None:
+    def _settle(self, begun: Begun, answer: StageAnswer) -> None:
         """Store what a stage has returned, or what it has got where it found that there is no answer."""
         stage, identity = begun.step.stage, begun.step.identity
         assert identity is not None, "a stage that is left out does not run"
         path = self.folder.artifact(stage.name)
         try:
-            result = artifact.write(path, content, identity, begun.provenance.until_now(), complete)
+            result = artifact.write(
+                path, answer.stored, identity, begun.provenance.until_now(), answer.no_answer is None
+            )
         except BaseException:
             begun.reporter.end("")
             raise
@@ -353,22 +322,18 @@ class Execution:
 
     def _draw_early(self, stages: Sequence[Stage]) -> None:
         """Draw what is to be looked at while the rest is still being computed."""
-        unsettled = {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
+        unsettled, config, graph = self._unsettled(), self.planner.config, self.planner.graph
         for stage in self.waiting:
             inputs = self.planner.inputs(stage)
-            wanted = set(stage.inputs(self.planner.config))
-            pending = {name for name in unsettled & wanted if self._suits(name)}
-            others = [name for name in pending if not self.planner.graph[name].draws]
+            wanted = unsettled.intersection(stage.inputs(config))
+            pending = {name for name in wanted if why_unsuited(graph[name], config) is None}
+            others = [name for name in pending if not graph[name].draws]
             if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
                 continue
             absent = [entry for entry in self.planner.missing_inputs(stage) if entry.what not in pending]
             absent += [LeftOut(one.name, STILL_COMPUTED) for one in stages if one.name in pending]
-            task = task_of(stage, self.planner.config, inputs, folder=self.folder.path, left_out=tuple(absent))
-            self.reporter.drawn(task.run(Silent()).summary, self.folder.path)
-
-    def _suits(self, name: str) -> bool:
-        """Whether a stage means something under the config, and so will have a result."""
-        return why_unsuited(self.planner.graph[name], self.planner.config) is None
+            task = task_of(stage, config, inputs, folder=self.folder.path, left_out=tuple(absent))
+            self.reporter.drawn(task.run(Silent()).content.summary, self.folder.path)
 
     def report(self, target: Stage, wall_s: float) -> StageReport:
         """How it went."""
@@ -428,7 +393,7 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     """Whether two of the stages need nothing of each other."""
     needed: dict[str, set[str]] = {}
     for stage in stages:
-        own = {name for name in (*stage.inputs(config), *stage.if_current) if name in needed}
+        own = {name for name in stage.results(config) if name in needed}
         needed[stage.name] = own.union(*(needed[name] for name in own))
     return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
 
@@ -441,13 +406,6 @@ def seconds_taken(stored: Stored | None) -> float | None:
         datetime.datetime.fromisoformat(t) for t in (stored.provenance.started_utc, stored.provenance.ended_utc)
     )
     return (ended - begun).total_seconds()
-
-
-def unanswered(error: NoAnswer) -> Content:
-    """What is stored of a stage without an answer: what it has got, and what it says."""
-    partial = error.partial if isinstance(error.partial, Content) else Content()
-    said = {"message": error.message, "advice": error.advice}
-    return replace(partial, summary={**partial.summary, "no_answer": said})
 
 
 def told_once(why: str) -> str:

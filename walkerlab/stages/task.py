@@ -6,17 +6,34 @@ import contextlib
 import importlib
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from walkerlab import kernel_cache
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
 from walkerlab.stages.graph import Stage
 from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
 from walkerlab.workers import tell
+
+
+@dataclass(frozen=True)
+class StageAnswer:
+    """What a stage said: its content, which is partial if there is no answer and `no_answer` says why."""
+
+    content: Content
+    no_answer: NoAnswer | None = None
+
+    @property
+    def stored(self) -> Content:
+        """What is stored of it: of a stage without an answer what it has got, and what it says."""
+        if self.no_answer is None:
+            return self.content
+        said = {"message": self.no_answer.message, "advice": self.no_answer.advice}
+        return replace(self.content, summary={**self.content.summary, "no_answer": said})
 
 
 @dataclass(frozen=True)
@@ -34,16 +51,20 @@ class StageTask:
     inputs: Mapping[str, Content]
     given: Mapping[str, Any]
 
-    def run(self, progress: Progress) -> Content:
+    def run(self, progress: Progress) -> StageAnswer:
         """Call the stage's `run` with what it declared and nothing else."""
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(self.module).run
         folder = self.given.get("folder")
-        with contextlib.nullcontext() if folder is None else drawing_into(folder):
-            content = run(self.config, self.inputs, progress, **self.given)
+        try:
+            with contextlib.nullcontext() if folder is None else drawing_into(folder):
+                content = run(self.config, self.inputs, progress, **self.given)
+        except NoAnswer as error:
+            partial = error.partial if isinstance(error.partial, Content) else Content()
+            return StageAnswer(partial, NoAnswer(error.message, error.advice))
         if not isinstance(content, Content):
             raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
-        return content
+        return StageAnswer(content)
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
@@ -58,7 +79,7 @@ def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offer
     asked = {
         "jobs": stage.has_cells,
         "parts": stage.keeps_parts,
-        "again": stage.walks_again,
+        "again": stage.walks,
         "folder": stage.draws,
         "left_out": stage.draws,
     }
@@ -86,7 +107,7 @@ class PipeReporter:
         tell(("compiling", kernel))
 
 
-def run_in_worker(task: StageTask) -> Content:
+def run_in_worker(task: StageTask) -> StageAnswer:
     """Run a stage in a worker, telling its progress."""
     reporter = PipeReporter()
     importlib.import_module(task.module)
