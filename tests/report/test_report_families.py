@@ -46,7 +46,7 @@ def test_the_diagram_marks_gaits_whose_motion_is_stored():
     assert (first.stable, second.stable) == (True, False)
     assert first.x < second.x
     assert first.walker.track["t"].size > 2
-    assert [scene["slope_rad"] for scene in (first.scene, second.scene)] == [0.02, 0.09]
+    assert [first.slope_rad, second.slope_rad] == [0.02, 0.09]
     assert gait_diagram(Results(config(), families())) is None
 
 

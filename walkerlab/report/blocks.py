@@ -23,11 +23,11 @@ class PageBlock(Protocol):
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Running text; a tone sets it off as a statement."""
+    """Running text; a tone sets it off as a statement, or as what stands there until a result is computed."""
 
     template: ClassVar[str] = "paragraph"
     text: str
-    tone: Tone = "plain"
+    tone: Tone | Literal["waiting"] = "plain"
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,6 @@ class Shares:
     template: ClassVar[str] = "shares"
     title: str
     parts: tuple[tuple[str, int, Tone], ...]
-
-    @property
-    def total(self) -> int:
-        """The whole."""
-        return sum(count for _, count, _ in self.parts)
 
 
 @dataclass(frozen=True)
@@ -116,14 +111,6 @@ class Terms:
 
     template: ClassVar[str] = "terms"
     items: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Waiting:
-    """That a result is still being computed."""
-
-    template: ClassVar[str] = "waiting"
-    text: str
 
 
 @dataclass(frozen=True)
@@ -215,11 +202,6 @@ class GaitMark:
     stable: bool
     walker: Walker
     slope_rad: float
-
-    @property
-    def scene(self) -> dict[str, object]:
-        """What is different in the player's scene."""
-        return {"slope_rad": self.slope_rad, "pads": []}
 
 
 @dataclass(frozen=True)

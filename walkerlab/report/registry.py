@@ -65,21 +65,19 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     run  name of the run's folder
     """
     sections = sections_of(results)
-    main = list(closing.on(MAIN, sections))
-    links = closing.further(results, sections)
+    main = [section for section in sections if section.page == MAIN]
+    beside = {file: tuple(one for one in sections if one.page == file) for file in closing.TITLES}
+    beside = {file: found for file, found in beside.items() if found}
+    links = closing.further(results, beside)
     if links is not None:
-        place = next(index for index, section in enumerate(main) if section.anchor == "glossary")
-        main.insert(place, links)
+        main.insert([section.anchor for section in main].index("glossary"), links)
     redone = "After" if results.departures else "Redoes"
     of_run = "" if run == DEFAULT else run
     title, source = f"Passive walking: {run}", results.config.source
-    report = Page(title, tuple(main), (lead(results.config, run),), MAIN, source, redone, results.pending, of_run)
-    beside = (
-        Page(f"{name} · {run}", found, file=file, run=of_run)
-        for file, name in closing.TITLES.items()
-        if (found := closing.on(file, sections))
+    return (
+        Page(title, tuple(main), (lead(results.config, run),), MAIN, source, redone, results.pending, of_run),
+        *(Page(f"{closing.TITLES[file]} · {run}", found, file=file, run=of_run) for file, found in beside.items()),
     )
-    return (report, *beside)
 
 
 def lead(config: Config, run: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -20,81 +20,59 @@ def section(results: Results) -> Section | None:
     summary = results.summary("accuracy")
     if not summary.get("reference"):
         return None
-    scenes = list(summary["reference"])
-    told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in scenes}
+    told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
     concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
+    references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
     blocks: tuple[PageBlock, ...] = (
         Paragraph(words("accuracy.introduction", summary)),
         Statements(concluded),
         costs(summary),
-        references(summary),
+        table("References", REFERENCE_COLUMNS, references, note=words("accuracy.references")),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
         *not_run(summary),
     )
-    return Section("accuracy", "Error against run time", blocks, fastest(summary), COSTS)
-
-
-def fastest(summary: Row) -> str:
-    """The fastest methods of each scene, in one sentence."""
-    scenes: dict[str, list[str]] = {}
+    fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
-        scenes.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
-    said = "; ".join(f"{methods} on {listed(found)}" for methods, found in scenes.items() if methods)
-    return f"Fastest: {said}." if said else ""
+        fastest.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
+    return Section("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
 
 
 def costs(summary: Row) -> Table:
     """What each method costs for each error, by scene."""
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
-    least = (
-        Column(f"ms for {power_of_ten(level, 1)}", partial(least_ms, level), partial(number, digits=3), True)
-        for level in levels
-    )
     columns = (
-        Column("method", lambda method: Cell(method["method"], "good" if method["best"] else None)),
-        *least,
-        Column("smallest error", smallest_error, numeric=True),
-        Column("its right-hand sides", lambda method: most_exact(method).get("rhs_evaluations"), whole, True),
-        Column("ended otherwise", failures, wide=True),
+        Column("method", "method"),
+        *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", partial(number, digits=3), numeric=True) for at in levels),
+        Column("smallest error", "smallest_error", numeric=True),
+        Column("its right-hand sides", "rhs_evaluations", whole, numeric=True),
+        Column("ended otherwise", "failures", wide=True),
     )
-    methods = {scene: methods_of(summary, scene) for scene in summary["reference"]}
+    methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
     note = words("accuracy.costs", summary["environment"])
     return table("Least run time for an error, method by method", columns, methods, note=note)
 
 
-def methods_of(summary: Row, scene: str) -> list[Row]:
-    """The methods of a scene, each with its runs and with how well the reference is known."""
+def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
+    """The methods of a scene, each with its least time (ms) for an error, by level, and its smallest error.
+
+    What the reference is known to bounds what can be told of an error.
+    """
     best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
-    runs = grouped((row for row in summary["rows"] if row["scene"] == scene), "method")
-    return [{"method": name, "best": name in best, "runs": mine, "known": known} for name, mine in runs.items()]
-
-
-def reached(method: Row) -> list[Row]:
-    """The runs that came to an end state."""
-    return [run for run in method["runs"] if run["error"] is not None]
-
-
-def least_ms(level: float, method: Row) -> float | None:
-    """Least time (ms) of the runs that are exact enough; None if none is."""
-    return min((1e3 * run["wall_s"] for run in reached(method) if run["error"] <= level), default=None)
-
-
-def most_exact(method: Row) -> Row:
-    """The run with the smallest error; nothing if none has one."""
-    return min(reached(method), key=lambda run: float(run["error"]), default={})
-
-
-def smallest_error(method: Row) -> str:
-    """The smallest error reached; what the reference is known to bounds what can be told of it."""
-    error = most_exact(method).get("error")
-    return number(error, 2) if error is None or error > method["known"] else f"≤ {number(method['known'], 2)}"
-
-
-def failures(method: Row) -> str:
-    """How the runs ended that have no end state."""
-    return listed(
-        f"{run['outcome']} at {power_of_ten(run['tolerance'], 1)}" for run in method["runs"] if run["error"] is None
-    )
+    for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
+        ended = [run for run in runs if run["error"] is not None]
+        exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
+        error = exact.get("error")
+        failed = [f"{run['outcome']} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
+        yield {
+            "method": Cell(method, "good" if method in best else None),
+            "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
+            "rhs_evaluations": exact.get("rhs_evaluations"),
+            "failures": listed(failed),
+            **{
+                f"{level}": min((1e3 * run["wall_s"] for run in ended if run["error"] <= level), default=None)
+                for level in levels
+            },
+        }
 
 
 REFERENCE_COLUMNS = (
@@ -103,12 +81,6 @@ REFERENCE_COLUMNS = (
     Column("second method", "second_method"),
     Column("they differ by", "agreement", partial(number, digits=2), numeric=True),
 )
-
-
-def references(summary: Row) -> Table:
-    """Where the truth comes from and how well it is known."""
-    rows = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
-    return table("References", REFERENCE_COLUMNS, rows, note=words("accuracy.references"))
 
 
 NOT_RUN_COLUMNS = (

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms, Waiting
+from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
@@ -19,28 +19,20 @@ TITLES = {
 """The pages beside the report, in their order."""
 
 
-def further(results: Results, sections: Sequence[Section]) -> Section | None:
+def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
     """Links to the other pages, each with what it comes to in a sentence for each section, and what will be there."""
     items = []
-    for file, title in TITLES.items():
-        found = on(file, sections)
+    for file, found in pages.items():
         silent = file == PAPER and not results.of_the_paper
-        brief = "" if silent else " ".join(section.finding for section in found if section.finding)
-        items += [(file, title, brief)] if found else []
+        items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
     blocks: list[PageBlock] = [Cards(tuple(items))] if items else []
-    blocks += [Waiting(words("closing.pending", name)) for name in results.pending]
-    title = "Further pages" if items else "Still to come"
-    return Section("further", title, tuple(blocks)) if blocks else None
-
-
-def on(page: str, sections: Sequence[Section]) -> tuple[Section, ...]:
-    """The sections of a page."""
-    return tuple(section for section in sections if section.page == page)
+    blocks += [Paragraph(words("closing.pending", name), "waiting") for name in results.pending]
+    return Section("further", "Further pages" if items else "Still to come", tuple(blocks)) if blocks else None
 
 
 def glossary(results: Results) -> Section:
     """What the words mean."""
-    told = words("closing.glossary", results.config.contact is not None).split(" | ")
+    told = words.parts("closing.glossary", results.config.contact is not None)
     terms = Terms(tuple((word, meaning) for word, _, meaning in (one.partition(": ") for one in told)))
     return Section("glossary", "Glossary", (terms,), "The words of this report, in a line each.")
 
@@ -48,7 +40,7 @@ def glossary(results: Results) -> Section:
 def left_out(results: Results) -> Section:
     """Results that were not computed, and parts of results that were left out."""
     parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
-    rows = rows_of(list(dict.fromkeys((*results.absent, *parts))))
+    rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
     if not rows:
         said = Paragraph("Nothing is left out: every result of the pipeline is there.")
         return Section("left-out", "Left out", (said,), "Nothing.")
@@ -57,18 +49,18 @@ def left_out(results: Results) -> Section:
     return Section("left-out", "Left out", (missing,), f"{count(len(rows), 'thing')}, each with its reason.")
 
 
-def rows_of(missing: Sequence[LeftOut]) -> list[list[str]]:
+def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     """What is missing for one reason in a row, and in a row below it what is missing for want of that."""
-    causes = dict.fromkeys(cause(absent.why, missing) for absent in missing)
-    rows = []
-    for why in causes:
+    reasons = {absent.why for absent in missing}
+    # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'
+    causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
+    for why in dict.fromkeys(causes.values()):
         first = listed(absent.what for absent in missing if absent.why == why)
-        saves = "; ".join(dict.fromkeys(absent.saves for absent in missing if absent.why == why and absent.saves))
-        further = listed(absent.what for absent in missing if absent.why != why and cause(absent.why, missing) == why)
-        rows += [[first, why, saves], *([[further, f"needs {first}", ""]] if further else [])]
-    return rows
-
-
-def cause(why: str, missing: Sequence[LeftOut]) -> str:
-    """The reason at the bottom of a reason, such as 'it needs simulate: it needs fixedpoint: no gait'."""
-    return min((absent.why for absent in missing if why.endswith(absent.why)), key=len)
+        yield (
+            first,
+            why,
+            "; ".join(dict.fromkeys(absent.saves for absent in missing if absent.why == why and absent.saves)),
+        )
+        further = listed(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
+        if further:
+            yield further, f"needs {first}", ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,7 @@ from walkerlab.benchmarks.engines.rows import OWN_LAW, SAME_LAW
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import NONE, fixed, number, power_of_ten
 from walkerlab.report.results import Results
-from walkerlab.report.tables import Column, Table, measured, table
+from walkerlab.report.tables import Column, Table, grouped, measured, table
 from walkerlab.report.words import words
 
 ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
@@ -29,18 +29,29 @@ def section(results: Results) -> Section | None:
         for experiment, text in told.items()
         if text
     ]
-    blocks: tuple[PageBlock, ...] = (
-        Paragraph(
-            words("engines.introduction", [f"{name} {version}" for name, version in summary["versions"].items()])
-        ),
-        Statements(tuple(concluded)),
-        same_law(summary),
-        own_law(summary),
-        *tuning(summary),
-        swings(summary),
-        limits(summary),
+    laws = grouped(summary["rows"], "experiment")
+    same_law, own_law = (
+        {scene: [row for row in laws.get(law, ()) if row["scene"] == scene] for scene in summary["reference"]}
+        for law in (SAME_LAW, OWN_LAW)
     )
-    return Section("engines", "In other engines", blocks)
+    for scene, reference in summary["reference"].items():
+        if "rigid_period_s" in reference:
+            gait = {"period_s": reference["rigid_period_s"], "step_length_m": reference["rigid_step_length_m"]}
+            own_law[scene].insert(0, {"engine": "rigid", "integrator": "gait", "start": 1.0, "slip_m": 0.0, **gait})
+    limits = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
+    blocks: list[PageBlock] = [
+        Paragraph(words("engines.introduction", summary["versions"])),
+        Statements(tuple(concluded)),
+        table("ADAMS's law in each engine's integrators", SAME_LAW_COLUMNS, same_law, note=words("engines.same_law")),
+        table("The walk on each engine's own contact", OWN_LAW_COLUMNS, own_law, note=words("engines.own_law")),
+    ]
+    if tuned := summary["tuning"]:
+        blocks.append(table("Tuning of the engines' own contact", TUNING_COLUMNS, tuned, note=words("engines.tuning")))
+    blocks += [
+        swings(summary["swings"]),
+        table("What the engines cannot express", LIMIT_COLUMNS, limits, wordy=True),
+    ]
+    return Section("engines", "In other engines", tuple(blocks))
 
 
 def engine_and_integrator(row: Row) -> str:
@@ -60,17 +71,6 @@ SAME_LAW_COLUMNS = (
 )
 
 
-def same_law(summary: Row) -> Table:
-    """Each integrator's runs from coarse to fine."""
-    runs = {scene: rows_of(summary, scene, SAME_LAW) for scene in summary["reference"]}
-    return table("ADAMS's law in each engine's integrators", SAME_LAW_COLUMNS, runs, note=words("engines.same_law"))
-
-
-def rows_of(summary: Row, scene: str, experiment: str) -> list[Row]:
-    """The rows of one scene and experiment."""
-    return [row for row in summary["rows"] if row["scene"] == scene and row["experiment"] == experiment]
-
-
 OWN_LAW_COLUMNS = (
     Column("contact", engine_and_integrator),
     RUN("start", "start", partial(number, digits=3)),
@@ -84,23 +84,6 @@ OWN_LAW_COLUMNS = (
 )
 
 
-def own_law(summary: Row) -> Table:
-    """The walks with each engine's own contact, ADAMS's law among them."""
-    walks = {
-        scene: [*rigid_gait(reference), *rows_of(summary, scene, OWN_LAW)]
-        for scene, reference in summary["reference"].items()
-    }
-    return table("The walk on each engine's own contact", OWN_LAW_COLUMNS, walks, note=words("engines.own_law"))
-
-
-def rigid_gait(reference: Row) -> list[Row]:
-    """The rigid model's gait as a row, if it is known."""
-    if "rigid_period_s" not in reference:
-        return []
-    gait = {"period_s": reference["rigid_period_s"], "step_length_m": reference["rigid_step_length_m"]}
-    return [{"engine": "rigid", "integrator": "gait", "start": 1.0, "slip_m": 0.0, **gait}]
-
-
 TUNING_COLUMNS = (
     Column("contact", lambda row: f"{row['engine']} {row['contact']}, {row['scene']}"),
     Column("quantity", lambda row: f"{row['quantity']} ({row['unit']})"),
@@ -108,14 +91,6 @@ TUNING_COLUMNS = (
     measured("measured", "reached", partial(number, digits=4), labels=engines.TuningRow),
     Column("residual", "residual", lambda value: f"{100.0 * value:+.2g} %", numeric=True),
 )
-
-
-def tuning(summary: Row) -> tuple[Table, ...]:
-    """What a ball and a block do on each contact, against what it was tuned to."""
-    rows = summary["tuning"]
-    if not rows:
-        return ()
-    return (table("Tuning of the engines' own contact", TUNING_COLUMNS, rows, note=words("engines.tuning")),)
 
 
 SWING = partial(measured, labels=engines.SwingRow)
@@ -128,25 +103,16 @@ SWING_COLUMNS = (
 )
 
 
-def swings(summary: Row) -> Table:
+LIMIT_COLUMNS = (Column("engine"), Column("cannot express", wide=True))
+
+
+def swings(runs: Sequence[Row]) -> Table:
     """The hinged walker's swing: of each integrator the finest run, with the orders observed on the way to it."""
     found: dict[tuple[str, ...], list[Row]] = {}
-    for row in summary["swings"]:
-        found.setdefault((row["scene"], row["engine"], row["integrator"]), []).append(row)
-    rows = [
-        {**min(runs, key=lambda run: float(run["error"])), "orders": ", ".join(orders_of(runs)) or "adapted"}
-        for runs in found.values()
-    ]
-    return table("Without contact: a swing in each integrator", SWING_COLUMNS, rows, note=words("engines.swings"))
-
-
-def orders_of(runs: list[Row]) -> list[str]:
-    """The orders observed from run to run."""
-    return [number(run["order"], 3) for run in runs if run["order"] is not None]
-
-
-def limits(summary: Row) -> Table:
-    """What each engine cannot express."""
-    columns = [Column("engine"), Column("cannot express", wide=True)]
-    rows = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
-    return table("What the engines cannot express", columns, rows, wordy=True)
+    for run in runs:
+        found.setdefault((run["scene"], run["engine"], run["integrator"]), []).append(run)
+    finest = []
+    for swung in found.values():
+        orders = ", ".join(number(run["order"], 3) for run in swung if run["order"] is not None)
+        finest.append({**min(swung, key=lambda run: float(run["error"])), "orders": orders or "adapted"})
+    return table("Without contact: a swing in each integrator", SWING_COLUMNS, finest, note=words("engines.swings"))

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.labels import with_unit
 from walkerlab.report.blocks import PAPER, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.report.numbers import NONE, count, listed, number
+from walkerlab.report.numbers import count, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, table
+from walkerlab.report.words import words
 
 Row = Mapping[str, Any]
 
@@ -35,15 +37,12 @@ def numbers(results: Results) -> Section | None:
     rows = paper_numbers(results)
     if not rows:
         return None
-    verdicts = Counter(str(row["verdict"]) for row in rows)
-    counts = listed(f"{verdicts[name]} {name}" for name in TONES if verdicts[name])
-    finding = f"Of {count(len(rows), 'number')} that the paper prints: {counts}."
-    told = [Statement(f"{name.capitalize()}:", MEANINGS[name], tone=TONES[name]) for name in MEANINGS]
-    blocks: tuple[PageBlock, ...] = (Statements(tuple(told), "lines"), numbers_table(rows))
+    told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in MEANINGS.items())
+    blocks: tuple[PageBlock, ...] = (Statements(told, "lines"), numbers_table(rows))
     if results.departures:
-        differs = in_signs("; ".join(results.departures))
-        said = f"This scene is not the paper’s: {differs}. What does not come out here is not refuted by that."
-        blocks = (Paragraph(said, "fair"), *blocks)
+        blocks = (Paragraph(words("paper.departs", results.departures), "fair"), *blocks)
+    verdicts = Counter(row["verdict"] for row in rows)
+    finding = words("paper.finding", len(rows), {name: verdicts[name] for name in TONES if verdicts[name]})
     return Section("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
@@ -51,7 +50,7 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     """The paper's numbers by where they stand, beside those of the models that have any."""
     models = [key for key in BESIDE if any(row.get(key) is not None for row in rows)]
     columns = (
-        Column("quantity", lambda row: in_signs(f"{row['quantity']}{unit_of(row)}")),
+        Column("quantity", lambda row: named(row["quantity"], row.get("unit"))),
         Column("printed", "printed", in_signs, numeric=True),
         *(Column(BESIDE[key], key, number, numeric=True) for key in models),
         Column("verdict", "verdict", lambda verdict: Cell(verdict, TONES.get(verdict, "plain"))),
@@ -59,6 +58,11 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
+
+
+def named(name: str, unit: str | None) -> str:
+    """A quantity's name with its unit."""
+    return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
 def paper_numbers(results: Results) -> Sequence[Row]:
@@ -109,8 +113,6 @@ NAMES = {
 }
 """What the rows are called in words, where their symbol does not say it."""
 
-UNIT = "unit"
-
 
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
@@ -123,31 +125,16 @@ def tables(results: Results) -> Section | None:
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     """One table; its rows are named by their symbol and unit, and columns without any value are left away."""
-    found = dict.fromkeys(name for row in rows.values() for name, value in row.items() if value is not None)
-    columns = [column_of(name, rows) for name in found if name != UNIT]
-    named = [{"row": row_name(symbol, row), **row} for symbol, row in rows.items()]
-    return table(caption, [Column("row", "row"), *columns], named, note=note)
-
-
-def column_of(name: str, rows: Mapping[str, Row]) -> Column:
-    """The column of a name, of texts or of numbers."""
-    texts = any(isinstance(row.get(name), str) for row in rows.values())
-    digits = 3 if "percent" in name else 6
-    return Column(HEADS.get(name, name.replace("_", " ")), name, partial(value_of, digits=digits), numeric=not texts)
-
-
-def row_name(symbol: str, row: Row) -> str:
-    """A row's symbol, what it stands for, and its unit."""
-    words = f"{NAMES[symbol]}, {symbol}" if symbol in NAMES else symbol
-    unit = row.get(UNIT)
-    return in_signs(f"{words} ({unit})" if unit not in (None, "", "1") else words)
-
-
-def value_of(value: Any, digits: int) -> str:
-    """A cell of a table."""
-    if value is None:
-        return NONE
-    return in_signs(value) if isinstance(value, str) else number(float(value), digits)
+    columns = [Column("row", "row")]
+    for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
+        texts = any(isinstance(row.get(key), str) for row in rows.values())
+        written = in_signs if texts else partial(number, digits=3 if "percent" in key else 6)
+        columns.append(Column(HEADS.get(key, key.replace("_", " ")), key, written, numeric=not texts))
+    shown = [column for column in columns if column.of != "unit"]
+    names = {symbol: f"{NAMES[symbol]}, {symbol}" if symbol in NAMES else symbol for symbol in rows}
+    return table(
+        caption, shown, [{"row": named(names[one], row.get("unit")), **row} for one, row in rows.items()], note=note
+    )
 
 
 PARTS = {"where": "where", "printed": "printed", "right": "right", "evidence": "evidence", "measured": "measured here"}

@@ -26,35 +26,25 @@ def section(results: Results) -> Section | None:
     if not summary:
         return None
     cases, known = summary["cases"], summary["known"]
+    failed = [words("stability.failed_case", one) for one in cases if not one["ok"]]
+    failed += [words("stability.failed_problem", one) for one in known if not one["ok"]]
+    unanswered = [(row["second_tried"], row) for row in cases if row["second_tried"]]
+    missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
+    note = words("stability.cases", by_reason(unanswered), by_reason(missed))
     blocks: list[PageBlock] = [
-        *failures(cases, known),
+        *(Paragraph(said, "bad") for said in failed),
         Paragraph(words("stability.judgement")),
-        case_table(cases),
+        table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
     ]
     if summary["ordinary"]:
         blocks.append(ordinary_table(summary))
-    blocks.append(maps(results))
+    planes = results.summary("stability-maps")
+    blocks.append(Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")))
     blocks += [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")]
     total = summary["passed"] + summary["failed"]
     finding = f"{summary['passed']} of {count(total, 'extreme case')} and known problems came out right."
     return Section("stability", "Stiff and extreme cases", tuple(blocks), finding, CASES)
-
-
-def failures(cases: Rows, known: Rows) -> list[PageBlock]:
-    """What is not as it should be, and why; in red."""
-    failed = [("stability.failed_case", one) for one in cases if not one["ok"]]
-    failed += [("stability.failed_problem", one) for one in known if not one["ok"]]
-    return [Paragraph(words(name, one), "bad") for name, one in failed]
-
-
-def maps(results: Results) -> Paragraph:
-    """What the maps came to, or how to make them."""
-    summary = results.summary("stability-maps")
-    if not summary:
-        return Paragraph(words("stability.how_to_map"))
-    counted = ([f"{many} {name}" for name, many in summary[key].items()] for key in ("outcomes", "fixed_step"))
-    return Paragraph(words("stability.maps", summary, *counted))
 
 
 def worst_measure(row: Row) -> float | None:
@@ -73,14 +63,6 @@ CASE_COLUMNS = (
     Column("time (ms)", "wall_s", lambda value: number(1e3 * value, 3), numeric=True),
     Column("why that is to be expected", "reason", wide=True),
 )
-
-
-def case_table(cases: Rows) -> Table:
-    """Every case, by family."""
-    unanswered = [(str(row["second_tried"]), row) for row in cases if row["second_tried"]]
-    missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
-    note = words("stability.cases", by_reason(unanswered), by_reason(missed))
-    return table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note)
 
 
 def by_reason(reasons: Sequence[tuple[str, Row]]) -> str:
@@ -109,17 +91,14 @@ KNOWN_COLUMNS = (
 
 def ordinary_table(summary: Row) -> Table:
     """What ordinary methods do with the cases: one row a case, one column a method."""
-    methods = grouped(summary["ordinary"], "method")
-    columns = [
-        Column("case", "case"),
-        *(
-            Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
-            for method in methods
-        ),
+    methods = [
+        Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
+        for method in grouped(summary["ordinary"], "method")
     ]
     tried = grouped(summary["ordinary"], "case").items()
     records = [{"case": case, **{row["method"]: row for row in rows}} for case, rows in tried]
-    return table("What an ordinary choice of method does", columns, records, note=words("stability.ordinary", summary))
+    note = words("stability.ordinary", summary)
+    return table("What an ordinary choice of method does", [Column("case", "case"), *methods], records, note=note)
 
 
 def ordinary_cell(row: Row | None) -> Cell:
