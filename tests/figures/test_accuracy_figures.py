@@ -45,7 +45,7 @@ def test_runs_that_did_not_reach_the_end_stay_visible_above_all_others():
 
 def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
     every = list(series_of(SCENES[0], measured_methods()))
-    whole = [one for one in every if one.reached.all()]
+    whole = [one for one in every if one.runs["reached"].all()]
     assert 0 < len(whole) < len(every)
     for shown, there in ((every, True), (whole, False)):
         assert ("end not reached" in [entry.get_label() for entry in entries(shown, AGREEMENT)]) is there

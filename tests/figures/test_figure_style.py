@@ -13,7 +13,7 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.registry import FIGURES
 from walkerlab.figures.style import CONTACT, LEGS, RIGID, WIDTH
-from walkerlab.figures.walk_figures import AT_SAME_TIME, IN_PHASE, PAPER
+from walkerlab.figures.walks import AT_SAME_TIME, IN_PHASE, PAPER
 
 RESULTS = {
     "both models": both_models(),

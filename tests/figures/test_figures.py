@@ -14,17 +14,19 @@ from matplotlib.colors import to_hex
 from synthetic_methods import everything
 from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, stored, without
 
-from walkerlab.figures import stick_diagram, walk_figures
+from walkerlab.figures import stick_diagram
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.figures.style import CONTACT, RIGID
+from walkerlab.figures.walks import AT_SAME_TIME, IN_PHASE, PAPER
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"
 ELSEWHERE = {"tune", "continuation", "basin", "engines"}
 FIGURES = [figure for figure in ALL_FIGURES if ELSEWHERE.isdisjoint(need.stage for need in figure.needs)]
 PAPER_FIGURES = [figure for figure in FIGURES if figure.number is not None]
+NUMBERED = {figure.number: figure for figure in PAPER_FIGURES}
 NAMES = [figure.name for figure in FIGURES]
 
 
@@ -79,13 +81,13 @@ def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
     results = rigid_alone(simulate=rigid(1, outcome="no-heel-strike", completed=0))
     assert drawable(results) == [7, 9, 10]
     assert why_left_out(results, {})[2] == "simulate: no step was completed"
-    assert walk_figures.FIGURE_7.caption(results).endswith("The rigid model took 0 steps (no-heel-strike).")
+    assert NUMBERED[7].caption(results).endswith("The rigid model took 0 steps (no-heel-strike).")
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_walk_that_ended_where_it_began_can_be_drawn():
     results = rigid_alone(simulate=first_sample_of(rigid(1, outcome="rejected", completed=0)))
-    for figure in (walk_figures.FIGURE_7, walk_figures.FIGURE_9, walk_figures.FIGURE_10):
+    for figure in (NUMBERED[7], NUMBERED[9], NUMBERED[10]):
         assert "0 steps (rejected)" in figure.drawn(results).caption
 
 
@@ -181,7 +183,7 @@ def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
         RIGID.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),
         CONTACT.colour: results["contact-sim"]["steps"]["touch_time_s"].tolist(),
     }
-    for figure in (walk_figures.FIGURE_7, walk_figures.FIGURE_10):
+    for figure in (NUMBERED[7], NUMBERED[10]):
         for axes in plotted(figure, results).axes:
             for colour, times in expected.items():
                 (uprights,) = [lines for lines in axes.collections if to_hex(lines.get_color()[0]).upper() == colour]
@@ -192,7 +194,7 @@ def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
 
 def test_lines_in_time_are_the_stored_angles_and_velocities():
     results = both_models()
-    axes = plotted(walk_figures.FIGURE_7, results).axes
+    axes = plotted(NUMBERED[7], results).axes
     for row, (name, leg) in enumerate((("angle", 0), ("angle", 1), ("velocity", 0), ("velocity", 1))):
         for stage, look in (("simulate", RIGID), ("contact-sim", CONTACT)):
             (line,) = lines_of(axes[row], look)
@@ -202,7 +204,7 @@ def test_lines_in_time_are_the_stored_angles_and_velocities():
 
 
 def test_legs_are_shaded_while_they_carry():
-    axes = plotted(walk_figures.FIGURE_7, rigid_alone()).axes
+    axes = plotted(NUMBERED[7], rigid_alone()).axes
     for leg, one in enumerate(axes[:2]):
         spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in one.patches]
         np.testing.assert_allclose(spans, [(0.7 * step, 0.7 * (step + 1)) for step in range(1 - leg, 10, 2)], atol=1e-9)
@@ -210,25 +212,25 @@ def test_legs_are_shaded_while_they_carry():
 
 def test_a_long_walk_shows_five_strides_and_says_so():
     results = rigid_alone(simulate=rigid(24))
-    figure = plotted(walk_figures.FIGURE_7, results)
+    figure = plotted(NUMBERED[7], results)
     (line,) = lines_of(figure.axes[0], RIGID)
     assert line.get_xdata()[-1] == pytest.approx(10 * 0.7)
-    caption = walk_figures.FIGURE_7.caption(results)
+    caption = NUMBERED[7].caption(results)
     assert "(the first 5 strides)" in caption
     assert caption.endswith("The rigid model walked 24 steps.")
 
 
 def test_a_fall_is_told():
     results = both_models(**{"contact-sim": contact(3, outcome="fell")})
-    assert "the contact model took 3 steps (fell)" in walk_figures.FIGURE_7.caption(results)
+    assert "the contact model took 3 steps (fell)" in NUMBERED[7].caption(results)
 
 
 def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
     results = both_models()
-    axes = plotted(walk_figures.FIGURE_8, results).axes
-    (raw,) = lines_of(axes[0], walk_figures.AT_SAME_TIME)
+    axes = plotted(NUMBERED[8], results).axes
+    (raw,) = lines_of(axes[0], AT_SAME_TIME)
     np.testing.assert_array_equal(raw.get_ydata(), np.abs(results["compare"]["errors"]["raw_angle_error_rad"][:, 0]))
-    steps = lines_of(axes[3], walk_figures.IN_PHASE)
+    steps = lines_of(axes[3], IN_PHASE)
     aligned = results["compare"]["aligned"]["aligned_velocity_error_rad_s"]
     assert len(steps) == 10
     for step, line in enumerate(steps):
@@ -238,8 +240,8 @@ def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
 
 
 def test_the_papers_error_is_a_line_within_sight():
-    for axes in plotted(walk_figures.FIGURE_8, both_models()).axes:
-        (line,) = lines_of(axes, walk_figures.PAPER)
+    for axes in plotted(NUMBERED[8], both_models()).axes:
+        (line,) = lines_of(axes, PAPER)
         bottom, top = axes.get_ylim()
         assert axes.get_yscale() == "log"
         assert set(line.get_ydata()) == {1e-4}
@@ -247,14 +249,14 @@ def test_the_papers_error_is_a_line_within_sight():
 
 
 def test_limit_cycles_of_both_legs_have_the_same_scales():
-    one, other = plotted(walk_figures.FIGURE_9, both_models()).axes
+    one, other = plotted(NUMBERED[9], both_models()).axes
     assert one.get_xlim() == other.get_xlim()
     assert one.get_ylim() == other.get_ylim()
 
 
 def test_the_last_stride_is_drawn_as_the_model_looks_and_the_whole_walk_thin():
     results = both_models()
-    axes = plotted(walk_figures.FIGURE_9, results).axes[0]
+    axes = plotted(NUMBERED[9], results).axes[0]
     (last,) = lines_of(axes, RIGID)
     trajectory = results["simulate"]["trajectory"]
     shown = trajectory["time"] >= 8 * 0.7
@@ -263,22 +265,22 @@ def test_the_last_stride_is_drawn_as_the_model_looks_and_the_whole_walk_thin():
 
 
 def test_a_constant_energy_looks_constant():
-    axes = plotted(walk_figures.FIGURE_10, rigid_alone()).axes[2]
+    axes = plotted(NUMBERED[10], rigid_alone()).axes[2]
     bottom, top = axes.get_ylim()
     assert top - bottom > 0.5
     assert bottom < 150.24 < top
 
 
 def test_marks_do_not_widen_the_scales():
-    bottom, top = plotted(walk_figures.FIGURE_10, rigid_alone()).axes[0].get_ylim()
+    bottom, top = plotted(NUMBERED[10], rigid_alone()).axes[0].get_ylim()
     assert bottom > 2.5
     assert top < 5.5
 
 
 def test_impacts_do_not_set_the_scale_of_the_mechanical_energy():
     results = both_models()
-    axes = plotted(walk_figures.FIGURE_10, both_models(**{"contact-sim": with_peak(results["contact-sim"])})).axes
-    assert axes[2].get_ylim() == plotted(walk_figures.FIGURE_10, results).axes[2].get_ylim()
+    axes = plotted(NUMBERED[10], both_models(**{"contact-sim": with_peak(results["contact-sim"])})).axes
+    assert axes[2].get_ylim() == plotted(NUMBERED[10], results).axes[2].get_ylim()
 
 
 def with_peak(result):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 from synthetic_engines import PERIOD, ROWS, content
 
 from walkerlab.benchmarks.engines.rows import EngineRow
@@ -53,8 +52,18 @@ def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
 
 def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
     every = list(engines_of("compass", "same-law", results))
-    assert len({to_hex(one.line.get_color()) for one in every}) == len({one.engine for one in every})
+    assert len({one.look.colour for one in every}) == len({one.engine for one in every})
     assert {one.engine for one in every} <= set(COLOURS)
+
+
+def test_each_panel_has_its_own_legend_since_its_lines_may_look_like_those_of_the_other(results):
+    with styled():
+        drawn = ERRORS.plot(results)
+    for axes, legend in zip(drawn.axes, drawn.legends, strict=True):
+        assert legend.get_title().get_text() == axes.get_title(loc="left")
+        looks = {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in legend.get_lines()}
+        assert len(looks) == len(legend.get_lines())
+        assert looks == {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines_of(axes)}
 
 
 def test_a_panel_without_a_finished_walk_says_so():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -34,6 +35,11 @@ def styled(width: float = WIDTH) -> Iterator[None]:
         yield
 
 
+def is_narrow(figure: Any) -> bool:
+    """Whether letters are smaller in a figure."""
+    return bool(figure.bbox.width < NARROW_BELOW * figure.dpi)
+
+
 def blank(height: float) -> Figure:
     """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
     width = matplotlib.rcParams["figure.figsize"][0]
@@ -47,19 +53,22 @@ def entry(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
-def legend_above(figure: Figure, handles: Sequence[Artist]) -> None:
-    """A legend in a band of its own above all axes, in as few rows as fit into the figure's width."""
-    labels = [str(handle.get_label()) for handle in handles]
+def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = None, edge: str = "upper") -> None:
+    """A legend in a band of its own above all axes, in as few rows as fit into the figure's width.
+
+    title  of what it is the legend
+    edge   "lower" puts it below all axes
+    """
+    labels = np.array([str(handle.get_label()) for handle in handles], dtype=object)
     room = figure.get_figwidth() * LEGEND_LETTERS / matplotlib.rcParams["legend.fontsize"]
-    fitting = (columns for columns in range(len(labels), 1, -1) if legend_width(labels, columns) < room)
-    rows = -(-len(labels) // next(fitting, 1))
-    figure.legend(handles=list(handles), loc="outside upper center", ncols=-(-len(labels) // rows))
-
-
-def legend_width(labels: Sequence[str], columns: int) -> float:
-    """Width of a legend (in), on the safe side; matplotlib fills the columns evenly, the first ones first."""
-    longest = [max(map(len, column)) for column in np.array_split(np.array(labels, dtype=object), columns)]
-    return sum(longest) * LETTER + columns * BESIDE_LABEL
+    for columns in range(len(labels), 0, -1):
+        # on the safe side; matplotlib fills the columns evenly, the first ones first
+        letters = sum(max(map(len, column)) for column in np.array_split(labels, columns))
+        if letters * LETTER + columns * BESIDE_LABEL < room:
+            break
+    rows = -(-len(labels) // columns)
+    where: dict[str, Any] = {"loc": f"outside {edge} center", "ncols": -(-len(labels) // rows)}
+    figure.legend(handles=list(handles), title=title, alignment="left", **where)
 
 
 def settle(figure: Figure) -> None:
@@ -84,3 +93,23 @@ def as_file(figure: Figure, kind: str, name: str, title: str) -> bytes:
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(file, format=kind, **undated[kind])
     return file.getvalue()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure as files' bytes, with its words."""
+
+    svg: bytes
+    png: bytes
+    title: str
+    caption: str
+
+
+def files_of(
+    plot: Callable[[], Figure], name: str, title: str, kinds: Sequence[str] = ("svg", "png"), width: float = WIDTH
+) -> list[bytes]:
+    """A figure plotted within the style, of a width in in, and laid out, as a file of each kind."""
+    with styled(width):
+        figure = plot()
+        settle(figure)
+        return [as_file(figure, kind, name, title) for kind in kinds]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -17,11 +16,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
-from walkerlab.figures import style
-from walkerlab.figures.canvas import blank, entry, legend_above
+from walkerlab.figures.canvas import add_legend, blank, entry, is_narrow
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
-from walkerlab.figures.walk_figures import TUNE_STAGE
-from walkerlab.figures.walks import Array, redoes_the_paper
+from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
+from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
 from walkerlab.paper.printed import ANGLE_ERROR
 from walkerlab.store.content import Group
 
@@ -29,14 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
 
 DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
-METHODS_HEIGHT, ENGINES_HEIGHT = 3.9, 4.2  # in
-
-
-def decades(axes: Axes) -> None:
-    """A logarithmic axis of errors, with labels at fewer decades where letters would meet."""
-    if np.isfinite(axes.dataLim.intervaly).all():
-        axes.set_yscale("log")
-        label_ticks(axes.yaxis, 20 if axes.figure.bbox.width > style.NARROW_BELOW * axes.figure.dpi else 8)
 
 
 def label_ticks(axis: Axis, most: int) -> None:
@@ -49,93 +39,106 @@ def label_ticks(axis: Axis, most: int) -> None:
         axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
 
 
+def decades(axes: Axes) -> None:
+    """A logarithmic axis of errors, with labels at fewer decades where letters would meet."""
+    if np.isfinite(axes.dataLim.intervaly).all():
+        axes.set_yscale("log")
+        label_ticks(axes.yaxis, 8 if is_narrow(axes.figure) else 20)
+
+
+@dataclass(frozen=True)
+class Series:
+    """The runs of a method, or of an integrator or contact of an engine, from loose or coarse to tight or fine.
+
+    runs    what is stored of them; gaps are NaN
+    filled  whether its marks are
+    engine  whose runs they are; methods have none
+    """
+
+    look: Look
+    runs: Mapping[str, Array]
+    filled: bool
+    engine: str = ""
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """What matplotlib is told of its line."""
+        marked = {"marker": self.look.marker, "markersize": 4.0}
+        return {**self.look.line, **marked, "markerfacecolor": self.look.colour if self.filled else "none"}
+
+    @property
+    def key(self) -> Line2D:
+        """Its legend entry."""
+        return entry(self.look.label, **self.line)
+
+    @property
+    def walked(self) -> NDArray[np.bool_]:
+        """Which of the runs walked to the end."""
+        return np.asarray(self.runs["outcome"] == "walked")
+
+
 LOOKS = {
-    "dop853": style.Look("dop853", style.BLUE, "-", 1.8, "o", order=5),
-    "radau5": style.Look("radau5", style.VERMILLION, "-", 1.8, "s", order=5),
-    "scipy-rk45": style.Look("scipy-rk45", style.GREEN, DASHED, 1.0, "v"),
-    "scipy-dop853": style.Look("scipy-dop853", style.BLUE, DASHED, 1.0, "o"),
-    "scipy-lsoda": style.Look("scipy-lsoda", style.ORANGE, DASHED, 1.0, "^"),
-    "scipy-radau": style.Look("scipy-radau", style.VERMILLION, DASHED, 1.0, "s"),
-    "scipy-bdf": style.Look("scipy-bdf", style.PURPLE, DASHED, 1.0, "D"),
-    "cvode-bdf": style.Look("cvode-bdf", style.PURPLE, DOTTED, 1.0, "d"),
-    "cvode-adams": style.Look("cvode-adams", style.GREEN, DOTTED, 1.0, "<"),
-    "scipy-dop853-numpy": style.Look("scipy-dop853-numpy", style.GREY, DOTTED, 1.2, "P"),
+    look.label: look
+    for look in (
+        Look("dop853", BLUE, "-", 1.8, "o", order=5),
+        Look("radau5", VERMILLION, "-", 1.8, "s", order=5),
+        Look("scipy-rk45", GREEN, DASHED, 1.0, "v"),
+        Look("scipy-dop853", BLUE, DASHED, 1.0, "o"),
+        Look("scipy-lsoda", ORANGE, DASHED, 1.0, "^"),
+        Look("scipy-radau", VERMILLION, DASHED, 1.0, "s"),
+        Look("scipy-bdf", PURPLE, DASHED, 1.0, "D"),
+        Look("cvode-bdf", PURPLE, DOTTED, 1.0, "d"),
+        Look("cvode-adams", GREEN, DOTTED, 1.0, "<"),
+        Look("scipy-dop853-numpy", GREY, DOTTED, 1.2, "P"),
+    )
 }
-OTHERS = style.Look("", style.BLACK, DOTTED, 1.0, "*")
+OTHERS = Look("", BLACK, DOTTED, 1.0, "*")
 METHOD_VARIABLES = ("method", "tolerance", "reached", "error", "wall_s", "rhs_evaluations", "outcome")
 SMALLEST = 1e-17  # below any floor
 FAILED = 30.0  # where failures are drawn, in terms of the largest error
 
 
-@dataclass(frozen=True)
-class MethodSeries:
-    """One method's runs on a scene, from loose to tight tolerance."""
-
-    look: style.Look
-    runs: Mapping[str, Array]
-
-    @property
-    def reached(self) -> NDArray[np.bool_]:
-        """Which of the runs came to the end."""
-        return np.asarray(self.runs["reached"] != 0)
-
-    @property
-    def line(self) -> dict[str, Any]:
-        """What matplotlib is told of its line; filled marks are those of methods that are compiled as a whole."""
-        filled = self.look.colour if self.look.style == "-" else "none"
-        return {**self.look.line, "marker": self.look.marker, "markersize": 4.0, "markerfacecolor": filled}
-
-
-def series_of(scene: str, results: Results) -> Iterator[MethodSeries]:
-    """The methods in the order in which they were measured."""
+def series_of(scene: str, results: Results) -> Iterator[Series]:
+    """The methods in the order in which they were measured; those compiled as a whole have filled marks."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
-        look = LOOKS.get(name, style.Look(name, OTHERS.colour, OTHERS.style, OTHERS.width, OTHERS.marker))
-        yield MethodSeries(look, {variable: rows[variable][methods == name] for variable in METHOD_VARIABLES})
-
-
-def agreement(scene: str, results: Results) -> float:
-    """How far the reference is from a second one: errors below mean nothing."""
-    return float(results["accuracy"].summary["reference"][scene]["agreement"])
+        look = LOOKS.get(name, replace(OTHERS, label=name))
+        yield Series(look, {one: rows[one][methods == name] for one in METHOD_VARIABLES}, look.style == "-")
 
 
 def plot_methods(scene: str, results: Results) -> Figure:
-    """Run time on the left, right-hand sides on the right, one line for each method."""
+    """Run time on the left, right-hand sides on the right, a line for each method, crosses where it gave up."""
     every = list(series_of(scene, results))
-    floor = max(agreement(scene, results), SMALLEST)
-    errors = [float(one.runs["error"][one.reached].max()) for one in every if one.reached.any()]
-    failed = FAILED * max([floor, *errors])
-    figure = blank(METHODS_HEIGHT)
+    # how far the reference is from a second one: errors below mean nothing
+    floor = max(float(results["accuracy"].summary["reference"][scene]["agreement"]), SMALLEST)
+    errors = [float(np.max(one.runs["error"], where=one.runs["reached"] != 0, initial=floor)) for one in every]
+    failed = FAILED * max(errors)
+    figure = blank(3.9)
     left, right = figure.subplots(1, 2, sharey=True)
     panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides (1)"))
-    for axes, cost, label in panels:
+    for axes, name, label in panels:
         axes.set(xscale="log", xlabel=label)
-        axes.axhspan(SMALLEST, floor, color=style.PALE, zorder=0)
+        axes.axhspan(SMALLEST, floor, color=PALE, zorder=0)
         for one in every:
-            draw_method(axes, one, one.runs[cost].astype(float), floor, failed)
+            there, cost, order = one.runs["reached"] != 0, one.runs[name].astype(float), one.look.order
+            axes.plot(cost[there], np.maximum(one.runs["error"][there], floor), **one.line, zorder=order)
+            cross: dict[str, Any] = {"color": one.look.colour, "linestyle": "none", "marker": "x", "markersize": 5.0}
+            axes.plot(cost[~there], np.full(np.count_nonzero(~there), failed), **cross, zorder=order)
         decades(axes)
         axes.set_ylim(0.3 * floor, 4.0 * failed)
     left.set(ylabel="error of the end state (SI)", title="(a) against run time")
     right.set_title("(b) against right-hand sides")
-    legend_above(figure, entries(every, floor))
+    add_legend(figure, entries(every, floor))
     return figure
 
 
-def draw_method(axes: Axes, one: MethodSeries, cost: Array, floor: float, failed: float) -> None:
-    """The runs that reached the end as a line, the others as crosses above everything."""
-    there, order = one.reached, one.look.order
-    axes.plot(cost[there], np.maximum(one.runs["error"][there], floor), **one.line, zorder=order)
-    crosses = np.full(int((~there).sum()), failed)
-    axes.plot(cost[~there], crosses, color=one.look.colour, linestyle="none", marker="x", markersize=5.0, zorder=order)
-
-
-def entries(every: Sequence[MethodSeries], floor: float) -> list[Line2D]:
+def entries(every: Sequence[Series], floor: float) -> list[Line2D]:
     """The legend: methods, failures, and what is below the reference's own uncertainty."""
-    methods = [entry(one.look.label, **one.line) for one in every]
-    cross = entry("end not reached", color=style.BLACK, linestyle="none", marker="x", markersize=5.0)
-    known = entry(f"reference unsure, {floor:.0e}", color=style.PALE, linewidth=6.0)
-    return [*methods, *([] if all(one.reached.all() for one in every) else [cross]), known]
+    found = [one.key for one in every]
+    if not all(one.runs["reached"].all() for one in every):
+        found.append(entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0))
+    return [*found, entry(f"reference unsure, {floor:.0e}", color=PALE, linewidth=6.0)]
 
 
 def tell_methods(scene: str, results: Results) -> tuple[Any, ...]:
@@ -145,7 +148,9 @@ def tell_methods(scene: str, results: Results) -> tuple[Any, ...]:
     failures = [
         (one.look.label, tolerance, outcome)
         for one in every
-        for tolerance, outcome, reached in zip(one.runs["tolerance"], one.runs["outcome"], one.reached, strict=True)
+        for tolerance, outcome, reached in zip(
+            one.runs["tolerance"], one.runs["outcome"], one.runs["reached"], strict=True
+        )
         if not reached
     ]
     itself = any(one.look.label == reference["method"] for one in every)
@@ -159,73 +164,47 @@ def methods_on(scene: str) -> Illustration:
     return Illustration(f"accuracy-{scene}", (need,), plot, told, words="accuracy", scene=scene)
 
 
-ACCURACY = tuple(methods_on(scene) for scene in ("rigid", "contact", "contact-near-rigid"))
-
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
 OF_A_SERIES = ("step_s", "error", "wall_s", "period_s", "outcome")
 ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *OF_A_SERIES)
-COLOURS = {OURS: style.BLACK, "mujoco": style.VERMILLION, "drake": style.BLUE, "exudyn": style.GREEN}
-OTHER_ENGINES = (style.ORANGE, style.PURPLE, style.GREY)
+COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
+OTHER_ENGINES = (ORANGE, PURPLE, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2, 1.0, 1.2)), (0.0, (2.0, 2.0)))
 
 
-@dataclass(frozen=True)
-class EngineSeries:
-    """The runs of one integrator, or contact, of one engine from the gait, from coarse to fine; gaps are NaN."""
-
-    engine: str
-    name: str
-    place: int  # among those of its engine
-    runs: Mapping[str, Array]
-
-    @property
-    def label(self) -> str:
-        """In legends."""
-        return f"{self.engine} {self.name}"
-
-    @property
-    def walked(self) -> NDArray[np.bool_]:
-        """Which of the runs walked to the end."""
-        return np.asarray(self.runs["outcome"] == "walked")
-
-    @property
-    def line(self) -> Line2D:
-        """Its look, as a line for a legend."""
-        colour = COLOURS.get(self.engine, OTHER_ENGINES[len(self.engine) % len(OTHER_ENGINES)])
-        return entry(
-            self.label, color=colour, linestyle=DASHES[self.place % len(DASHES)],
-            linewidth=1.8 if self.engine == OURS else 1.1, marker=MARKERS[self.place % len(MARKERS)], markersize=4.0,
-            markerfacecolor=colour if self.place == 0 else "none",
-        )  # fmt: skip
-
-
-def engines_of(scene: str, experiment: str, results: Results) -> Iterator[EngineSeries]:
-    """The series in the order in which they were measured."""
+def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series]:
+    """The series in the order in which they were measured, each from the gait; an engine's first has filled marks."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
-    engine, name = rows["engine"].astype(str), rows["integrator"].astype(str)
+    engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
     here = (rows["scene"] == scene) & (rows["experiment"] == experiment)
-    keys = list(dict.fromkeys(zip(engine[here].tolist(), name[here].tolist(), strict=True)))
-    for number, key in enumerate(keys):
-        mine = here & (engine == key[0]) & (name == key[1]) & (rows["start"] == 1.0)
-        place = [before for before, _ in keys[:number]].count(key[0])
-        yield EngineSeries(*key, place, {variable: rows[variable][mine] for variable in OF_A_SERIES})
+    places: dict[str, int] = {}
+    for engine, name in dict.fromkeys(zip(engines[here].tolist(), names[here].tolist(), strict=True)):
+        mine = here & (engines == engine) & (names == name) & (rows["start"] == 1.0)
+        place = places[engine] = places.get(engine, -1) + 1
+        colour = COLOURS.get(engine, OTHER_ENGINES[len(engine) % len(OTHER_ENGINES)])
+        style, marker = DASHES[place % len(DASHES)], MARKERS[place % len(MARKERS)]
+        look = Look(f"{engine} {name}", colour, style, 1.8 if engine == OURS else 1.1, marker)
+        yield Series(look, {variable: rows[variable][mine] for variable in OF_A_SERIES}, place == 0, engine)
 
 
 def plot_errors(scene: str, results: Results) -> Figure:
-    """Same law on the left, own law on the right."""
-    figure = blank(ENGINES_HEIGHT)
-    left, right = figure.subplots(1, 2)
-    same, own = (list(engines_of(scene, experiment, results)) for experiment in (SAME_LAW, OWN_LAW))
-    for axes, every in ((left, same), (right, own)):
+    """Same law on the left, own law on the right, each with its legend: the same look means something else there."""
+    figure = blank(4.6)
+    panels = (
+        (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
+        (OWN_LAW, "lower", "(b) each engine's own contact", "difference of the step period (s)"),
+    )
+    for axes, (experiment, edge, title, label) in zip(figure.subplots(1, 2), panels, strict=True):
+        every = list(engines_of(scene, experiment, results))
         for one in every:
             draw_engine(axes, one, "wall_s", one.runs["error"])
         costs(axes)
         decades(axes)
-        axes.set_xlabel("run time (s)")
-    left.set(ylabel="error of the end state (SI)", title="(a) ADAMS's law in each integrator")
-    right.set(ylabel="difference of the step period (s)", title="(b) each engine's own contact")
-    legend_above(figure, [one.line for one in (*same, *own) if np.isfinite(one.runs["error"]).any()])
+        axes.set(xlabel="run time (s)", ylabel=label, title=title)
+        found = [one.key for one in every if np.isfinite(one.runs["error"]).any()]
+        if found:
+            add_legend(figure, found, title, edge)
     return figure
 
 
@@ -238,30 +217,27 @@ def costs(axes: Axes) -> None:
         axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
 
 
-def draw_engine(axes: Axes, one: EngineSeries, cost: str, values: Array) -> None:
+def draw_engine(axes: Axes, one: Series, cost: str, values: Array) -> None:
     """A series without its gaps."""
     there = np.isfinite(one.runs[cost]) & np.isfinite(values) & (values > 0.0)
-    line = one.line
-    line.set_data(one.runs[cost][there], values[there])
-    axes.add_line(line)
-    axes.autoscale_view()
+    axes.plot(one.runs[cost][there], values[there], **one.line)
 
 
 def plot_periods(scene: str, results: Results) -> Figure:
     """Period of the last step over step size, own contact, with ADAMS's law and the rigid gait as levels."""
-    figure = blank(ENGINES_HEIGHT)
+    figure = blank(4.2)
     axes = figure.subplots()
     every = [one for one in engines_of(scene, OWN_LAW, results) if one.engine != OURS]
     for one in every:
         draw_engine(axes, one, "step_s", np.where(one.walked, one.runs["period_s"], np.nan))
     reference = results[ENGINES_STAGE].summary["reference"][scene]
-    levels = [axes.axhline(reference["period_s"], color=style.CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
+    levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
         level = reference["rigid_period_s"]
-        levels.append(axes.axhline(level, color=style.GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
+        levels.append(axes.axhline(level, color=GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
     costs(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
-    legend_above(figure, [*levels, *(one.line for one in every if one.walked.any())])
+    add_legend(figure, [*levels, *(one.key for one in every if one.walked.any())])
     return figure
 
 
@@ -274,38 +250,29 @@ def tell_errors(scene: str, results: Results) -> tuple[Any, ...]:
 def tell_periods(scene: str, results: Results) -> tuple[Any, ...]:
     """The conclusion on own contacts, and the steps of what did not walk to the end."""
     every = engines_of(scene, OWN_LAW, results)
-    failed = [(one.label, one.runs["step_s"][~one.walked]) for one in every if not one.walked.all()]
+    failed = [(one.look.label, one.runs["step_s"][~one.walked]) for one in every if not one.walked.all()]
     return results[ENGINES_STAGE].summary["conclusions"][scene][OWN_LAW], failed
 
 
-def engines_on(scene: str) -> tuple[Illustration, Illustration]:
+def engines_on(scene: str) -> Iterator[Illustration]:
     """The figures of one scene."""
     need = Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
-
-    def one(about: str, plot: Any, tell: Any) -> Illustration:
-        made = partial(plot, scene), partial(tell, scene)
-        return Illustration(f"engines-{about}-{scene}", (need,), *made, words=f"engines-{about}", scene=scene)
-
-    return one("errors", plot_errors, tell_errors), one("periods", plot_periods, tell_periods)
+    for about, plot, told in (("errors", plot_errors, tell_errors), ("periods", plot_periods, tell_periods)):
+        made = partial(plot, scene), partial(told, scene)
+        yield Illustration(f"engines-{about}-{scene}", (need,), *made, words=f"engines-{about}", scene=scene)
 
 
-ENGINES = (*engines_on("compass"), *engines_on("kneed"))
-
-ALIGNED, VELOCITY, RAW = "angle_error_rad", "velocity_error_rad_s", "raw_angle_error_rad"
-NUMERICAL, WALL = "numerical_time_s", "wall_s"
+ALIGNED, NUMERICAL, WALL = "angle_error_rad", "numerical_time_s", "wall_s"
 LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
-ERRORS: Final = (
-    (RAW, style.Look("angle at the same time (rad)", style.VERMILLION, ":", 1.2, "v")),
-    (ALIGNED, style.Look("angle in phase (rad)", style.BLUE, "-", 1.6, "o")),
-    (VELOCITY, style.Look("angular velocity in phase (rad/s)", style.ORANGE, "--", 1.4, "s")),
-    (NUMERICAL, style.Look("numerical error, last touch (s)", style.GREY, "-.", 1.0, "x")),
-)
-LIMIT = (
-    Need(
-        TUNE_STAGE, LIMITS[0][0], (WALL, ALIGNED, VELOCITY, RAW, NUMERICAL), "no gait to lead towards the rigid limit"
-    ),
-)
-CLAIM: Final = (0.0, (1.0, 2.0))
+ERRORS: Final = {
+    "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
+    ALIGNED: Look("angle in phase (rad)", BLUE, "-", 1.6, "o"),
+    "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
+    NUMERICAL: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
+}
+LIMIT = Need(TUNE_STAGE, LIMITS[0][0], (WALL, *ERRORS), "no gait to lead towards the rigid limit")
+CLAIM: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
+CONFIGS: Final[dict[str, Any]] = {"color": BLACK, "linestyle": "", "marker": "o", "markersize": 9, "fillstyle": "none"}
 LEAST = 1e-14
 """Shown in place of a numerical error of nothing, which has no place on a logarithmic axis."""
 
@@ -316,44 +283,36 @@ def plot_limit(results: Results) -> Figure:
     found = limits(results)
     both = figure.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0]
     for axes, (rows, title) in zip(both, found, strict=True):
-        draw_limit(axes, rows)
+        for name, look in ERRORS.items():
+            values = np.maximum(np.abs(rows[name]), LEAST)
+            axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
+            if name != NUMERICAL:
+                axes.plot(rows[WALL][:1], values[:1], **CONFIGS)
+        axes.set(xscale="log", yscale="log", title=title, xlabel="run time of the walk (s)")
         if redoes_the_paper(results):
-            axes.axhline(ANGLE_ERROR.value, color=style.BLACK, linestyle=CLAIM, linewidth=1.0)
-        axes.set(title=title, xlabel="run time of the walk (s)")
+            axes.axhline(ANGLE_ERROR.value, **CLAIM)
     both[0].set_ylabel("error")
-    key: list[Artist] = [entry(look.label, **look.line, marker=look.marker, markersize=4) for _, look in ERRORS]
+    key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERRORS.values()]
     if redoes_the_paper(results):
-        key.append(entry("the paper's claim", color=style.BLACK, linestyle=CLAIM, linewidth=1.0))
-    key.append(
-        entry("the config's contact", color=style.BLACK, linestyle="", marker="o", markersize=9, fillstyle="none")
-    )
-    legend_above(figure, key)
+        key.append(entry("the paper's claim", **CLAIM))
+    add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
     return figure
 
 
 def limits(results: Results) -> list[tuple[Group, str]]:
     """The series there are, with their titles: feet that roll in both models too are not made points as well."""
     stored = results[TUNE_STAGE].groups
-    there = [(group, title) for group, title in LIMITS if group in stored and ALIGNED in stored[group].variables]
-    found = [(stored[group], title) for group, title in there]
+    found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
     return found if len(found) > 1 else [(found[0][0], "")]
-
-
-def draw_limit(axes: Axes, rows: Group) -> None:
-    """One series."""
-    for name, look in ERRORS:
-        values = np.maximum(np.abs(rows[name]), LEAST)
-        axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
-        if name != NUMERICAL:
-            axes.plot(rows[WALL][:1], values[:1], "o", markersize=9, color=style.BLACK, fillstyle="none")
-    axes.set(xscale="log", yscale="log")
 
 
 def tell_limit(results: Results) -> tuple[Any, ...]:
     """What the config's contact and the most rigid one amount to, with point feet besides, and the paper's claim."""
-    errors = [rows[ALIGNED] for rows, _ in limits(results)]
-    point_feet = errors[1][-1] if len(errors) > 1 else None
-    return errors[0][0], errors[0][-1], point_feet, ANGLE_ERROR.text if redoes_the_paper(results) else ""
+    first, *point_feet = [rows[ALIGNED] for rows, _ in limits(results)]
+    claim = ANGLE_ERROR.text if redoes_the_paper(results) else ""
+    return first[0], first[-1], point_feet[0][-1] if point_feet else None, claim
 
 
-FIGURE_12 = paper_figure(12, LIMIT, plot_limit, tell_limit)
+ACCURACY = tuple(methods_on(scene) for scene in ("rigid", "contact", "contact-near-rigid"))
+ENGINES = (*engines_on("compass"), *engines_on("kneed"))
+FIGURE_12 = paper_figure(12, (LIMIT,), plot_limit, tell_limit)

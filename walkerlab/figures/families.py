@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank, entry, legend_above
+from walkerlab.figures.canvas import add_legend, blank, entry
 from walkerlab.figures.illustration import Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
@@ -37,10 +37,9 @@ OTHER: Final = GREEN
 
 @dataclass(frozen=True)
 class DrawnBranch:
-    """A branch with its model."""
+    """A branch, or a curve over two parameters, with its model."""
 
     model: str
-    number: int
     group: Group
 
     @property
@@ -55,9 +54,14 @@ class DrawnBranch:
         return MODELS[self.model] if period & (period - 1) == 0 else OTHER
 
 
-def branches_of(results: Results) -> Iterator[DrawnBranch]:
-    """Every branch of a result."""
-    return (DrawnBranch(*found) for found in numbered(results, "branch"))
+def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
+    """Every branch of a result, or every curve, in the order in which they were followed."""
+    groups = results[STAGE].groups
+    for model in MODELS:
+        for number in count():
+            if (group := groups.get(f"{model}/{name}_{number}")) is None:
+                break
+            yield DrawnBranch(model, group)
 
 
 def label_of(results: Results) -> str:
@@ -85,21 +89,18 @@ class Curve:
 
 def curve_of(group: Group, name: str) -> Curve:
     """A quantity along a branch; its stability changes at bifurcations, and else in the middle between neighbours."""
-    value, quantity = group["value"], group[name]
-    stable = group["stable"].astype(bool)
+    value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
-    places = group["mark_after"].astype(int) + 1
-    order = np.argsort(places, kind="stable")
-    marked = places[order] + np.arange(places.size)
-    value = np.insert(value, places[order], group["mark_value"][order])
-    quantity = np.insert(quantity, places[order], group[f"mark_{name}"][order], axis=0)
-    on_mark = np.zeros(value.size, bool)
-    on_mark[marked] = True
-    known = np.insert(stable, places[order], True)  # a bifurcation bounds what is stable and what is not
+    order = np.argsort(group["mark_after"].astype(int), kind="stable")
+    places = group["mark_after"].astype(int)[order] + 1
+    value = np.insert(value, places, group["mark_value"][order])
+    quantity = np.insert(quantity, places, group[f"mark_{name}"][order], axis=0)
+    # a bifurcation bounds what is stable and what is not
+    known, on_mark = np.insert(stable, places, True), np.insert(np.zeros(stable.size, bool), places, True)
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
-    kinds = tuple(str(kind) for kind in group["mark_kind"][order])
-    return Curve(value, quantity, between, tuple(zip((int(place) for place in marked), kinds, strict=True)))
+    marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
+    return Curve(value, quantity, between, tuple(marks))
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
@@ -111,16 +112,14 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
         if begin == end:
             continue
         stable = bool(curve.stable[begin])
-        axes.plot(
-            *stretch_of(curve, begin, end), color=branch.colour,
-            linestyle=STYLES[stable], linewidth=width if stable else 0.6 * width, zorder=4 if stable else 3,
-        )  # fmt: skip
+        thick, order = (width, 4) if stable else (0.6 * width, 3)
+        stretch = stretch_of(curve, begin, end)
+        axes.plot(*stretch, color=branch.colour, linestyle=STYLES[stable], linewidth=thick, zorder=order)
     for place, kind in curve.marks:
         marker, colour = MARKS[kind]
-        axes.plot(
-            np.full(curve.quantity.shape[1], curve.value[place]), curve.quantity[place], linestyle="none",
-            marker=marker, markersize=2.6, color=colour, markeredgewidth=0.0, zorder=6,
-        )  # fmt: skip
+        mark: dict[str, Any] = {"marker": marker, "markersize": 2.6, "color": colour, "markeredgewidth": 0.0}
+        values = np.full(curve.quantity.shape[1], curve.value[place])
+        axes.plot(values, curve.quantity[place], linestyle="none", **mark, zorder=6)
     return {kind for _, kind in curve.marks}
 
 
@@ -138,16 +137,6 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
     return np.concatenate([first, value[1:]]), np.concatenate([parting, quantity[1:]])
 
 
-def numbered(results: Results, name: str) -> Iterator[tuple[str, int, Group]]:
-    """The groups of a name, with their models and numbers, in the order in which they were followed."""
-    groups = results[STAGE].groups
-    for model in MODELS:
-        number = 0
-        while (group := groups.get(f"{model}/{name}_{number}")) is not None:
-            yield model, number, group
-            number += 1
-
-
 def clouds(results: Results) -> Iterator[tuple[str, Group]]:
     """What walks of the models settled on."""
     found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
@@ -160,21 +149,6 @@ def model_entries(drawn: Sequence[DrawnBranch], **look: Any) -> list[Artist]:
     return [entry(f"{model} model", color=colour, **look) for model, colour in MODELS.items() if model in models]
 
 
-def key_of(results: Results, kinds: set[str]) -> list[Artist]:
-    """What the legend has; kinds of the bifurcations that are drawn."""
-    drawn = list(branches_of(results))
-    found = model_entries(drawn, linewidth=1.5)
-    if any(branch.colour == OTHER for branch in drawn):
-        found.append(entry("other gaits", color=OTHER, linewidth=1.0))
-    found.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
-    if any(clouds(results)):
-        found.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
-    for kind, (marker, colour) in MARKS.items():
-        if kind in kinds:
-            found.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
-    return found
-
-
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
@@ -184,33 +158,36 @@ def plot_branches(results: Results) -> Figure:
     """Both quantities over the whole span on the left, over the part with bifurcations on the right."""
     figure = blank(5.6)
     panels = figure.subplots(2, 2)
-    close = cascade_of(results)
+    branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     kinds: set[str] = set()
-    for row, (name, words) in enumerate(QUANTITIES.items()):
-        for column, axes in enumerate(panels[row]):
-            kinds |= draw_family(axes, results, name)
+    for row, (name, words) in zip(panels, QUANTITIES.items(), strict=True):
+        for axes, shown in zip(row, (None, close), strict=True):
+            for model, cloud in settled:
+                values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
+                colour = BLACK if model == "rigid" else GREY
+                axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
+            kinds.update(*(draw_branch(axes, branch, name) for branch in branches))
             axes.set_xlabel(label_of(results))
-            if column == 1 and close is not None:
-                axes.set_xlim(*close)
-            axes.set_ylim(*bounds(results, name, close if column == 1 else None))
-        units = next(branches_of(results)).group.variables[name].units
-        panels[row][0].set_ylabel(with_unit(words, units))
+            if shown is not None:
+                axes.set_xlim(*shown)
+            axes.set_ylim(*bounds(results, name, shown))
+        row[0].set_ylabel(with_unit(words, branches[0].group.variables[name].units))
     for axes, title in zip(panels[0], ("(a) all of it", "(b) where gaits change"), strict=True):
         axes.set_title(title)
-    legend_above(figure, key_of(results, kinds))
+    key = model_entries(branches, linewidth=1.5)
+    if any(branch.colour == OTHER for branch in branches):
+        key.append(entry("other gaits", color=OTHER, linewidth=1.0))
+    key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
+    if settled:
+        key.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
+    marks = {kind: mark for kind, mark in MARKS.items() if kind in kinds}
+    for kind, (marker, colour) in marks.items():
+        key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
+    add_legend(figure, key)
     return figure
 
 
-def draw_family(axes: Axes, results: Results, name: str) -> set[str]:
-    """One quantity of every branch, with its bifurcations and the attractor behind."""
-    for model, cloud in clouds(results):
-        values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
-        colour = BLACK if model == "rigid" else GREY
-        axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
-    return {kind for branch in branches_of(results) for kind in draw_branch(axes, branch, name)}
-
-
-def cascade_of(results: Results) -> tuple[float, float] | None:
+def close_of(results: Results) -> tuple[float, float] | None:
     """The part of the axis with bifurcations, from before the first to where the attractor ends."""
     summary = results[STAGE].summary
     found = [one["value"] for one in summary["bifurcations"]]
@@ -224,17 +201,13 @@ def cascade_of(results: Results) -> tuple[float, float] | None:
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
     """Room for what is stable and for the gaits of one step, in the part that is shown."""
-    shown: list[NDArray[Any]] = []
+    shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
-        group = branch.group
-        inside = np.ones(group["value"].size, bool)
+        value, wanted = branch.group["value"], branch.group["stable"].astype(bool)
         if close is not None:
-            inside = (group["value"] >= close[0]) & (group["value"] <= close[1])
-        wanted = inside & group["stable"].astype(bool)
-        if close is None and branch.period == 1:
-            wanted = inside
-        shown.append(group[name][wanted].ravel())
-    values = np.concatenate([*shown, *(cloud[name].ravel() for _, cloud in clouds(results))])
+            wanted &= (value >= close[0]) & (value <= close[1])
+        shown.append(branch.group[name][wanted | (close is None and branch.period == 1)].ravel())
+    values = np.concatenate(shown)
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
     room = ROOM * max(float(np.ptp(values)), 1e-9)
@@ -258,26 +231,21 @@ def plot_multipliers(results: Results) -> Figure:
     left, right = figure.subplots(1, 2)
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
     for branch in drawn:
-        draw_multipliers(left, right, branch)
+        value, real, imag = (branch.group[name] for name in ("value", "multiplier_real", "multiplier_imag"))
+        dots: dict[str, Any] = {"color": branch.colour, "marker": "o", "markersize": 1.6}
+        left.plot(real.ravel(), imag.ravel(), linestyle="none", **dots)
+        last = int(np.argmax(value))
+        left.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
+        # stored largest first, so that each magnitude is a line
+        right.plot(value, np.hypot(real, imag), linewidth=1.0, **dots)
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
     left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
     right.set(xlabel=label_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter")
-    handles = model_entries(drawn, marker="o", markersize=3)
     end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
-    legend_above(figure, [*handles, end])
+    add_legend(figure, [*model_entries(drawn, marker="o", markersize=3), end])
     return figure
-
-
-def draw_multipliers(plane: Axes, over: Axes, branch: DrawnBranch) -> None:
-    """Every multiplier along the branch, its last place marked; magnitudes, largest first, so that each is a line."""
-    real, imag = branch.group["multiplier_real"], branch.group["multiplier_imag"]
-    dots: dict[str, Any] = {"color": branch.colour, "marker": "o", "markersize": 1.6}
-    plane.plot(real.ravel(), imag.ravel(), linestyle="none", **dots)
-    last = int(np.argmax(branch.group["value"]))
-    plane.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
-    over.plot(branch.group["value"], np.hypot(real, imag), linewidth=1.0, **dots)
 
 
 def tell_multipliers(results: Results) -> tuple[Any, ...]:
@@ -301,24 +269,24 @@ DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#
 OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
-def curves(results: Results) -> list[tuple[str, Group]]:
-    """The curves with their models."""
-    return [(model, group) for model, _, group in numbered(results, "curve")]
-
-
 def plot_plane(results: Results) -> Figure:
-    """Regions by what walks settle on, and every curve over them."""
+    """Regions by what walks settle on, and every curve over them, by model, kind and period."""
     figure = blank(4.4)
     axes = figure.subplots()
     regions = results[STAGE].groups.get("rigid/regions")
     key: list[Artist] = []
     if regions is not None:
-        value, second = regions["value"], regions["second"]
-        mesh = partial(axes.pcolormesh, value, second, shading="nearest", rasterized=True)
+        mesh = partial(axes.pcolormesh, regions["value"], regions["second"], shading="nearest", rasterized=True)
         key = draw_kinds(lambda numbers, **look: mesh(numbers.T, **look), region_kinds(regions))
-    legend_above(figure, [*key, *draw_curves(axes, curves(results))])
+    looks: dict[tuple[str, str], dict[str, Any]] = {}
+    for curve in branches_of(results, "curve"):
+        kind = str(curve.group.attrs["kind"])
+        look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
+        axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
+        axes.set_ylabel(curve.group.variables["second"].long_name)
+    order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
+    add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
     axes.set_xlabel(label_of(results))
-    axes.set_ylabel(curves(results)[0][1].variables["second"].long_name)
     return figure
 
 
@@ -335,27 +303,11 @@ def region_kinds(regions: Group) -> list[Kind]:
     return [kind for kind in kinds if kind[2].any()]
 
 
-def draw_curves(axes: Axes, drawn: list[tuple[str, Group]]) -> list[Artist]:
-    """Every curve, by model, kind and period; returns the key."""
-    seen: dict[tuple[str, str], None] = {}
-    for model, group in drawn:
-        kind = str(group.attrs["kind"])
-        axes.plot(
-            group["value"], group["second"], color=CURVE_COLOURS[model], linestyle=CURVE_STYLES[kind],
-            linewidth=WIDTHS.get(int(group.attrs["period"]), FINEST),
-        )  # fmt: skip
-        seen[model, kind] = None
-    return [
-        entry(f"{kind}s, {model} model", color=CURVE_COLOURS[model], linestyle=CURVE_STYLES[kind])
-        for model, kind in sorted(seen, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
-    ]
-
-
 def tell_plane(results: Results) -> tuple[Any, ...]:
     """What the curves divide, and how much of the plane walks."""
-    drawn = curves(results)
-    kinds = sorted({str(group.attrs["kind"]) for _, group in drawn}, key=list(MARKS).index)
-    models = [model for model in CURVE_COLOURS if any(model == one for one, _ in drawn)]
+    drawn = list(branches_of(results, "curve"))
+    kinds = sorted({str(curve.group.attrs["kind"]) for curve in drawn}, key=list(MARKS).index)
+    models = [model for model in CURVE_COLOURS if any(model == curve.model for curve in drawn)]
     regions = results[STAGE].groups.get("rigid/regions")
     shares = [] if regions is None else [(name, where.mean()) for _, name, where in region_kinds(regions)]
     return kinds, models, shares

@@ -6,12 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from walkerlab.figures.canvas import blank, entry, legend_above
+from walkerlab.figures.canvas import add_legend, blank, entry
 from walkerlab.figures.illustration import Illustration, Need, Results
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, LEGS, ORANGE, PURPLE
 from walkerlab.figures.walks import (
@@ -45,63 +44,44 @@ NOTHING: Final = 1e-3
 
 def plot_forces(results: Results) -> Figure:
     """Both forces in time on the left, one against the other on the right."""
-    walk = walk_of(results[CONTACT_STAGE], CONTACT).first(STRIDES)
+    result = results[CONTACT_STAGE]
+    walk = walk_of(result, CONTACT).first(STRIDES)
+    loads, pulls = walk[NORMAL], walk[FRICTION]
+    # the normal force (N) up to which it is shown
+    top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     panels = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
     normal, friction, cone = panels["normal"], panels["friction"], panels["cone"]
-    top = in_sight(walk)
-    steepest = draw_cone(cone, results, top)
+    key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
+    steepest = 0.0
+    # no cone where no foot feels any friction
+    for name, style in (("static", "-"), ("dynamic", "--")) if result[TRAJECTORY][FRICTION].any() else ():
+        coefficient = float(result.identity.config_slice["contact"][f"{name}_friction"])
+        bound: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": style}
+        for sign in (-1.0, 1.0):
+            cone.plot([0.0, top], [0.0, sign * coefficient * top], **bound)
+        key.append(entry(f"{name} coefficient, {coefficient:g}", **bound))
+        steepest = max(steepest, coefficient)
+    cone.axhline(0.0, color=GREY, linewidth=0.6)
     for leg, look in enumerate(LEGS):
-        load, pull = walk[NORMAL][:, leg], walk[FRICTION][:, leg]
+        load, pull = loads[:, leg], pulls[:, leg]
         line(normal, walk.time, load, look)
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
-    for axes, name, words, title in (
-        (normal, NORMAL, "normal force", "(a) normal force"),
-        (friction, FRICTION, "friction", "(b) friction, downhill positive"),
-    ):
-        axes.set(ylabel=walk.label(words, name), title=title, xlim=(0.0, float(walk.time[-1])))
-    normal.set_ylim(-0.03 * top, top)
+    reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
+    wide = max(reach, 0.6 * steepest * top)
+    of_normal, of_friction = walk.label("normal force", NORMAL), walk.label("friction", FRICTION)
+    end = (0.0, float(walk.time[-1]))
+    normal.set(ylabel=of_normal, title="(a) normal force", xlim=end, ylim=(-0.03 * top, top))
+    friction.set(ylabel=of_friction, title="(b) friction, downhill positive", xlim=end, ylim=(-reach, reach))
     friction.sharex(normal)
     friction.set_xlabel("time (s)")
     normal.tick_params(labelbottom=False)
-    reach = 1.1 * max(float(np.abs(walk[FRICTION][walk[NORMAL] < top]).max()), 1e-9)
-    friction.set_ylim(-reach, reach)
-    wide = max(reach, 0.6 * steepest * top)
-    cone.set(xlabel=walk.label("normal force", NORMAL), ylabel=walk.label("friction", FRICTION))
-    cone.set(xlim=(0.0, top), ylim=(-wide, wide), title="(c) against the friction cone")
-    legs: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
-    cones = [entry(label, color=BLACK, linewidth=1.0, linestyle=style) for label, style, _ in cone_of(results)]
-    legend_above(figure, [*legs, *cones])
+    cone.set(xlabel=of_normal, ylabel=of_friction, title="(c) against the friction cone")
+    cone.set(xlim=(0.0, top), ylim=(-wide, wide))
+    add_legend(figure, key)
     return figure
-
-
-def cone_of(results: Results) -> list[tuple[str, str, float]]:
-    """The bounds of friction: label, style and coefficient; none where no foot feels any."""
-    asked = results[CONTACT_STAGE].identity.config_slice["contact"]
-    if not results[CONTACT_STAGE][TRAJECTORY][FRICTION].any():
-        return []
-    words = {"static": "-", "dynamic": "--"}
-    return [
-        (f"{name} coefficient, {asked[f'{name}_friction']:g}", style, float(asked[f"{name}_friction"]))
-        for name, style in words.items()
-    ]
-
-
-def draw_cone(axes: Axes, results: Results, top: float) -> float:
-    """The bounds of friction over the normal force; the largest coefficient."""
-    for _, style, coefficient in cone_of(results):
-        for sign in (-1.0, 1.0):
-            axes.plot([0.0, top], [0.0, sign * coefficient * top], color=BLACK, linewidth=1.0, linestyle=style)
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    return max((coefficient for *_, coefficient in cone_of(results)), default=0.0)
-
-
-def in_sight(walk: Walk) -> float:
-    """The normal force (N) up to which a figure shows it."""
-    load = walk[NORMAL][walk[NORMAL] > 0.0]
-    return 1.1 * float(np.quantile(load, OF_SAMPLES)) if load.size else 1.0
 
 
 def tell_forces(results: Results) -> tuple[Any, ...]:
@@ -135,7 +115,7 @@ def plot_losses(results: Results) -> Figure:
         below += lost[: steps.size]
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set(xlabel="step number (1)", ylabel="energy lost (J)")
-    legend_above(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
+    add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
     return figure
 
 

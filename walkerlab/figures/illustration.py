@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import as_file, settle, styled
+from walkerlab.figures.canvas import Drawing, files_of
 from walkerlab.figures.style import POINT
 from walkerlab.prose import Prose, f, percent
 from walkerlab.store.artifact import Stored
@@ -46,15 +46,6 @@ class Need:
         there = group is not None and all(name in group.variables for name in self.variables)
         there = there and (not self.scene or self.scene in result.summary["reference"])
         return None if there else f"{self.stage}: {self.or_else}"
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """An illustration as files' bytes, with its words."""
-
-    svg: bytes
-    png: bytes
-    caption: str
 
 
 @dataclass(frozen=True)
@@ -121,18 +112,12 @@ class Illustration:
 
     def drawn(self, results: Results) -> Drawing:
         """Its files and words; the same results give the same bytes."""
-        with styled():
-            figure = self.plot(results)
-            settle(figure)
-            svg, png = (as_file(figure, kind, self.name, self.heading) for kind in ("svg", "png"))
-            return Drawing(svg, png, self.caption(results))
+        svg, png = files_of(lambda: self.plot(results), self.name, self.heading)
+        return Drawing(svg, png, self.title, self.caption(results))
 
     def as_file(self, results: Results, kind: str, width: float) -> bytes:
         """The figure as PDF, SVG or PNG, of a width in pt."""
-        with styled(POINT * width):
-            figure = self.plot(results)
-            settle(figure)
-            return as_file(figure, kind, self.name, self.heading)
+        return files_of(lambda: self.plot(results), self.name, self.heading, [kind], POINT * width)[0]
 
 
 def paper_figure(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -11,17 +12,15 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
-from walkerlab.figures.canvas import blank, entry, legend_above
+from walkerlab.figures.canvas import add_legend, blank, entry
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
-from walkerlab.figures.walk_figures import TUNE_STAGE, redoes_the_procedure
-from walkerlab.figures.walks import redoes_the_paper
+from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.labels import with_unit
 from walkerlab.store.content import Group
@@ -90,58 +89,43 @@ COLOURS: Final = {
     Outcome.REJECTED: PALE,
     Outcome.BENT_KNEE: BLUE,
 }
-MARKS: Final = (
-    ("rigid start", "o", (1.0, 1.0)),
-    ("adjusted start", "D", ("adjusted_swing_factor", "adjusted_stance_factor")),
-    ("contact gait", "X", ("gait_swing_factor", "gait_stance_factor")),
-)
-MODELS: Final = (("outcome", "steps", "(a) contact model"), ("rigid_outcome", "rigid_steps", "(b) rigid model"))
+OUTCOMES: Final = discrete([COLOURS[one] for one in Outcome])
+MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
 def plot_starts(results: Results) -> Figure:
     """Both models' maps on the same axes, outcome as colour, lines where more steps are walked."""
     cells = results[TUNE_STAGE]["map"]
+    across, up = cells[SWING], cells[STANCE]
+    marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
+    for name, marker, size, face in (("adjusted", "D", 9, "none"), ("gait", "X", 6, WHITE)):
+        place = cells.attrs.get(f"{name}_{SWING}"), cells.attrs.get(f"{name}_{STANCE}")
+        if None not in place:
+            marks.append(("contact gait" if name == "gait" else "adjusted start", marker, size, face, place))
     figure = blank(3.9)
     both = figure.subplots(1, 2, sharex=True, sharey=True)
-    seen: set[Outcome] = set()
     swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
-    for axes, (outcome, steps, title) in zip(both, MODELS, strict=True):
-        seen |= draw_starts(axes, cells, outcome, steps)
+    for axes, (model, title) in zip(both, MODELS, strict=True):
+        steps = cells[f"{model}steps"]
+        axes.pcolormesh(across, up, cells[f"{model}outcome"], **OUTCOMES, rasterized=True)
+        levels = [level for level in STEP_LEVELS if level < int(steps.max())]
+        if levels and steps.min() < levels[-1]:
+            axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
-    marks = [mark for axes in both for mark in draw_marks(axes, cells)]
-    unique = {str(mark.get_label()): mark for mark in marks}
-    patches: list[Artist] = [Patch(facecolor=COLOURS[one], edgecolor="none", label=one.label) for one in sorted(seen)]
-    legend_above(figure, [*patches, *unique.values()])
+    key: list[Artist] = [
+        Patch(facecolor=COLOURS[one], edgecolor="none", label=one.label)
+        for one in map(Outcome, np.unique([cells[f"{model}outcome"] for model, _ in MODELS]).tolist())
+    ]
+    for label, marker, size, face, (x, y) in marks:
+        mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
+        for axes in both:
+            axes.plot([x], [y], **mark, markerfacecolor=face, zorder=5)
+        key.append(entry(label, **mark, markerfacecolor=face))
+    both[0].set(xlim=across[[0, -1]], ylim=up[[0, -1]])
+    add_legend(figure, key)
     return figure
-
-
-def draw_starts(axes: Axes, cells: Group, outcome: str, steps: str) -> set[Outcome]:
-    """One model's cells; returns the outcomes that occur."""
-    colours = discrete([COLOURS[one] for one in Outcome])
-    axes.pcolormesh(cells[SWING], cells[STANCE], cells[outcome], **colours, rasterized=True)
-    most = int(cells[steps].max())
-    levels = [level for level in STEP_LEVELS if level < most]
-    if levels and cells[steps].min() < levels[-1]:
-        axes.contour(cells[SWING], cells[STANCE], cells[steps], levels, colors=BLACK, linewidths=0.4)
-    return {Outcome(int(number)) for number in np.unique(cells[outcome])}
-
-
-def draw_marks(axes: Axes, cells: Group) -> list[Line2D]:
-    """The rigid start, the adjusted start and the contact gait, where they lie on the map."""
-    drawn: list[Line2D] = []
-    for label, marker, place in MARKS:
-        where: list[Any] = [cells.attrs.get(one) if isinstance(one, str) else one for one in place]
-        if None in where:
-            continue
-        size, face = (9, "none") if marker == "D" else (6, WHITE)
-        drawn += axes.plot(
-            [where[0]], [where[1]], linestyle="", marker=marker, markersize=size, color=BLACK, markerfacecolor=face,
-            label=label, zorder=5,
-        )  # fmt: skip
-    axes.set(xlim=cells[SWING][[0, -1]], ylim=cells[STANCE][[0, -1]])
-    return drawn
 
 
 def tell_starts(results: Results) -> tuple[Any, ...]:
@@ -153,8 +137,6 @@ def tell_starts(results: Results) -> tuple[Any, ...]:
     return result.summary["map"], result["map"].attrs["steps_wanted"], paper
 
 
-FIGURE_11 = paper_figure(11, (MAP,), plot_starts, tell_starts)
-
 BASIN: Final = "basin"
 CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no start was walked")
 ATTRACTORS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
@@ -165,40 +147,40 @@ NO_ATTRACTOR: Final = -1
 
 def plot_basins(results: Results) -> Figure:
     """Attractors and failures by colour on the left, steps to settle by brightness on the right."""
-    cells = results[BASIN]["basin"]
-    across, up = (str(name) for name in results[BASIN].summary["plane"][:2])
+    summary, cells = results[BASIN].summary, results[BASIN]["basin"]
+    plane = [str(name) for name in summary["plane"][:2]]
+    xlim, ylim = (sides_of(cells[name]) for name in plane)
+    # of a grid over three coordinates, the middle plane
+    shown = {name: cells[name] if cells[name].ndim == 2 else cells[name][:, :, cells[name].shape[2] // 2]
+             for name in ("outcome", "attractor", "steps_to_settle")}  # fmt: skip
+
+    def draw(axes: Axes, values: NDArray[Any], **how: Any) -> Any:
+        extent = (*xlim, *ylim)
+        return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
+
     figure = blank(3.9)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    patches = draw_kinds(partial(draw_plane, left, cells, (across, up)), kinds_of_fates(cells, results[BASIN].summary))
+    key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
     left.set_title("(a) where walks end")
-    settled = np.ma.masked_where(slice_of(cells["attractor"]) == NO_ATTRACTOR, slice_of(cells["steps_to_settle"]))
+    settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"])
     right.set_title("(b) steps to the attractor")
     if settled.count():
         least = float(settled.min())
         scale = LogNorm(least, max(float(settled.max()), least + 1.0))
-        bar = figure.colorbar(draw_plane(right, cells, (across, up), settled, cmap="viridis_r", norm=scale), ax=right)
+        bar = figure.colorbar(draw(right, settled, cmap="viridis_r", norm=scale), ax=right)
         bar.set_label("steps")
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         bar.ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if value < 1.5 * least else ""))
     else:
         right.text(0.5, 0.9, "no walk settles on a gait", transform=right.transAxes, ha="center")
-    marks = [mark_gait(axes, cells, (across, up)) for axes in (left, right)]
-    left.set_ylabel(axis_of(cells, up))
+    x, y = (float(cells.attrs[f"at_{name}"]) for name in plane)
+    gait: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": BLACK, "markerfacecolor": WHITE}
     for axes in (left, right):
-        axes.set_xlabel(axis_of(cells, across))
-    legend_above(figure, [*patches, marks[0]])
+        axes.plot([x], [y], linestyle="", **gait)
+        axes.set(xlim=xlim, ylim=ylim, xlabel=axis_of(cells, plane[0]))
+    left.set_ylabel(axis_of(cells, plane[1]))
+    add_legend(figure, [*key, entry("rigid gait of one step", linestyle="", **gait)])
     return figure
-
-
-def slice_of(values: NDArray[Any]) -> NDArray[Any]:
-    """The plane itself, or of a grid over three coordinates the middle."""
-    return values if values.ndim == 2 else values[:, :, values.shape[2] // 2]
-
-
-def draw_plane(axes: Axes, cells: Group, plane: tuple[str, str], values: NDArray[Any], **how: Any) -> Any:
-    """Values of cells, the first coordinate across."""
-    extent = (*sides_of(cells[plane[0]]), *sides_of(cells[plane[1]]))
-    return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
 
 def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
@@ -207,10 +189,9 @@ def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
     return float(middles[0]) - half, float(middles[-1]) + half
 
 
-def kinds_of_fates(cells: Group, summary: Mapping[str, Any]) -> list[Kind]:
+def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
     """The attractors and failures that occur."""
     attractors = summary["attractors"]
-    outcome, attractor = slice_of(cells["outcome"]), slice_of(cells["attractor"])
     kinds: list[Kind] = [
         (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
         for number in range(len(attractors))
@@ -230,17 +211,6 @@ def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
     return f"gait of {period} step{'' if period == 1 else 's'}{letter}"
 
 
-def mark_gait(axes: Axes, cells: Group, plane: tuple[str, str]) -> Line2D:
-    """The gait of one step through which the plane is laid."""
-    place = [float(cells.attrs[f"at_{name}"]) for name in plane]
-    (mark,) = axes.plot(
-        [place[0]], [place[1]], linestyle="", marker="o", markersize=4.5, color=BLACK, markerfacecolor=WHITE,
-        label="rigid gait of one step",
-    )  # fmt: skip
-    axes.set(xlim=sides_of(cells[plane[0]]), ylim=sides_of(cells[plane[1]]))
-    return mark
-
-
 def tell_basins(results: Results) -> tuple[Any, ...]:
     """What is walked, how much of the window walks, and to which attractors."""
     summary = results[BASIN].summary
@@ -249,14 +219,10 @@ def tell_basins(results: Results) -> tuple[Any, ...]:
     return summary, reached
 
 
-FIGURE_15 = paper_figure(15, (CELLS,), plot_basins, tell_basins)
-
 MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
 _LAW: Final = Contact().in_si()
-PAPER: Final = {STIFFNESS: _LAW.stiffness_N_per_m_e, VELOCITY: _LAW.stiction_velocity_m_s}
-HEIGHT: Final = 3.9  # in
-ERROR_LABEL: Final = "error (1)"
+PAPER: Final = (_LAW.stiffness_N_per_m_e, _LAW.stiction_velocity_m_s)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # errors told apart by colour
 VERDICT_COLOURS: Final = {
     "fine": SKY,
@@ -265,92 +231,85 @@ VERDICT_COLOURS: Final = {
     "gives up": ORANGE,
     "no reference": PALE,
 }
-UNANSWERED: Final = (int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED))
+
+
+@dataclass(frozen=True)
+class OverStiffness:
+    """Two panels over stiffness and another coordinate: what becomes of walks, and their errors."""
+
+    figure: Figure
+    left: Axes
+    right: Axes
+    edges: tuple[NDArray[Any], NDArray[Any]]
+
+    @classmethod
+    def of(cls, cells: Group, up: str, titles: tuple[str, str]) -> OverStiffness:
+        """Both panels, still empty, the other coordinate upward."""
+        figure = blank(3.9)
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        x, y = edges(cells[STIFFNESS]), edges(cells[up])
+        for axes, title in ((left, titles[0]), (right, titles[1])):
+            axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title)
+            axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
+            axes.xaxis.set_major_locator(LogLocator(numticks=7))
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_minor_locator(NullLocator())
+        left.set_ylabel(axis_of(cells, up))
+        return cls(figure, left, right, (x, y))
+
+    def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:
+        """Values of the cells."""
+        return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
+
+    def draw_errors(
+        self, cells: Group, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]
+    ) -> None:
+        """Errors by brightness, where there are any, with their scale; cells of other kinds in their colours."""
+        shown = np.ma.masked_where(~there, np.clip(cells["error"], *ends))
+        mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
+        self.figure.colorbar(mesh, ax=self.right, label="error (1)", extend="both")
+        for colour, _, where in others:
+            if where.any():
+                alone = np.ma.masked_where(~where, np.ones(where.shape))
+                self.draw(self.right, alone, cmap=ListedColormap([colour]))
 
 
 def plot_stiction(results: Results) -> Figure:
     """Outcome on the left, error on the right."""
     cells = results[MAPS]["stiction"]
-    figure = blank(HEIGHT)
-    left, right = panels(figure, cells, VELOCITY)
-    outcomes = cells["outcome"]
-    draw_over_stiffness(left, cells, VELOCITY, outcomes, **discrete([COLOURS[one] for one in Outcome]))
-    left.set_title("(a) how the walk ends")
-    unanswered = np.isin(outcomes, UNANSWERED)
-    otherwise = (cells["compared"] == 0) & ~unanswered
-    colour_errors(figure, right, cells, VELOCITY, cells["compared"] == 1, SHARP)
-    right.set_title("(b) against a tolerance ten times tighter")
-    for mask, colour in ((unanswered, BLACK), (otherwise, VERMILLION)):
-        overlay(right, cells, VELOCITY, mask, colour)
-    for axes in (left, right):
-        axes.plot(PAPER[STIFFNESS], PAPER[VELOCITY], marker="o", color=BLACK, markerfacecolor=WHITE, markersize=5.0)
-    seen = [Outcome(int(number)) for number in np.unique(outcomes)]
-    patches: list[Artist] = [Patch(facecolor=COLOURS[one], label=one.label) for one in seen]
-    if otherwise.any():
-        patches.append(Patch(facecolor=VERMILLION, label="(b) ends otherwise"))
-    mark = entry("paper", linestyle="none", marker="o", color=BLACK, markerfacecolor=WHITE)
-    legend_above(figure, [*patches, mark])
-    return figure
+    made = OverStiffness.of(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
+    outcomes, compared = cells["outcome"], cells["compared"] == 1
+    made.draw(made.left, outcomes, **OUTCOMES)
+    unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
+    otherwise = (VERMILLION, "(b) ends otherwise", ~compared & ~unanswered)
+    made.draw_errors(cells, compared, SHARP, [(BLACK, "", unanswered), otherwise])
+    seen = [(COLOURS[one], one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+    seen += [otherwise[:2]] if otherwise[2].any() else []
+    mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
+    for axes in (made.left, made.right):
+        axes.plot(*PAPER, **mark, markersize=5.0)
+    patches = [Patch(facecolor=colour, label=label) for colour, label in seen]
+    add_legend(made.figure, [*patches, entry("paper", linestyle="none", **mark)])
+    return made.figure
 
 
 def plot_step(results: Results) -> Figure:
     """Verdict on the left, error on the right."""
     cells = results[MAPS]["step"]
-    names = verdicts_of(cells)
-    figure = blank(HEIGHT)
-    left, right = panels(figure, cells, STEP)
-    draw_over_stiffness(left, cells, STEP, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
-    left.set_title("(a) what becomes of the walk")
-    there = np.isin(cells["verdict"], [names.index("fine"), names.index("wrong silently")])
-    colour_errors(figure, right, cells, STEP, there, ROUGH)
-    right.set_title("(b) error of the state at the end")
-    for name in ("diverges", "gives up", "no reference"):
-        overlay(right, cells, STEP, cells["verdict"] == names.index(name), VERDICT_COLOURS[name])
-    for axes in (left, right):
-        axes.axvline(PAPER[STIFFNESS], color=GREY, linewidth=0.8)
+    names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
+    made = OverStiffness.of(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
+    verdict = np.array(names, dtype=object)[cells["verdict"]]
+    made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
+    errors = ("fine", "wrong silently")
+    others = [(VERDICT_COLOURS[name], name, verdict == name) for name in VERDICT_COLOURS if name not in errors]
+    made.draw_errors(cells, np.isin(verdict, errors), ROUGH, others)
+    line: dict[str, Any] = {"color": GREY, "linewidth": 0.8}
+    for axes in (made.left, made.right):
+        axes.axvline(PAPER[0], **line)
     seen = [names[int(number)] for number in np.unique(cells["verdict"])]
-    patches: list[Artist] = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
-    legend_above(figure, [*patches, entry("the paper's stiffness", color=GREY, linewidth=0.8)])
-    return figure
-
-
-def verdicts_of(cells: Group) -> list[str]:
-    """The verdicts' names by their numbers."""
-    return [entry.partition(" ")[2] for entry in str(cells.attrs["verdicts"]).split(", ")]
-
-
-def panels(figure: Figure, cells: Group, up: str) -> tuple[Axes, Axes]:
-    """Two panels over stiffness."""
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    for axes in (left, right):
-        axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS))
-        axes.set(xlim=edges(cells[STIFFNESS])[[0, -1]], ylim=edges(cells[up])[[0, -1]])
-        axes.xaxis.set_major_locator(LogLocator(numticks=7))
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_minor_locator(NullLocator())
-    left.set_ylabel(axis_of(cells, up))
-    return left, right
-
-
-def draw_over_stiffness(axes: Axes, cells: Group, up: str, values: NDArray[Any], **look: Any) -> Any:
-    """Values of cells over stiffness and another coordinate."""
-    return axes.pcolormesh(edges(cells[STIFFNESS]), edges(cells[up]), values, **look, rasterized=True)
-
-
-def colour_errors(
-    figure: Figure, axes: Axes, cells: Group, up: str, there: NDArray[np.bool_], ends: tuple[float, float]
-) -> None:
-    """Errors by brightness, where there are any, with their scale."""
-    shown = np.ma.masked_where(~there, np.clip(cells["error"], *ends))
-    mesh = draw_over_stiffness(axes, cells, up, shown, cmap="cividis", norm=LogNorm(*ends))
-    figure.colorbar(mesh, ax=axes, label=ERROR_LABEL, extend="both")
-
-
-def overlay(axes: Axes, cells: Group, up: str, mask: NDArray[np.bool_], colour: str) -> None:
-    """Some cells in one colour."""
-    if mask.any():
-        shown = np.ma.masked_where(~mask, np.ones(mask.shape))
-        draw_over_stiffness(axes, cells, up, shown, cmap=ListedColormap([colour]))
+    patches = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
+    add_legend(made.figure, [*patches, entry("the paper's stiffness", **line)])
+    return made.figure
 
 
 def tell_maps(which: str, results: Results) -> tuple[Any, ...]:
@@ -365,4 +324,5 @@ STABILITY = (
     Illustration("stability-stiction", (STICTION_NEED,), plot_stiction, partial(tell_maps, "stiction")),
     Illustration("stability-step", (STEP_NEED,), plot_step, partial(tell_maps, "step")),
 )
-FIGURES = (FIGURE_11, FIGURE_15)
+FIGURE_15 = paper_figure(15, (CELLS,), plot_basins, tell_basins)
+FIGURES = (paper_figure(11, (MAP,), plot_starts, tell_starts), FIGURE_15)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
-from walkerlab.figures.canvas import as_file, blank, settle, styled
+from walkerlab.figures.canvas import blank, files_of
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -43,19 +43,12 @@ class Length:
 
 
 @dataclass(frozen=True)
-class Mass:
-    """A mass, what the config says of it, and where it is (m)."""
-
-    words: tuple[str, ...]
-    at: Point
-
-
-@dataclass(frozen=True)
 class UprightLeg:
     """One leg upright over its sole, which is at the origin; lengths in m.
 
     joints  the leg's line from the hip down, without the sole
     centre  of the sole's arc
+    masses  what the config says of each, and where it is
     top     height of the torso's end, or of the hip
     """
 
@@ -63,24 +56,13 @@ class UprightLeg:
     centre: Point
     radius: float
     lengths: tuple[Length, ...]
-    masses: tuple[Mass, ...]
+    masses: tuple[tuple[tuple[str, ...], Point], ...]
     top: float
 
-    @property
-    def length(self) -> float:
-        """Hip to sole."""
-        return self.joints[0][1]
 
-    @property
-    def line(self) -> tuple[Point, ...]:
-        """The joints, and where the leg's line meets its sole's arc."""
-        ahead, centre = self.centre
-        return (*self.joints, (0.0, centre - math.sqrt(max(0.0, self.radius**2 - ahead**2))))
-
-
-def said(key: str, value: float, unit: str = "") -> str:
+def said(key: str, value: float) -> str:
     """A key with its value, as a config has them."""
-    return f"{key}: {value:g} {unit}".rstrip()
+    return f"{key}: {value:g}"
 
 
 def weighing(walker: Any, prefix: str) -> tuple[str, ...]:
@@ -101,16 +83,15 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
     lengths: list[Length] = []
-    masses = [Mass(weighing(walker, "hip_"), hip)]
+    masses = [(weighing(walker, "hip_"), hip)]
 
     def measured(key: str, start: Point, end: Point) -> None:
         lengths.append(Length(key, value_of(walker, key), start, end))
 
     if walker.torso is not None:
-        head = (0.0, top + walker.torso.above_hip_m)
-        measured("torso.above_hip_m", head, hip)
-        masses.append(Mass(weighing(walker, "torso."), head))
-        top = head[1]
+        top += walker.torso.above_hip_m
+        measured("torso.above_hip_m", (0.0, top), hip)
+        masses.append((weighing(walker, "torso."), (0.0, top)))
     limbs = [("leg_", "hip", hip, sole)]
     if isinstance(walker, Kneed):
         joints.append((0.0, walker.shank.length_m))
@@ -125,7 +106,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
             measured(below, above, mass)
             measured(ahead, (0.0, mass[1]), mass)
         measured(f"{limb}length_m", above, end)
-        masses.append(Mass(weighing(walker, limb), mass))
+        masses.append((weighing(walker, limb), mass))
     if isinstance(walker, StraightLegs):
         centre = (walker.foot_centre_ahead_m, radius)
         measured("foot_centre_ahead_m", (0.0, radius), centre)
@@ -135,43 +116,51 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
-    title = f"The measures of a walker of type {walker.type}"
-    with styled():
-        figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
-        settle(figure)
-        return as_file(figure, kind, name, title)
+
+    def plot() -> Figure:
+        return of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
+
+    return files_of(plot, name, f"The measures of a walker of type {walker.type}", [kind])[0]
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
-    """One leg upright with its measures, the other one pale behind it."""
+    """One leg upright on the slope with its measures, the other one pale behind it."""
     leg = upright(walker)
+    length, centre = leg.joints[0][1], leg.centre
+    # the joints, and where the leg's line meets its sole's arc
+    line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
     figure = blank(HEIGHT)
     axes = figure.add_subplot()
     axes.set_axis_off()
-    axes.set(aspect="equal", xlim=(-1.15 * leg.length, 1.35 * leg.length))
-    axes.set_ylim(-0.16 * leg.length, leg.top + 0.1 * leg.length)
-    ground(axes, leg.length)
-    # the other leg, off the ground behind, its knee bent if it has one
-    line, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
-    for angle, above, below in zip(angles, leg.joints, leg.line[1:], strict=True):
-        line.append(turned(angle, above, below, line[-1]))
-    draw_leg(axes, line, turned(angles[-1], leg.joints[-1], leg.centre, line[-2]), leg.radius, FAINT)
-    draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
-    axes.plot([0.0, 0.0], [leg.length, leg.top], color=BLACK, linewidth=2.0)
-    draw_heights(axes, leg)
-    draw_sideways(axes, leg)
-    draw_masses(axes, leg)
-    return figure
-
-
-def ground(axes: Axes, length: float) -> None:
-    """The slope, and which way is ahead."""
-    left, right = axes.get_xlim()
-    axes.fill_between([left, right], -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
+    left, right = ends = (-1.15 * length, 1.35 * length)
+    axes.set(aspect="equal", xlim=ends, ylim=(-0.16 * length, leg.top + 0.1 * length))
+    axes.fill_between(ends, -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
     axes.plot([left, right], [0.0, 0.0], color=BLACK, linewidth=0.8)
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
+    # the other leg, off the ground behind, its knee bent if it has one
+    other, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
+        other.append(turned(angle, above, below, other[-1]))
+    draw_leg(axes, other, turned(angles[-1], leg.joints[-1], centre, other[-2]), leg.radius, FAINT)
+    draw_leg(axes, line, centre, leg.radius, BLACK)
+    axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
+    draw_lengths(axes, leg.lengths, length)
+    for words, (x, height) in leg.masses:
+        axes.plot(x, height, marker="o", markersize=8, color=GREEN, zorder=5)
+        axes.plot([LEFT * length, x], [height, height], color=GREEN, linewidth=0.5, zorder=1)
+        name(axes, LEFT * length, height, "\n".join(words) + " ", GREEN, ha="right", va="center")
+    if leg.radius > SMALL_ARC * length:
+        axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
+    elif leg.radius:
+        name(axes, LEFT * length, 0.03 * length, said("foot_radius_m", leg.radius) + " ", BLUE, ha="right")
+    return figure
+
+
+def name(axes: Axes, x: float, y: float, words: str, colour: str, **aligned: Any) -> None:
+    """Small words at a point."""
+    axes.text(x, y, words, color=colour, fontsize=SMALL, **aligned)
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
@@ -189,54 +178,36 @@ def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 
 
-def draw_heights(axes: Axes, leg: UprightLeg) -> None:
-    """Measures from a point to one below it, each in the first lane that has room."""
+def draw_lengths(axes: Axes, lengths: Sequence[Length], leg_length: float) -> None:
+    """Measures from a point to one below it, each in the first lane that has room; others ahead of the leg's line.
+
+    Those too small to show are left out.
+    """
     lanes: list[list[tuple[float, float]]] = []
-    heights = [one for one in leg.lengths if one.start[1] != one.end[1] and one.value > SMALL_ARC * leg.length]
-    for measure in heights:
-        high, low = measure.start[1], measure.end[1]
+    for measure in lengths:
+        words, (_, high), (_, low) = said(measure.key, measure.value), measure.start, measure.end
+        if high == low and measure.value:
+            axes.annotate("", xy=measure.end, xytext=measure.start, arrowprops={"arrowstyle": "-", "color": VERMILLION})
+            name(axes, -0.03 * leg_length, high + 0.025 * leg_length, words, VERMILLION, ha="right")
+        if high == low or measure.value <= SMALL_ARC * leg_length:
+            continue
         free = (number for number, taken in enumerate(lanes) if all(high <= b or low >= a for a, b in taken))
         number = next(free, len(lanes))
-        lanes[number:number] = [] if number < len(lanes) else [[]]
+        if number == len(lanes):
+            lanes.append([])
         lanes[number].append((high, low))
-        x = (FIRST_LANE + number * LANE) * leg.length
+        x = (FIRST_LANE + number * LANE) * leg_length
         for point in (measure.start, measure.end):
             axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
         axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
-        place = (x + 0.015 * leg.length, 0.5 * (high + low))
-        axes.text(*place, said(measure.key, measure.value), color=BLUE, fontsize=SMALL, va="center")
-
-
-def draw_sideways(axes: Axes, leg: UprightLeg) -> None:
-    """Measures from the leg's line to a point ahead of it; those that are zero are left out."""
-    for measure in leg.lengths:
-        if measure.start[1] != measure.end[1] or not measure.value:
-            continue
-        axes.annotate("", xy=measure.end, xytext=measure.start, arrowprops={"arrowstyle": "-", "color": VERMILLION})
-        place = (-0.03 * leg.length, measure.start[1] + 0.025 * leg.length)
-        axes.text(*place, said(measure.key, measure.value), color=VERMILLION, fontsize=SMALL, ha="right")
-
-
-def draw_masses(axes: Axes, leg: UprightLeg) -> None:
-    """Masses with their words to the left; the sole's centre if there is room."""
-    for mass in leg.masses:
-        axes.plot(*mass.at, marker="o", markersize=8, color=GREEN, zorder=5)
-        place = (LEFT * leg.length, mass.at[1])
-        axes.plot([place[0], mass.at[0]], [mass.at[1]] * 2, color=GREEN, linewidth=0.5, zorder=1)
-        axes.text(*place, "\n".join(mass.words) + " ", color=GREEN, fontsize=SMALL, va="center", ha="right")
-    if leg.radius > SMALL_ARC * leg.length:
-        axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
-    elif leg.radius:
-        place = (LEFT * leg.length, 0.03 * leg.length)
-        axes.text(*place, said("foot_radius_m", leg.radius) + " ", color=BLUE, fontsize=SMALL, ha="right")
+        name(axes, x + 0.015 * leg_length, 0.5 * (high + low), words, BLUE, va="center")
 
 
 def of_parts(walker: PartsWalker) -> Figure:
     """Every body of the second leg, and those of neither, each in its own frame."""
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
-    for place, body in enumerate(shown):
-        axes = figure.add_subplot(1, len(shown), place + 1)
+    for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         axes.set_aspect("equal", adjustable="datalim")
         axes.set(title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
@@ -254,8 +225,7 @@ def of_parts(walker: PartsWalker) -> Figure:
                 x, y = foot.centre_m
                 axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
         axes.margins(x=0.6, y=0.25)
-        if place == 0:
-            axes.set_ylabel("up (m)")
+    figure.axes[0].set_ylabel("up (m)")
     return figure
 
 
@@ -266,13 +236,11 @@ def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[st
         return f"[{point[0]:g}, {point[1]:g}]"
 
     for hinge in walker.hinges:
-        locks = ", locks" if hinge.locks else ""
-        for role, other, point in (
-            ("parent", hinge.parent, hinge.parent_point_m),
-            ("child", hinge.child, hinge.child_point_m),
-        ):
-            if other == body:
-                yield f"{hinge.name}{locks}\n{role}_point_m: {at(point)}", BLUE, "o", point
+        called = f"{hinge.name}{', locks' if hinge.locks else ''}\n"
+        if hinge.parent == body:
+            yield f"{called}parent_point_m: {at(hinge.parent_point_m)}", BLUE, "o", hinge.parent_point_m
+        if hinge.child == body:
+            yield f"{called}child_point_m: {at(hinge.child_point_m)}", BLUE, "o", hinge.child_point_m
     yield f"centre_m: {at(centre)}", GREEN, "o", centre
     for particle in walker.particles:
         if particle.body == body:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import as_file, blank, entry, legend_above, settle, styled
+from walkerlab.figures.canvas import add_legend, blank, entry, files_of
 from walkerlab.figures.style import BLUE, ORANGE
 from walkerlab.figures.walks import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.store.content import Content, Group
@@ -19,39 +19,31 @@ LOOKS: Final[tuple[dict[str, Any], ...]] = (
 )
 
 
-def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> Any:
+def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> list[bytes] | None:
     """SVG and PNG of two runs' walks over one another; None if they have no walk in common that was sampled.
 
     names  of the runs
     """
-    shown = [stage for stage in (RIGID_STAGE, CONTACT_STAGE) if trajectory(first, stage) and trajectory(second, stage)]
-    if not shown:
-        return None
-    title = f"{names[0]} and {names[1]}"
-    with styled():
-        figure = drawn(shown, (first, second), names)
-        settle(figure)
-        return as_file(figure, "svg", "diff", title), as_file(figure, "png", "diff", title)
+    both = [
+        (stage, [run[stage].groups["trajectory"] for run in (first, second)])
+        for stage in (RIGID_STAGE, CONTACT_STAGE)
+        if all(stage in run and run[stage].groups.get("trajectory") for run in (first, second))
+    ]
+    return files_of(lambda: drawn(both, names), "diff", f"{names[0]} and {names[1]}") if both else None
 
 
-def trajectory(results: Mapping[str, Content], stage: str) -> Group | None:
-    """The samples of a walk, if there are any."""
-    return results[stage].groups.get("trajectory") if stage in results else None
-
-
-def drawn(shown: list[str], runs: tuple[Mapping[str, Content], ...], names: tuple[str, str]) -> Figure:
-    """A column for each walk, a row for angles and one for the energy."""
+def drawn(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
+    """A column for each stage, with both runs' trajectories; a row for angles and one for the energy."""
     figure = blank(0.5 + 1.9 * len(ROWS))
-    axes = figure.subplots(len(ROWS), len(shown), sharex="col", sharey="row", squeeze=False)
-    for (first, *_), (_, label) in zip(axes, ROWS, strict=True):
-        first.set_ylabel(label)
-    for column, stage in enumerate(shown):
-        axes[0][column].set_title(stage)
-        axes[-1][column].set_xlabel("time (s)")
-        for row, (variable, _) in enumerate(ROWS):
-            for run, look in zip(runs, LOOKS, strict=True):
-                group = trajectory(run, stage)
-                if group is not None and variable in group.variables:
-                    axes[row][column].plot(group["time"], group[variable], **look)
-    legend_above(figure, [entry(name, **look) for name, look in zip(names, LOOKS, strict=True)])
+    axes = figure.subplots(len(ROWS), len(both), sharex="col", sharey="row", squeeze=False)
+    for row, (variable, label) in zip(axes, ROWS, strict=True):
+        row[0].set_ylabel(label)
+        for one, (_, groups) in zip(row, both, strict=True):
+            for group, look in zip(groups, LOOKS, strict=True):
+                if variable in group.variables:
+                    one.plot(group["time"], group[variable], **look)
+    for top, bottom, (stage, _) in zip(axes[0], axes[-1], both, strict=True):
+        top.set_title(stage)
+        bottom.set_xlabel("time (s)")
+    add_legend(figure, [entry(name, **look) for name, look in zip(names, LOOKS, strict=True)])
     return figure

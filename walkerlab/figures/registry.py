@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from walkerlab.figures import costs, families, ground, maps, stick_diagram, walk_figures
+from walkerlab.figures import costs, families, ground, maps, stick_diagram, walks
 from walkerlab.figures.illustration import Illustration
 
-NUMBERED = (*stick_diagram.FIGURES, *walk_figures.FIGURES, *maps.FIGURES, costs.FIGURE_12, *families.FIGURES)
+NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, costs.FIGURE_12, *families.FIGURES)
 FIGURES: tuple[Illustration, ...] = (
     *sorted(NUMBERED, key=lambda figure: figure.name),
     *ground.FIGURES,

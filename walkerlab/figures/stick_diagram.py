@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any, Final
 
@@ -17,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank, entry, legend_above, styled
+from walkerlab.figures.canvas import add_legend, blank, entry, styled
 from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
 from walkerlab.figures.walks import (
@@ -119,12 +120,10 @@ class Sticks:
         between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
             between.append(np.linspace(strikes[-1], self.time[-1], BETWEEN + 2)[1:])
-        return self._nearest(strikes), self._nearest(np.concatenate(between))
-
-    def _nearest(self, times: Array) -> NDArray[np.int64]:
-        right = np.clip(np.searchsorted(self.time, times), 1, self.time.size - 1)
-        left_is_nearer = times - self.time[right - 1] < self.time[right] - times
-        return np.asarray(right - left_is_nearer, dtype=np.int64)
+        at_strikes, others = (
+            np.abs(self.time[:, None] - times).argmin(axis=0) for times in (strikes, np.concatenate(between))
+        )
+        return at_strikes, others
 
 
 def sticks_of(result: Stored) -> Sticks:
@@ -138,51 +137,33 @@ def sticks_of(result: Stored) -> Sticks:
     if "torso_angle" in trajectory.variables:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
-    # a compass has point feet in the rigid model, whatever its ball feet
-    point_feet = result.identity.stage == RIGID_STAGE and walker["type"] == "compass"
+    knees = joints("knee") if "knee_along_m" in trajectory.variables else None
+    radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
+    if result.identity.stage == RIGID_STAGE and walker["type"] == "compass":
+        radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
+    landings = np.append(0.0, steps["touch_along_m"])
     return Sticks(
-        trajectory["time"],
-        hip,
-        joints("foot"),
-        steps["touch_time_s"],
-        np.append(0.0, steps["touch_along_m"]),
-        slope,
-        joints("knee") if "knee_along_m" in trajectory.variables else None,
-        0.0 if point_feet else sole_radius(walker),
-        head,
-    )
-
-
-def sole_radius(walker: Mapping[str, Any]) -> float:
-    """Radius of a walker's soles (m), from its block of the config."""
-    return float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
+        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head
+    )  # fmt: skip
 
 
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
-    """The walker over its first gait cycle, without the ground."""
-    figure, axes = framed(sticks)
-    at_strikes, between = sticks.postures()
-    draw_postures(axes, sticks, between, FAINT)
-    draw_postures(axes, sticks, at_strikes, FULL)
-    shown = slice(0, int(max(at_strikes.max(), between.max())) + 1)
-    axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
-    mark_landings(axes, sticks)
-    show_direction(axes, sticks, sticks.top[shown])
-    return figure, axes
-
-
-def framed(sticks: Sticks) -> tuple[Figure, Axes]:
-    """Axes of equal scales that fit the cycle, and a figure that fits the axes."""
+    """The walker over its first gait cycle, without the ground, to one scale in a figure that fits."""
     at_strikes, between = sticks.postures()
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
-    points = sticks.in_plane(seen).reshape(-1, 2)
-    left, bottom, right, top = surrounding(points, sticks.leg_length)
+    left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
     widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(1.05 + (WIDTH - 0.7) * (top - bottom) / (right - left))
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
+    draw_postures(axes, sticks, between, FAINT)
+    draw_postures(axes, sticks, at_strikes, FULL)
+    shown = slice(0, int(rows.max()) + 1)
+    axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
+    name_landings(axes, sticks)
+    show_direction(axes, sticks, sticks.top[shown])
     return figure, axes
 
 
@@ -211,7 +192,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
 
-def mark_landings(axes: Axes, sticks: Sticks) -> None:
+def name_landings(axes: Axes, sticks: Sticks) -> None:
     """Where and when feet came down, under the ground."""
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for along, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -247,86 +228,67 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 def entries(sticks: Sticks) -> list[Artist]:
     """Legend entries of the legs and of what else the walker is made of."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
-    strike = entry("at heel strike", color=GREY, linewidth=FULL)
-    between = entry("between", color=GREY, linewidth=FAINT)
+    strike, between = entry("at heel strike", color=GREY, linewidth=FULL), entry("between", color=GREY, linewidth=FAINT)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
     torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
     return [*legs, strike, between, hip, *torso]
 
 
-def tell_cycle(sticks: Sticks) -> tuple[Any, ...]:
-    """How long the steps of the cycle take and how far they go, whether it was completed, and what is drawn."""
-    strikes = sticks.strikes[:CYCLE]
-    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
-    return list(steps), strikes.size == CYCLE, sticks.head is not None
-
-
-TERRAIN = "terrain"
 PAD_HEIGHT = 0.028
 """Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
-HATCHES = ("////", "||||")
-PAD_NAMES = ("pad of leg 1", "pad of leg 2")
+PADS: Final[tuple[dict[str, Any], ...]] = tuple(
+    {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
+    for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
+)
+"""How the pads of the legs' lanes are drawn."""
 
 
-def plot_rigid(results: Results) -> Figure:
-    """The walker on the bare slope: the rigid model's ground is a plane."""
-    sticks = sticks_of(results[RIGID_STAGE])
-    figure, axes = stick_diagram(sticks)
-    draw_slope(axes, sticks)
-    legend_above(figure, entries(sticks))
-    return figure
-
-
-def tell_rigid(results: Results) -> tuple[Any, ...]:
-    """The cycle's measures."""
-    return tell_cycle(sticks_of(results[RIGID_STAGE]))
-
-
-def plot_contact(results: Results) -> Figure:
-    """The walker on its pads, or on its plane."""
-    sticks = sticks_of(results[CONTACT_STAGE])
-    figure, axes = stick_diagram(sticks)
-    pads = results[CONTACT_STAGE].groups.get(TERRAIN)
-    more: list[Artist] = []
-    if pads is None:
-        draw_slope(axes, sticks)
-    else:
-        draw_pads(axes, sticks, pads)
-        more = [Patch(label=name, **pad_look(leg)) for leg, name in enumerate(PAD_NAMES)]
-    legend_above(figure, [*entries(sticks), *more])
-    return figure
-
-
-def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> None:
-    """The pads of both lanes that are in sight."""
+def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
+    """The pads of both lanes that are in sight; returns their legend entries."""
     bottom = -PAD_HEIGHT * sticks.leg_length
     left, right = axes.get_xlim()
-    for pad_left, pad_right, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
-        corners = np.array([[pad_left, 0.0], [pad_right, 0.0], [pad_right, bottom], [pad_left, bottom]])
-        outline = sticks.in_plane(corners)
+    for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
+        outline = sticks.in_plane(np.array([[begin, 0.0], [end, 0.0], [end, bottom], [begin, bottom]]))
         if outline[:, 0].max() > left and outline[:, 0].min() < right:
-            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **pad_look(int(leg))))
+            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **PADS[int(leg)]))
+    return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
 
 
-def pad_look(leg: int) -> dict[str, Any]:
-    """How the pads of a leg's lane are drawn."""
-    return {"facecolor": "white", "edgecolor": LEGS[leg].colour, "hatch": HATCHES[leg], "linewidth": 0.7}
+def plot_cycle(stage: str, results: Results) -> Figure:
+    """A model's walker on its pads, or on its plane."""
+    sticks, pads = sticks_of(results[stage]), results[stage].groups.get("terrain")
+    figure, axes = stick_diagram(sticks)
+    ground = [] if pads is None else draw_pads(axes, sticks, pads)
+    if pads is None:
+        draw_slope(axes, sticks)
+    add_legend(figure, [*entries(sticks), *ground])
+    return figure
 
 
-def tell_contact(results: Results) -> tuple[Any, ...]:
-    """The cycle's measures, the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some."""
-    result = results[CONTACT_STAGE]
-    sticks, terrain = sticks_of(result), result.identity.config_slice["contact"]["terrain"]
-    pitch = result.summary["pitch_m"] if TERRAIN in result.groups else None
-    return *tell_cycle(sticks), sticks.radius, terrain, pitch
+def tell_cycle(stage: str, results: Results) -> tuple[Any, ...]:
+    """How long the steps of the cycle take and how far they go, whether it was completed, and what is drawn.
+
+    Of the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
+    """
+    result = results[stage]
+    sticks = sticks_of(result)
+    strikes = sticks.strikes[:CYCLE]
+    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
+    told = list(steps), strikes.size == CYCLE, sticks.head is not None
+    if stage == RIGID_STAGE:
+        return told
+    pitch = result.summary["pitch_m"] if "terrain" in result.groups else None
+    return *told, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch
 
 
-PLACES = (*STATES, *JOINTS)
-FIGURE_2 = paper_figure(
-    2, (Need(RIGID_STAGE, TRAJECTORY, PLACES, NO_STATES), STEPS_TAKEN_RIGID), plot_rigid, tell_rigid
-)
-FIGURE_6 = paper_figure(
-    6, (Need(CONTACT_STAGE, TRAJECTORY, PLACES, NO_STATES), STEPS_TAKEN_CONTACT), plot_contact, tell_contact
+FIGURE_2, FIGURE_6 = (
+    paper_figure(
+        number,
+        (Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), steps_taken),
+        partial(plot_cycle, stage),
+        partial(tell_cycle, stage),
+    )
+    for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 

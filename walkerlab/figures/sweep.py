@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import matplotlib
@@ -14,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import as_file, blank, entry, legend_above, settle, styled
+from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
 from walkerlab.store.content import Group
@@ -36,16 +35,6 @@ RADIUS: Final = "spectral_radius"
 LABELS: Final = {RADIUS: "largest multiplier (1)"}
 
 
-@dataclass(frozen=True)
-class SweepFigure:
-    """A figure's bytes and words."""
-
-    svg: bytes
-    png: bytes
-    title: str
-    caption: str
-
-
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
     """The numbers that say most by default: the well-known ones, then others that vary."""
     numbers = [name for name in group.variables if is_number(group, name, dims) and name not in parameters]
@@ -65,9 +54,7 @@ def varies(values: NDArray[Any]) -> bool:
     return there.size > 0 and bool(np.ptp(there.astype(float)) > 0.0)
 
 
-def draw(
-    group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]
-) -> SweepFigure:
+def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Drawing:
     """The figure of some numbers over the parameters.
 
     parameters  names of the coordinates
@@ -75,14 +62,14 @@ def draw(
     names       what to draw, at least one
     """
     title = f"{stage} over {', '.join(parameters)}"
-    with styled():
+
+    def plot() -> Figure:
         if len(dims) != 2:
-            figure = panels(group, parameters, dims, names)
-        else:
-            figure = (lines if in_lines(group, dims) else maps)(group, parameters, names)
-        settle(figure)
-        svg, png = (as_file(figure, kind, f"sweep-{stage}", title) for kind in ("svg", "png"))
-    return SweepFigure(svg, png, title, caption(group, dims, parameters, names))
+            return panels(group, parameters, dims, names)
+        return (lines if in_lines(group, dims) else maps)(group, parameters, names)
+
+    svg, png = files_of(plot, f"sweep-{stage}", title)
+    return Drawing(svg, png, title, caption(group, dims, parameters, names))
 
 
 def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], names: Sequence[str]) -> str:
@@ -116,11 +103,19 @@ def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names
     axes = figure.subplots(len(names), len(shown), sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
         x = spread(group, parameter, dims)
-        for row, name in enumerate(names):
-            draw_panel(axes[row][column], group, x, parameter, name, joined=len(dims) == 1 and column == 0)
-            if column == 0:
-                axes[row][column].set_ylabel(label(group, name))
+        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_SCATTERED)).astype(int))
+        ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
+        for one, name in zip(axes[:, column], names, strict=True):
+            y = group[name].astype(float).ravel()
+            if ordered:
+                one.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
+            else:
+                dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
+                one.plot(x[few], y[few], color=BLUE, **dots, rasterized=few.size > 2000)
+            finish_panel(one, group, parameter, name, x[np.isnan(y)])
         axes[-1][column].set_xlabel(label(group, parameter))
+    for one, name in zip(axes[:, 0], names, strict=True):
+        one.set_ylabel(label(group, name))
     return figure
 
 
@@ -134,27 +129,13 @@ def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
     return np.broadcast_to(values.reshape(along), group["outcome"].shape).ravel()
 
 
-def draw_panel(axes: Axes, group: Group, x: NDArray[Any], parameter: str, name: str, joined: bool) -> None:
-    """One number over one parameter."""
-    y = group[name].astype(float).ravel()
-    few = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_SCATTERED)).astype(int))
-    ordered = joined and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
-    if ordered:
-        axes.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
-    else:
-        axes.plot(x[few], y[few], linestyle="none", color=BLUE, marker="o", markersize=2.2, rasterized=few.size > 2000)
-    finish_panel(axes, group, parameter, name, x[np.isnan(y)])
-
-
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
     """What a number's panel over a parameter has besides its points; missing: where there is no answer."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
-        axes.plot(
-            missing, np.full(missing.size, 0.02), color=VERMILLION, marker="|", linestyle="none", markersize=5.0,
-            transform=axes.get_xaxis_transform(),
-        )  # fmt: skip
+        mark: dict[str, Any] = {"color": VERMILLION, "marker": "|", "linestyle": "none", "markersize": 5.0}
+        axes.plot(missing, np.full(missing.size, 0.02), **mark, transform=axes.get_xaxis_transform())
     if is_logarithmic(np.unique(numbers(group, parameter))):
         axes.set_xscale("log")
     name_ticks(axes, group, parameter, "x")
@@ -169,26 +150,25 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     """A row for each number, over one parameter, and in it a line for each value of the one that has fewer."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
-    looks = [(matplotlib.colormaps["viridis"](0.85 * shade), DASHES[place % len(DASHES)])
+    looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
              for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
     figure = blank(0.8 + PANEL_HEIGHT * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for one, name in zip(axes, names, strict=True):
         found = group[name].astype(float)
         rows = found if parameters[0] == few else found.T
-        for row, (colour, style) in zip(rows, looks, strict=True):
-            one.plot(x, row, color=colour, linestyle=style, linewidth=1.3, marker="o", markersize=2.4)
+        for row, look in zip(rows, looks, strict=True):
+            one.plot(x, row, **look, linewidth=1.3, marker="o", markersize=2.4)
         finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
         one.set_ylabel(label(group, name))
     axes[-1].set_xlabel(label(group, across))
-    said = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
     spoken, _, unit = label(group, few).rstrip(")").rpartition(" (")
     unit = "" if unit == "1" else f" {unit}"
-    key = [
-        entry(f"{spoken} {value}{unit}", color=colour, linestyle=style)
-        for value, (colour, style) in zip(said, looks, strict=True)
-    ]
-    legend_above(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
+    key = []
+    for value, look in zip(values, looks, strict=True):
+        said = f"{value:.6g}" if isinstance(value, float) else str(value)
+        key.append(entry(f"{spoken} {said}{unit}", **look))
+    add_legend(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
     return figure
 
 
@@ -222,7 +202,7 @@ def draw_map(figure: Figure, axes: Axes, group: Group, parameters: Sequence[str]
     if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
         axes.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
         outlined = [withStroke(linewidth=2.6, foreground=GREY)]
-        legend_above(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
+        add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
     for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
         getattr(axes, f"set_{axis}label")(label(group, parameter))
         if is_logarithmic(scale):

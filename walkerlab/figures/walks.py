@@ -1,10 +1,12 @@
-"""The walks of both models as figures show them: out of the stored results, and over time."""
+"""The walks of both models: 5, 7 and 10 in time, 8 their difference, 9 their limit cycles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from operator import is_
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,15 +15,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import blank, entry, legend_above
-from walkerlab.figures.illustration import Need, Results
-from walkerlab.figures.style import CONTACT, PALE, RIGID, Look
+from walkerlab.figures.canvas import add_legend, blank, entry
+from walkerlab.figures.illustration import Need, Results, paper_figure
+from walkerlab.figures.style import BLACK, CONTACT, GREY, PALE, RIGID, VERMILLION, Look
 from walkerlab.labels import with_unit
+from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
 from walkerlab.store.content import Content, Group
 
 Array = NDArray[np.float64]
 
-RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE = "simulate", "contact-sim", "compare"
+RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE, TUNE_STAGE = "simulate", "contact-sim", "compare", "tune"
 TRAJECTORY, STEPS = "trajectory", "steps"
 STATES = ("time", "angle", "velocity", "stance_leg")
 JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
@@ -32,12 +35,13 @@ NO_ENERGIES = "'energies' is not among the config's outputs"
 NO_STEP = "no step was completed"
 TOUCHES = "touch_time_s"
 
-RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATES, NO_STATES)
-RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
-STEPS_TAKEN_RIGID = Need(RIGID_STAGE, STEPS, (TOUCHES, "touch_along_m"), NO_STEP)
-CONTACT_STATES = Need(CONTACT_STAGE, TRAJECTORY, STATES, NO_STATES)
-CONTACT_ENERGIES = Need(CONTACT_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
-STEPS_TAKEN_CONTACT = Need(CONTACT_STAGE, STEPS, (TOUCHES, "touch_along_m"), NO_STEP)
+RIGID_STATES, CONTACT_STATES = (Need(stage, TRAJECTORY, STATES, NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE))
+RIGID_ENERGIES, CONTACT_ENERGIES = (
+    Need(stage, TRAJECTORY, ENERGIES, NO_ENERGIES) for stage in (RIGID_STAGE, CONTACT_STAGE)
+)
+STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
+    Need(stage, STEPS, (TOUCHES, "touch_along_m"), NO_STEP) for stage in (RIGID_STAGE, CONTACT_STAGE)
+)
 
 PAPER_STRIDES = 5
 """Strides that the paper's figures in time show; a longer walk's figures show its first ones."""
@@ -125,8 +129,7 @@ def sentence(walks: list[Walk]) -> str:
 def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
     """The walks' first strides, and a phrase on how much that is: '' if it is all, ' (the first 5 strides)' if not."""
     cut = [walk.first(strides) for walk in walks]
-    whole = all(short is walk for short, walk in zip(cut, walks, strict=True))
-    return cut, "" if whole else f" (the first {strides} strides)"
+    return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
 def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, list[Axes]]:
@@ -165,30 +168,242 @@ def line(axes: Axes, x: Array, y: Array, look: Look) -> None:
     axes.plot(x, y, **look.line, zorder=look.order)
 
 
-def shade_stance(axes: Axes, walk: Walk, leg: int) -> None:
-    """Shade the times in which a leg carries the walker."""
-    carries = np.asarray(walk["stance_leg"] == leg, dtype=np.int64)
-    edges = np.diff(carries, prepend=0, append=0)
-    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        axes.axvspan(walk.time[begin], walk.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
-
-
 def strike_entry(look: Look) -> Artist:
     """Legend entry of a model's heel strikes: upright, as they are in the figure."""
     label = f"heel strike, {look.label.split()[0]}"
     return entry(label, color=look.colour, linestyle="none", marker="|", markersize=11.0, markeredgewidth=STRIKE_WIDTH)
 
 
-def stance_entry(look: Look) -> Artist:
-    """Legend entry of the shading by one model's stance phases."""
-    return Patch(facecolor=PALE, edgecolor="none", label=f"stance of the leg, {look.label.split()[0]}")
-
-
-def model_lines(walks: list[Walk]) -> list[Artist]:
-    """Legend entries of the models."""
-    return [entry(walk.look.label, **walk.look.line) for walk in walks]
-
-
 def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
     """The legend of a figure of walks, above all axes."""
-    legend_above(figure, [*model_lines(walks), *(strike_entry(walk.look) for walk in walks), *more])
+    looks = [walk.look for walk in walks]
+    models = [entry(look.label, **look.line) for look in looks]
+    add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
+
+
+ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start of those searched walks")
+FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid model took no step")
+
+
+def adjusted_walks(results: Results) -> tuple[list[Walk], str]:
+    """The first strides of the rigid model from its start and of the contact model from the adjusted one."""
+    result = results[TUNE_STAGE]
+    outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
+    both = (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome))
+    times = [touch_times(result[group]) for group, *_ in both]
+    walks = [Walk(look, end, at.size, at, result[group]) for at, (group, look, end) in zip(times, both, strict=True)]
+    return shown(walks)
+
+
+def redoes_the_procedure(results: Results) -> bool:
+    """Whether the walker is the paper's compass, whose legs are links there."""
+    return "paper_start" in results[TUNE_STAGE].summary
+
+
+def plot_adjusted(results: Results) -> Figure:
+    """A row for each link: called as in the paper if the walker is its compass, else by what it does first."""
+    walks, _ = adjusted_walks(results)
+    own = ("the leg that swings first", "the leg that stands first")
+    links = ("link 1", "link 2") if redoes_the_procedure(results) else own
+    titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
+    figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
+    legend(figure, walks)
+    return figure
+
+
+def tell_adjusted(results: Results) -> tuple[Any, ...]:
+    """What the start was, and how the walk went."""
+    return results[TUNE_STAGE].summary["adjustment"], adjusted_walks(results)[1], redoes_the_procedure(results)
+
+
+STATES_IN_TIME = (
+    ("angle", "angle", 0, "(a1) angle of leg 1"),
+    ("angle", "angle", 1, "(a2) angle of leg 2"),
+    ("velocity", "velocity", 0, "(b1) angular velocity of leg 1"),
+    ("velocity", "velocity", 1, "(b2) angular velocity of leg 2"),
+)
+
+
+def plot_states(results: Results) -> Figure:
+    """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker."""
+    walks, _ = shown(walks_with(results, RIGID_STATES, CONTACT_STATES))
+    first = walks[0]
+    figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
+    for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
+        edges = np.diff((first["stance_leg"] == leg).astype(int), prepend=0, append=0)
+        for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
+    stance = f"stance of the leg, {first.look.label.split()[0]}"
+    legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
+    return figure
+
+
+def tell_walks(strides: int, results: Results) -> tuple[Any, ...]:
+    """How much is shown, and how the walks went."""
+    walks = walks_with(results, RIGID_STATES, CONTACT_STATES)
+    return shown(walks, strides)[1], sentence(walks)
+
+
+AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
+IN_PHASE: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
+PAPER: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
+ROOM = 3.0
+"""Factor between what is shown of errors and the axis's ends."""
+ZERO_CROSSING = 1e-3
+"""Part of the largest error below which nothing is shown: where a difference changes its sign it is nothing."""
+QUANTITIES = (
+    ("a", "angle", "angle_error_rad", ANGLE_ERROR),
+    ("b", "angular velocity", "velocity_error_rad_s", VELOCITY_ERROR),
+)
+"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned), the paper's error."""
+RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name, _ in QUANTITIES)), NO_STATES)
+ALIGNED_ERRORS = Need(
+    COMPARE_STAGE,
+    "aligned",
+    ("phase", *(f"aligned_{name}" for _, _, name, _ in QUANTITIES)),
+    "no step was completed by both models",
+)
+
+
+def plot_differences(results: Results) -> Figure:
+    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps."""
+    (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
+    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
+    of_the_paper, early = redoes_the_paper(results), raw["time"] <= rigid.time[-1]
+    figure, axes = time_axes(4, 1.55, [rigid])
+    rows = [(*quantity, leg) for quantity in QUANTITIES for leg in (0, 1)]
+    for one, (letter, words, name, printed, leg) in zip(axes, rows, strict=True):
+        raw_error = np.abs(raw[f"raw_{name}"][early, leg])
+        aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
+        line(one, raw["time"][early], raw_error, AT_SAME_TIME)
+        for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
+            line(one, begin + (end - begin) * aligned["phase"], error, IN_PHASE)
+        largest = max(float(raw_error.max()), float(aligned_error.max()))
+        bottom, top = ZERO_CROSSING * largest, ROOM * largest
+        if of_the_paper:
+            one.axhline(printed.value, **PAPER.line)
+            bottom, top = min(printed.value / ROOM, bottom), max(ROOM * printed.value, top)
+        one.set_yscale("log", subs=[])
+        one.set(ylim=(bottom, top), ylabel=with_unit("error", raw.variables[f"raw_{name}"].units))
+        one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
+    looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
+    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
+    return figure
+
+
+def tell_differences(results: Results) -> tuple[Any, ...]:
+    """The largest errors of all that was compared, in both ways, and the paper's."""
+    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
+    largest = []
+    for _, words, name, _ in QUANTITIES:
+        at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
+        largest.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
+    return largest, ANGLE_ERROR.text if redoes_the_paper(results) else ""
+
+
+CYCLES = 20
+"""Strides that are shown: a transient is over by then; more lines would only lie on one another."""
+LAST_STRIDE = 2
+"""Steps of it."""
+EARLIER_WIDTH = 0.5
+ARROW_LENGTH = 0.06
+"""Of an arrow on the cycle, in parts of a step's samples."""
+
+
+def plot_cycles(results: Results) -> Figure:
+    """A phase plane for each leg, both on the same scales."""
+    walks, _ = shown(walks_with(results, RIGID_STATES, CONTACT_STATES), CYCLES)
+    figure = blank(4.2)
+    axes = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    for leg, one in enumerate(axes):
+        for walk in walks:
+            draw_cycles(one, walk, leg)
+        show_direction(one, walks[0], leg)
+        one.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
+    axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
+    key = [entry(walk.look.label, **walk.look.line) for walk in walks]
+    if any(walk.strikes.size > LAST_STRIDE for walk in walks):
+        key.append(entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH))
+    for whose, face in (("this leg", GREY), ("the other leg", "white")):
+        dot: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": GREY, "markerfacecolor": face}
+        key.append(entry(f"heel strike of {whose}", linestyle="none", **dot))
+    add_legend(figure, key)
+    return figure
+
+
+def draw_cycles(axes: Axes, walk: Walk, leg: int) -> None:
+    """The last stride as the model's look has it, those before as thin lines under it.
+
+    Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
+    """
+    angle, velocity, look = walk["angle"][:, leg], walk["velocity"][:, leg], walk.look
+    axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
+    last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
+    line(axes, angle[last], velocity[last], look)
+    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
+    own = walk["stance_leg"][before] != leg
+    for rows, face in ((before[own], look.colour), (before[~own], "white")):
+        axes.plot(
+            angle[rows], velocity[rows], linestyle="none", marker=look.marker, markersize=4.5,
+            markerfacecolor=face, markeredgecolor=look.colour, zorder=look.order + 2,
+        )  # fmt: skip
+
+
+def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
+    """Arrowheads in the middle of the first swing and the first stance of a leg."""
+    carries = walk["stance_leg"] == leg
+    for phase in (carries, ~carries):
+        rows = np.flatnonzero(phase)
+        first = rows[: np.argmax(np.diff(rows, append=rows[-1] + 2) > 1) + 1] if rows.size else rows
+        if first.size < 3:
+            continue
+        middle, ahead = first[first.size // 2], first[first.size // 2 + max(1, int(ARROW_LENGTH * first.size))]
+        tail, head = (tuple(walk[name][row, leg] for name in ("angle", "velocity")) for row in (middle, ahead))
+        arrow = {"arrowstyle": "-|>", "color": walk.look.colour, "mutation_scale": 13.0, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", xy=head, xytext=tail, arrowprops=arrow, zorder=7)
+
+
+ENERGIES_IN_TIME = (
+    ("kinetic_J", "energy", None, "(a) kinetic energy"),
+    ("potential_J", "energy", None, "(b) potential energy, from the current stance foot"),
+    ("mechanical_J", "energy", None, "(c) mechanical energy, the sum of both"),
+)
+SMALLEST_SPAN = 0.005
+"""Of the axis of the mechanical energy, in parts of it: a constant must look constant."""
+MARGIN = 0.08
+FEW = 0.005
+"""Part of the samples that lie within impacts, and so do not set the scale."""
+
+
+def plot_energies(results: Results) -> Figure:
+    """A row for each energy."""
+    walks, _ = shown(walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES))
+    figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
+    ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
+    bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
+    lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
+    room = 0.5 * lacking + MARGIN * (top - bottom)
+    axes[-1].set_ylim(bottom - room, top + room)
+    legend(figure, walks)
+    return figure
+
+
+def tell_energies(results: Results) -> tuple[Any, ...]:
+    """How much is shown, the means of the mechanical energy, and how the walks went."""
+    walks = walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES)
+    cut, extent = shown(walks)
+    means = []
+    for walk in cut:
+        energy, durations = walk["mechanical_J"], np.diff(walk.time)
+        integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
+        means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
+    return extent, means, redoes_the_paper(results), any(walk.look is CONTACT for walk in walks), sentence(walks)
+
+
+FIGURES = (
+    paper_figure(5, (ADJUSTED, FROM_RIGID), plot_adjusted, tell_adjusted),
+    paper_figure(7, (RIGID_STATES,), plot_states, partial(tell_walks, PAPER_STRIDES)),
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), plot_differences, tell_differences),
+    paper_figure(9, (RIGID_STATES,), plot_cycles, partial(tell_walks, CYCLES)),
+    paper_figure(10, (RIGID_ENERGIES,), plot_energies, tell_energies),
+)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
-from walkerlab.figures.sweep import SweepFigure, choose, is_number
+from walkerlab.figures.canvas import Drawing
+from walkerlab.figures.sweep import choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.page import SweepPage, render_sweep
 from walkerlab.report.words import words
@@ -63,7 +64,7 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) ->
             raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
 
 
-def page_of(swept: Swept, group: Group, figure: SweepFigure | None, shown: Sequence[str]) -> SweepPage:
+def page_of(swept: Swept, group: Group, figure: Drawing | None, shown: Sequence[str]) -> SweepPage:
     """What the page says."""
     summary, question = swept.summary, swept.question
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
