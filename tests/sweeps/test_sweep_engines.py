@@ -146,8 +146,10 @@ def test_dask_makes_a_cluster_of_its_own(toy):
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_jobs_on_this_machine_give_the_same(toy, tmp_path):
-    pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
+    submitit = pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    # how long submitit waits for a dead job's result on a slow network disk, three times here
+    monkeypatch.setattr(submitit.Job, "_results_timeout_s", 1)
     options = {"cluster": "local", "timeout_min": "5"}
     swept = toy.run("deadly", "seed=11:16:6", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
