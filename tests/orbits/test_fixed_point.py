@@ -50,7 +50,7 @@ class Counted(Shooting):
     def walk(self, section, z, steps=1, derived=True):
         walked = super().walk(section, z, steps, derived)
         self.steps += 1
-        self.evaluations += int((self.memory.varied if derived else self.memory.plain).counts[RHS])
+        self.evaluations += int((self.memory.varied if derived else self.plain).counts[RHS])
         return walked
 
 
@@ -310,14 +310,14 @@ def led(map_, walker, starts, gaits=()):
 
 
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
-def test_a_gait_is_come_near_with_fewer_derivatives_than_it_is_solved_with(walker):
+def test_a_start_is_followed_by_the_moves_of_newtons_method(walker):
     map_ = shooting(walker)
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
     near = gait * [[1.02, 0.96, 1.03]]
     solved = solve(map_, walker, near[0], 1e-6).x
     assert led(map_, walker, near) == [NEW]
     np.testing.assert_allclose([solved, near[0]], [gait, gait], atol=1e-5)
-    assert int(map_.memory.varied.counts[RHS]) <= map_.evaluations / 3
+    assert int(map_.memory.varied.counts[RHS]) == map_.evaluations
 
 
 def test_a_start_near_a_known_gait_is_followed_no_further():

@@ -17,6 +17,7 @@ belongs to both legs.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,15 +85,15 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
 
     def changed(self, **fields: Any) -> "Standing":
         """The same with other values of some fields."""
-        other: Any = self.copy()
-        for name, value in fields.items():
-            other[name] = value
-        return frozen(other)
+        return frozen(self, fields)
 
 
-def frozen(model: Any) -> Standing:
-    """A copy that nobody can write to."""
-    memory: Any = np.array(model)
+def frozen(model: Any, fields: Mapping[str, Any]) -> Standing:
+    """A copy with these fields that nobody can write to."""
+    memory: Any = np.empty((), model.dtype)
+    memory[()] = model
+    for name, value in fields.items():
+        memory[name] = value
     memory.flags.writeable = False
     read_only: Standing = memory[()]
     return read_only
@@ -112,10 +113,7 @@ def new_standing(n: int, **fields: Any) -> Standing:
         (name, np.int64, whole[name]) if name in whole else (name, np.float64, shapes.get(name, ()))
         for name in Standing.__annotations__
     ]
-    model = np.zeros((), np.dtype((Standing, layout)))
-    for name, value in fields.items():
-        model[name] = value
-    return frozen(model)
+    return frozen(np.zeros((), np.dtype((Standing, layout))), fields)
 
 
 def on_slope(model: Standing, slope: float) -> Standing:

@@ -11,7 +11,7 @@ applied bifurcation theory, chapter 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -82,7 +82,7 @@ class Follower:
         if found is None:
             return way._replace(stride=0.5 * way.stride)
         points = (*way.points, (abscissa, found))[-self._strides.remembered :]
-        return Way(ahead, min(self._strides.widest, 1.5 * way.stride), points)
+        return Way(ahead, min(self._strides.widest, 1.2 * way.stride), points)
 
 
 def interpolated(points: Points, x: float) -> Floats:
@@ -119,7 +119,7 @@ class OnPlane(Generic[D]):
         """Value and derivative at x (m + 1,)."""
         here = self.equations.at(x)
         value = np.append(here.value, self.normal @ (x - self.point))
-        return replace(here, value=value, jacobian=np.vstack((here.jacobian, self.normal)))
+        return here._replace(value=value, jacobian=np.vstack((here.jacobian, self.normal)))
 
 
 def corrected(

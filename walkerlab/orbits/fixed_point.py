@@ -16,7 +16,7 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
 from walkerlab.orbits.newton import Damping, Floats, NotConverged, Solution, newton
-from walkerlab.orbits.shooting import EXACT, NEW, SHORTEST_STEP, Shooting, StepEquations, Steps, on_section, section_of
+from walkerlab.orbits.shooting import EXACT, NEW, Shooting, StepEquations, Steps, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.orbits.step_map import multipliers_of
@@ -26,13 +26,13 @@ from walkerlab.solvers.system import State
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
 SAME = 1e-5  # relative distance of states below which two searches found one gait
-LOOKING = Tolerances("dop853", 1e-8, 1e-11, 20_000)
+LOOKING = Tolerances("dop853", 1e-7, 1e-10, 20_000)
 MAX_EVALUATIONS, DAMPING = 60, Damping(2.0**-8)  # of Newton's method
 # on the way from a vanishing slope
-STRIDES = Strides(math.log(1.6), math.log(1.001), 3)  # of the logarithm of the slope's cube root
+STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # of the logarithm of the slope's cube root
 EVALUATIONS_ON_THE_WAY = 20
-LOOSE = 1e-8  # residual that is good enough, relative; a multiplier tends to 1 as the slope vanishes
-JUMP = 0.02  # a gait further than this from where it was expected is another gait
+LOOSE = 1e-6  # residual that is good enough, relative; a multiplier tends to 1 as the slope vanishes
+JUMP, JUMP_IN_TIME = 0.05, 0.02  # a gait further than this from where it was expected is another gait
 RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
 # angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
 # free at heel strike
@@ -228,7 +228,7 @@ class SlopeBranch:
             return None
         found = scaled(s, solved.x, float(solved.evaluated.data.time[0]))
         moved = np.abs(found - expected)
-        near = moved[:3].max() <= JUMP * np.abs(found[:3]).max() and moved[3] <= JUMP * found[3]
+        near = moved[:3].max() <= JUMP * np.abs(found[:3]).max() and moved[3] <= JUMP_IN_TIME * found[3]
         return found if near else None
 
 
@@ -310,7 +310,7 @@ class Search:
         if self.known(z, by):
             return True
         settings, solved = self.settings, self.solved(z)
-        if isinstance(solved, NotConverged) or solved.evaluated.data.time[0] < SHORTEST_STEP:
+        if isinstance(solved, NotConverged):
             return False
         z, DP = solved.x, solved.evaluated.data.DP[0]
         if self.walker.slope == 0.0 and self.stands(z):

@@ -8,7 +8,6 @@ leg, stance leg, and a shank whose knee was free during the impact. A compass ha
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -27,7 +26,7 @@ from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor,
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
-from walkerlab.solvers.stepping import H_NEXT, T, clear_counts
+from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -44,62 +43,50 @@ EXACT = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 QUICK = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # of long walks
 WATCHED = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 AT_ONCE = 8  # steps that a derivative is led over at once
-
+SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which repeats itself too
 # of random starts
-MAX_EVALUATIONS = 60
-SMALLEST_MOVE = 2.0**-8
-NO_RESIDUAL = 1e300
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, which solves the equations too
-NEAR_RESIDUAL = 1e-6  # of a start that has come near a solution
-STANDING_RESIDUAL = 1e-2  # below which so short a step comes to stand
+MAX_EVALUATIONS, SMALLEST_SHARE = 40, 2.0**-6  # of a move of Newton's method
+NO_RESIDUAL, NEAR_RESIDUAL = 1e300, 1e-6
 WIDEST_WAY, LEFT = 0.1, 0.1  # to a known gait, and what part of it a move with the derivative there may leave
 NEW, NOWHERE = -1, -2  # where a start leads, beside the number of a known gait
 
 
 class StrikeSection(NamedTuple):
-    """The states of a walker just after a heel strike, y = origin + z basis, and z = y[places]."""
+    """The states of a walker just after a heel strike, y = start + z basis, with short directions to be led along."""
 
     walker: Any  # (), the walker as compiled code takes it
-    origin: Any  # (2 n,)
+    start: Any  # (2 n (1 + d),) the state at z = 0, with its columns
     basis: Any  # (d, 2 n)
-    places: Any  # (d,)
-    columns: Any  # (2 n d,) short directions, to be led along
+    places: Any  # (d (1 + d),) of z in the state, and of the columns' z row by row of the derivative
 
 
 @lru_cache(REMEMBERED)
 def section_of(walker: Standing) -> StrikeSection:
     """The section of a walker, whose legs are straight there."""
     straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
-    n, places = len(straight), walker.section[:d].copy()
+    n, places = len(straight), walker.section[:d]
     origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
     origin[:n] = -2.0 * (walker.slope + walker.lean) * straight[:, SWING]
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
-    return StrikeSection(np.asarray(walker), origin, basis, places, SMALL * basis.ravel())
+    every = np.add.outer(places, 2 * n * np.arange(1, d + 1))
+    return StrikeSection(
+        np.asarray(walker),
+        np.append(origin, SMALL * basis),
+        basis,
+        np.append(places, every),
+    )
 
 
 def on_section(walker: Standing, z: Any) -> State:
     """The state (2 n) of section coordinates z (d,)."""
     section = section_of(walker)
-    return tuple((section.origin + np.asarray(z) @ section.basis).tolist())
+    return tuple((section.start[: len(walker.blank)] + np.asarray(z) @ section.basis).tolist())
 
 
 def coordinates_of(walker: Standing, y: Any) -> Floats:
     """The section coordinates (d,) of a state (2 n) just after heel strike."""
-    return np.asarray(y, float)[section_of(walker).places]
-
-
-class Memory(NamedTuple):
-    """What steps are computed in."""
-
-    plain: Any  # method for the equations of the walker alone
-    varied: Any  # for those with a column for each coordinate
-    finder: CrossingFinder
-    observer: Observer
-    plain_y: Any  # (2 n,) the state
-    varied_y: Any  # (2 n (1 + d),) with its columns
-    knee_time: Any  # (1,) s
-    pivots: Any  # (d,)
+    return np.asarray(y, float)[walker.section[: walker.coordinates]]
 
 
 class Steps(NamedTuple):
@@ -117,32 +104,41 @@ class Steps(NamedTuple):
     DP: Floats
 
 
+class Memory(NamedTuple):
+    """What steps are computed in, with their derivatives."""
+
+    varied: Any  # method for the equations with a column for each coordinate
+    finder: CrossingFinder
+    observer: Observer
+    y: Any  # (2 n (1 + d),) the state with its columns
+    knee_time: Any  # (1,) s
+    pivots: Any  # (d,)
+
+
 class Shooting:
     """The step map of walkers that are alike, with the memory to evaluate it."""
 
     def __init__(self, like: Standing, tolerances: Tolerances) -> None:
         """Steps at these tolerances."""
         size, d = len(like.blank), int(like.coordinates)
-        plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
-        self.memory = Memory(
-            plain, varied, finder_for(plain, EVENTS), unwatched(), np.zeros(size), np.zeros(size * (1 + d)),
-            np.zeros(1), np.zeros(d, np.int64),
-        )  # fmt: skip
+        self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
+        finder = finder_for(self.plain, EVENTS)
+        self.memory = Memory(varied, finder, unwatched(), np.zeros(size * (1 + d)), np.zeros(1), np.zeros(d, np.int64))
 
     def walk(self, section: StrikeSection, z: Floats, steps: int = 1, derived: bool = True) -> Steps:
-        """Walk from z (d,), with the derivative if it is wanted: without, it is a fraction of the work."""
+        """Walk from z (d,), with the derivative if it is wanted: without, it is two thirds of the work."""
         memory = self.memory
-        method, y = (memory.varied, memory.varied_y) if derived else (memory.plain, memory.plain_y)
-        size = section.origin.size
-        y[:size] = section.origin + z @ section.basis
-        if derived:
-            y[size:] = section.columns
-        clear_counts(method)
+        method = memory.varied if derived else self.plain
+        d, size = section.basis.shape
+        y = section.start[: method.y.size].copy()
+        y[:size] += z @ section.basis
+        method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
         strikes: HeelStrikes = new_heel_strikes(steps, y.size)
         status, taken = walk(section.walker, method, memory.finder, memory.observer, y, strikes)
-        ahead = strikes.after[:taken].reshape(taken, y.size // size, size)[:, :, section.places]
-        return Steps(Outcome(status), strikes.time[:taken], ahead[:, 0], ahead[:, 1:].transpose(0, 2, 1) / SMALL)
+        ahead = strikes.after[:taken].take(section.places if derived else section.places[:d], axis=1)
+        DP = ahead[:, d:].reshape(taken, d if derived else 0, d) / SMALL
+        return Steps(Outcome(status), strikes.time[:taken], ahead[:, :d], DP)
 
     def lead(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
         """Follow starts (starts, d) to where they lead; they are overwritten with the last states tried.
@@ -155,29 +151,9 @@ class Shooting:
         z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
         for k, gait in enumerate(gaits):
             z[k], DP[k] = gait
-        known, led = KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), np.zeros(len(starts), np.int64)
-        follow_starts(section, self.memory, known, starts, led)
+        led = np.zeros(len(starts), np.int64)
+        follow_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, led)
         return led
-
-
-@dataclass(frozen=True)
-class StepEquations:
-    """P(z) - z = 0 of a walker."""
-
-    shooting: Shooting
-    section: StrikeSection
-
-    def at(self, z: Floats) -> Evaluated[Steps]:
-        """Residual and its derivative at z (d,)."""
-        step = self.shooting.walk(self.section, z)
-        if step.outcome is not Outcome.WALKED:
-            return Evaluated(step.outcome, z, np.eye(z.size), step)
-        return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - np.eye(z.size), step)
-
-
-# ---- random starts ---------------------------------------------------------------------------------------------------
-# A start comes near a solution of P(z) = z with few derivatives, each of which takes as long as five steps: Broyden's
-# updates serve between them (Broyden 1965, his first method). What is found is solved to rounding elsewhere.
 
 
 class KnownGaits(NamedTuple):
@@ -189,151 +165,83 @@ class KnownGaits(NamedTuple):
 
 @kernel
 def follow_starts(section: StrikeSection, memory: Memory, known: KnownGaits, starts: Any, led: Any) -> None:
-    """See `Shooting.lead`.
-
-    starts  (starts, d); overwritten
-    led     (starts,); written
-    """
-    model = section.walker[()]
-    d = starts.shape[1]
-    z = vector(model.section)
-    for i in range(len(starts)):
-        copied(starts[i], d, z)
-        led[i] = follow(model, section, memory, known, z)
-        copied(z, d, starts[i])
-
-
-@inlined
-def copied(numbers: Any, d: int, to: Any) -> None:
-    """Copy d numbers."""
-    for i in range(d):
-        to[i] = numbers[i]
-
-
-@inlined
-def step_from(model: Standing, section: StrikeSection, memory: Memory, z: Any, end: Any, DP: Any, derived: bool) -> Any:
-    """One step from z (d,): where it leads into `end` (d,), and if `derived` its derivative into DP (d, d).
-
-    Returns whether it ended in a heel strike, and the residual, the largest component of P(z) - z; huge if it did not.
-    """
-    method = memory.varied if derived else memory.plain
-    y = memory.varied_y if derived else memory.plain_y
-    size, d = section.origin.size, section.places.size
-    for i in range(size):
-        y[i] = section.origin[i]
-        for j in range(d):
-            y[i] += z[j] * section.basis[j, i]
-    for i in range(y.size - size):
-        y[size + i] = section.columns[i]
-    clear_counts(memory.plain)
-    method.clock[H_NEXT] = 0.0
-    status, _ = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.knee_time)
-    if status != WALKED:
-        return False, NO_RESIDUAL
-    residual = 0.0
-    for i in range(d):
-        end[i] = y[section.places[i]]
-        residual = max(residual, abs(end[i] - z[i]))
-        if derived:
-            for j in range(d):
-                DP[i, j] = y[size * (j + 1) + section.places[i]] / SMALL
-    return True, residual
+    """Where Newton's method leads from starts (starts, d), into led (starts,); see `Shooting.lead`."""
+    for k in range(len(starts)):
+        led[k] = follow(section.walker[()], section, memory, known, starts[k])
 
 
 @inlined
 def follow(model: Standing, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
-    """Where a start z (d,) leads, which is overwritten with the last state tried.
+    """Where Newton's method leads from z (d,), which is overwritten with the last state tried.
 
-    After a full move that makes the residual smaller, Broyden's update of the derivative serves for the next one; else
-    the derivative is computed anew, and moves with it are halved until they do. A start that does not walk to a heel
-    strike, or comes to stand, is given up.
+    A move is halved until it makes the residual smaller. A start that does not walk to a heel strike, or comes to
+    stand, is given up. It leads to a known gait if the way there is short and one move with the derivative at that gait
+    leaves a small part of it.
     """
-    d, like = section.places.size, model.section
-    end, best, move, DP = vector(like), vector(like), vector(like), matrix(like)
-    clear_counts(memory.varied)
-    _, best_residual = step_from(model, section, memory, z, end, DP, False)
-    scale, evaluations = 1.0, 1
-    stale, exact, nearer = True, False, True
-    while NEAR_RESIDUAL < best_residual < NO_RESIDUAL and evaluations < MAX_EVALUATIONS:
-        if nearer:
-            if best_residual < STANDING_RESIDUAL and memory.plain.clock[T] < SHORTEST_STEP:
+    method, y, places = memory.varied, memory.y, section.places
+    (d, size), like = section.basis.shape, model.section
+    best, move, system = vector(like), vector(like), matrix(like)
+    least, share = NO_RESIDUAL, 1.0
+    clear_counts(method)
+    for _ in range(MAX_EVALUATIONS):
+        for i in range(y.size):
+            y[i] = section.start[i]
+        for i in range(size):
+            for j in range(d):
+                y[i] += z[j] * section.basis[j, i]
+        method.clock[H_NEXT] = 0.0
+        status, t = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.knee_time)
+        residual = NO_RESIDUAL
+        if status == WALKED and t >= SHORTEST_STEP:
+            residual = 0.0
+            for i in range(d):
+                residual = max(residual, abs(y[places[i]] - z[i]))
+        if residual < least:
+            least, share = residual, 1.0
+            if residual <= NEAR_RESIDUAL:
+                return NEW
+            for i in range(d):
+                best[i], move[i] = z[i], y[places[i]] - z[i]
+            for gait in range(len(known.z)):
+                way, left = 0.0, 0.0
+                for i in range(d):
+                    off = z[i] - known.z[gait, i]
+                    way = max(way, abs(off))
+                    for j in range(d):
+                        off += known.inverse[gait, i, j] * move[j]
+                    left = max(left, abs(off))
+                if way < WIDEST_WAY and left < LEFT * way:
+                    return gait
+            for i in range(d):
+                for j in range(d):
+                    system[i, j] = (1.0 if i == j else 0.0) - y[places[d * (i + 1) + j]] / SMALL
+            if not factor(system, memory.pivots, d):
                 return NOWHERE
-            gait = leads_to(known, z, end)
-            if gait >= 0:
-                return gait
-        if stale:
-            walked, _ = step_from(model, section, memory, z, end, DP, True)
-            if not walked:
-                return NOWHERE
-            stale, exact, scale = False, True, 1.0
-        if scale == 1.0:
-            copied(z, d, best)
-            if not newton_move(memory, model, z, end, DP, move):
+            solve(system, memory.pivots, move, 0, d)
+        else:
+            share *= 0.5
+            if least == NO_RESIDUAL or share < SMALLEST_SHARE:
                 return NOWHERE
         for i in range(d):
-            z[i] = best[i] + scale * move[i]
-        _, residual = step_from(model, section, memory, z, end, DP, False)
-        evaluations += 1
-        nearer = residual < best_residual
-        if nearer:
-            stale, exact, best_residual = scale < 1.0, False, residual
-            if not stale:
-                update(d, z, end, move, DP)
-        else:
-            copied(best, d, z)
-            stale, scale = not exact, 0.5 * scale
-            if scale < SMALLEST_MOVE:
-                return NOWHERE
-    return NEW if best_residual <= NEAR_RESIDUAL else NOWHERE
-
-
-@inlined
-def newton_move(memory: Memory, model: Standing, z: Any, end: Any, DP: Any, move: Any) -> bool:
-    """(I - DP)^-1 (end - z) into `move` (d,); False if the matrix is singular."""
-    d, system = memory.pivots.size, matrix(model.section)
-    for i in range(d):
-        move[i] = end[i] - z[i]
-        for j in range(d):
-            system[i, j] = (1.0 if i == j else 0.0) - DP[i, j]
-    if not factor(system, memory.pivots, d):
-        return False
-    solve(system, memory.pivots, move, 0, d)
-    return True
-
-
-@inlined
-def leads_to(known: KnownGaits, z: Any, end: Any) -> int:
-    """Number of the known gait that Newton's method with the derivative there leads to from z (d,); else NOWHERE.
-
-    It does if the way is short and one move leaves a small part of it: what the next leaves is smaller still.
-
-    end  (d,) where the step from z leads
-    """
-    for k in range(len(known.z)):
-        way, left = 0.0, 0.0
-        for i in range(known.z.shape[1]):
-            off = z[i] - known.z[k, i]
-            way = max(way, abs(off))
-            for j in range(known.z.shape[1]):
-                off += known.inverse[k, i, j] * (end[j] - z[j])
-            left = max(left, abs(off))
-        if way < WIDEST_WAY and left < LEFT * way:
-            return k
+            z[i] = best[i] + share * move[i]
     return NOWHERE
 
 
-@inlined
-def update(d: int, z: Any, end: Any, move: Any, DP: Any) -> None:
-    """Broyden's update of the derivative DP (d, d) after a full move (d,) to z (d,)."""
-    square = 0.0
-    for i in range(d):
-        square += move[i] * move[i]
-    for i in range(d):
-        for j in range(d):
-            DP[i, j] += (end[i] - z[i]) * move[j] / square
+class StepEquations:
+    """P(z) - z = 0 of a walker; a 'step' that is too short to be one has no value."""
 
+    def __init__(self, shooting: Shooting, section: StrikeSection) -> None:
+        """Steps of `shooting` from a walker's section."""
+        self.shooting, self.section, self.unity = shooting, section, np.eye(len(section.basis))
 
-# ---- over a parameter ------------------------------------------------------------------------------------------------
+    def at(self, z: Floats) -> Evaluated[Steps]:
+        """Residual and its derivative at z (d,)."""
+        step = self.shooting.walk(self.section, z)
+        if step.outcome is not Outcome.WALKED:
+            return Evaluated(step.outcome, z, self.unity, step)
+        if step.time[0] < SHORTEST_STEP:
+            return Evaluated(Outcome.NO_HEEL_STRIKE, z, self.unity, step)
+        return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - self.unity, step)
 
 
 class RigidMap:
