@@ -74,11 +74,11 @@ def _comment(text: str, indent: str) -> Iterator[str]:
 
 def _lines(block: dict[str, Any], indent: str) -> Iterator[str]:
     for name, value in block.items():
-        if isinstance(value, dict):
-            yield f"{indent}{name}:"
+        if isinstance(value, dict) and value:
+            yield f"{indent}{_value(name)}:"
             yield from _lines(value, f"{indent}  ")
         else:
-            yield f"{indent}{name}: {_value(value)}"
+            yield f"{indent}{_value(name)}: {_value(value)}"
 
 
 def _value(value: Any) -> str:

@@ -13,6 +13,7 @@ from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import typed
+from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.report.numbers import listed
@@ -21,7 +22,6 @@ from walkerlab.stages.plan import survey
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, OtherLayout, Stored
 from walkerlab.store.key import differences
-from walkerlab.store.provenance import resolved_yaml
 from walkerlab.store.runfolder import Record, RunFolder
 
 SHOWN_CHANGES = 3
@@ -167,7 +167,7 @@ def claim(folder: RunFolder, config: Config) -> None:
     """
     refuse_another_config(folder, config)
     record = folder.record()
-    asked = Record(folder.name, folder.source, resolved_yaml(config))
+    asked = Record(folder.name, folder.source, to_yaml(config))
     if record is None or (comes_from(record, folder) and record != asked):
         folder.write_record(asked)
 

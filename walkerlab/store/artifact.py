@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +29,11 @@ SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
 SEAL_BYTES = 83
 
 
-ROOT_ATTRIBUTES = frozenset(
-    {
-        "stage", "stage_key", "schema_version", "config_slice", "input_keys", "code_digest", "config", "command_line",
-        "seed", "started_utc", "ended_utc", "platform", "package_version", "library_versions", "git_commit",
-        "input_digests", "summary_json", "summary_timed", "content_digest", "complete",
-    }
-)  # fmt: skip
+NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
+"""What of an identity and a provenance is a mapping, which an attribute holds as JSON."""
+ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
+    "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
+}  # fmt: skip
 """What every artifact says of itself; a content with arrays at the root may say more there."""
 
 
@@ -88,15 +86,8 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
     image = hdf5.image(content.groups, {**root, **own})
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
-    return Stored(
-        groups=content.groups,
-        summary=content.summary,
-        timed=content.timed,
-        identity=identity,
-        provenance=provenance,
-        complete=complete,
-        seal=seal,
-    )
+    parts = content.groups, content.summary, content.timed
+    return Stored(*parts, identity=identity, provenance=provenance, complete=complete, seal=seal)
 
 
 @dataclass(frozen=True)
@@ -152,9 +143,15 @@ def read(path: Path) -> Stored:
     Raises FileNotFoundError if there is none, and Damaged for whatever is not intact: cut short, altered, hostile.
     """
     try:
-        image, seal = unsealed(read_bounded(path, LIMIT_BYTES))
-        groups, root = hdf5.parse(image)
-        return assembled(groups, root, seal)
+        data = read_bounded(path, LIMIT_BYTES)
+        image, end = data[:-SEAL_BYTES], SEAL.fullmatch(data[-SEAL_BYTES:])
+        if end is None:
+            raise Damaged(
+                "it does not end with the seal of a finished artifact: cut short, or not written by walkerlab"
+            )
+        if hashlib.sha256(image).hexdigest().encode() != end[1]:
+            raise Damaged("it was altered after it was finished")
+        return assembled(*hdf5.parse(image), end[1].decode())
     except (FileNotFoundError, Damaged):
         raise
     except OSError as error:
@@ -181,43 +178,17 @@ def check(path: Path, key: str) -> Verdict:
 
 def root_attributes(
     content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
-) -> dict[str, str | int | bool]:
+) -> dict[str, Attribute]:
     """What stands at the root of the file: all but the arrays."""
-    root: dict[str, str | int | bool] = {
-        "stage": identity.stage,
+    facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
+    return {
+        **{name: canonical_json(dict(value)) if name in NESTED else value for name, value in facts.items()},
         "stage_key": identity.key,
-        "schema_version": identity.schema_version,
-        "config_slice": canonical_json(dict(identity.config_slice)),
-        "input_keys": canonical_json(dict(identity.input_keys)),
-        "code_digest": identity.code_digest,
-        "config": provenance.config,
-        "command_line": provenance.command_line,
-        "seed": provenance.seed,
-        "started_utc": provenance.started_utc,
-        "ended_utc": provenance.ended_utc,
-        "platform": provenance.platform,
-        "package_version": provenance.package_version,
-        "library_versions": canonical_json(dict(provenance.library_versions)),
-        "input_digests": canonical_json(dict(provenance.input_digests)),
         "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
         "summary_timed": canonical_json(content.timed),
         "content_digest": digest,
         "complete": complete,
     }
-    if provenance.git_commit is not None:
-        root["git_commit"] = provenance.git_commit
-    return root
-
-
-def unsealed(data: bytes) -> tuple[bytes, str]:
-    """The HDF5 part of a file's bytes, and its sha256; Damaged if that is not what the seal at the end says."""
-    image, end = data[:-SEAL_BYTES], data[-SEAL_BYTES:]
-    seal = SEAL.fullmatch(end)
-    if seal is None:
-        raise Damaged("it does not end with the seal of a finished artifact: cut short, or not written by walkerlab")
-    if hashlib.sha256(image).hexdigest().encode() != seal[1]:
-        raise Damaged("it was altered after it was finished")
-    return image, seal[1].decode()
 
 
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
@@ -227,28 +198,13 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
     own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
     if "" in groups:
         groups = {**groups, "": Group(groups[""].variables, own)}
-    identity = Identity(
-        stage=root["stage"],
-        config_slice=json.loads(root["config_slice"]),
-        input_keys=json.loads(root["input_keys"]),
-        code_digest=root["code_digest"],
-    )
-    provenance = Provenance(
-        config=root["config"],
-        command_line=root["command_line"],
-        seed=root["seed"],
-        started_utc=root["started_utc"],
-        ended_utc=root["ended_utc"],
-        platform=root["platform"],
-        package_version=root["package_version"],
-        library_versions=json.loads(root["library_versions"]),
-        git_commit=root.get("git_commit"),
-        input_digests=json.loads(root["input_digests"]),
-    )
+    facts = {name: json.loads(value) if name in NESTED else value for name, value in root.items()}
+    identity = Identity(**{one.name: facts[one.name] for one in fields(Identity)})
+    provenance = Provenance(**{one.name: facts[one.name] for one in fields(Provenance) if one.name in facts})
     artifact = Stored(
-        groups=groups,
-        summary=json.loads(root["summary_json"]),
-        timed=tuple(json.loads(root["summary_timed"])),
+        groups,
+        json.loads(root["summary_json"]),
+        tuple(json.loads(root["summary_timed"])),
         identity=identity,
         provenance=provenance,
         complete=root["complete"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from walkerlab.store.artifact import Damaged, read
@@ -19,22 +19,15 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
-    """The artifacts of these stages, the files that they list, and what killed writers left; those that exist."""
+    """What there is: artifacts of these stages, the files in the folder that they list, what killed writers left."""
     found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
+    inside = folder.path.resolve()
     for stage in stages:
         found |= {folder.artifact(stage), folder.parts(stage)}
-        found.update(listed_files(folder, stage))
+        with contextlib.suppress(OSError, Damaged):
+            listed = indexed_files(read(folder.artifact(stage)))
+            found |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
     return sorted(path for path in found if path.is_file() or path.is_symlink())
-
-
-def listed_files(folder: RunFolder, stage: str) -> Iterator[Path]:
-    """The files that a stage's artifact lists, so far as they are inside the run folder."""
-    try:
-        names = indexed_files(read(folder.artifact(stage)))
-    except (OSError, Damaged):
-        return
-    inside = folder.path.resolve()
-    yield from (folder.path / name for name in names if (inside / name).resolve().is_relative_to(inside))
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,10 @@ Attribute = str | int | float | bool
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
 """Names of groups, variables, dimensions and attributes: what HDF5, netCDF and xarray all take unquoted."""
+
+
+TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
+"""Keys of summaries that name measured run times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +112,9 @@ class Content:
         object.__setattr__(self, "summary", {key: plain(value) for key, value in self.summary.items()})
         object.__setattr__(self, "timed", tuple(sorted(self.timed)))
         check_text(*self.summary, *self.timed)
-        object.__setattr__(self, "groups", with_parents(self.groups))
+        through = {path[:end] for path in self.groups for end, letter in enumerate(path) if letter == "/"}
+        empty = {path: Group({}) for path in sorted(through.difference(self.groups))}
+        object.__setattr__(self, "groups", {**self.groups, **empty})
         for path in filter(None, self.groups):
             above, _, name = path.rpartition("/")
             for part in path.split("/"):
@@ -144,10 +150,16 @@ class Digest:
         self._take(canonical_json([path, dict(attrs)]).encode())
 
     def add(self, name: str, variable: Variable) -> None:
-        """Take a variable of the group."""
-        if not variable.timing:
-            for part in variable_parts(name, variable):
-                self._take(part)
+        """Take a variable of the group: its labels, then its values in C order, little-endian."""
+        if variable.timing:
+            return
+        values = variable.values
+        label = [name, variable.dims, values.shape, values.dtype.kind, variable.units, variable.long_name]
+        self._take(canonical_json([*label, variable.timing, variable.missing]).encode())
+        if values.dtype.kind == "O":
+            self._take(canonical_json(values.ravel().tolist()).encode())
+        else:
+            self._take(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
 
     def hex(self) -> str:
         """The digest of what has come."""
@@ -156,23 +168,6 @@ class Digest:
     def _take(self, part: bytes) -> None:
         self._sha256.update(len(part).to_bytes(8, "little"))
         self._sha256.update(part)
-
-
-def with_parents(groups: Mapping[str, Group]) -> dict[str, Group]:
-    """The groups and, empty, those that a path leads through and that are not among them."""
-    through = {path[:end] for path in groups for end, letter in enumerate(path) if letter == "/"}
-    return {**groups, **{path: Group({}) for path in sorted(through.difference(groups))}}
-
-
-def variable_parts(name: str, variable: Variable) -> Iterator[bytes]:
-    """The bytes that stand for a variable in a digest: its labels, then its values in C order, little-endian."""
-    values = variable.values
-    label = [name, variable.dims, values.shape, values.dtype.kind, variable.units, variable.long_name]
-    yield canonical_json([*label, variable.timing, variable.missing]).encode()
-    if values.dtype.kind == "O":
-        yield canonical_json(values.ravel().tolist()).encode()
-    else:
-        yield values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
 
 
 def canonical(values: ArrayLike) -> NDArray[Any]:
@@ -232,15 +227,10 @@ def plain(value: Any) -> Any:
 
 def untimed(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
     """The summary without its timings, at any depth."""
-    return {key: _untimed(value) for key, value in summary.items() if key not in timed and not is_timing(key)}
 
+    def inner(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return untimed(value)
+        return [inner(item) for item in value] if isinstance(value, list) else value
 
-def _untimed(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return untimed(value)
-    return [_untimed(item) for item in value] if isinstance(value, list) else value
-
-
-def is_timing(key: str) -> bool:
-    """Whether a summary's key names a measured run time."""
-    return key == "wall_s" or key.endswith("_wall_s")
+    return {key: inner(value) for key, value in summary.items() if not (key in timed or TIMING.fullmatch(key))}

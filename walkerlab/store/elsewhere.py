@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import mmap
 import os
-import secrets
-from collections.abc import Iterator
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored
-from walkerlab.store.files import storing, write_atomically
+from walkerlab.store.files import replacing
 from walkerlab.store.runfolder import RunFolder
 
 
@@ -26,21 +24,16 @@ class Elsewhere:
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> Elsewhere | None:
     """The result for a key in another run folder beside this one, or None; never raises for what files may be."""
-    for path in artifacts_beside(folder, stage):
+    try:
+        names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
+    except OSError:
+        return None
+    for path in (RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name):
         if mentions(path, key):
             verdict = artifact.check(path, key)
             if verdict.accepted and verdict.artifact is not None:
                 return Elsewhere(path, verdict.artifact)
     return None
-
-
-def artifacts_beside(folder: RunFolder, stage: str) -> Iterator[Path]:
-    """The files of a stage's results in the other run folders, by name."""
-    try:
-        names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
-    except OSError:
-        return
-    yield from (RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name)
 
 
 def mentions(path: Path, key: str) -> bool:
@@ -58,18 +51,8 @@ def take_over(found: Elsewhere, target: Path) -> None:
     Artifacts are only ever replaced, so that a shared file is as safe as one's own. Raises StorageError if the system
     refuses.
     """
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        os.link(found.path, temporary)
-    except OSError:
-        with storing(target):
-            data = found.path.read_bytes()
-        write_atomically(target, data)
-        return
-    try:
-        with storing(target):
-            temporary.replace(target)
-    finally:
-        # Replacing a name by another of the same file leaves both.
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+    with replacing(target) as temporary:
+        try:
+            os.link(found.path, temporary)
+        except OSError:
+            shutil.copyfile(found.path, temporary)

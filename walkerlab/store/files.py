@@ -84,11 +84,16 @@ def replacing(path: Path) -> Iterator[Path]:
             with temporary.open("rb") as file:
                 os.fsync(file.fileno())
             temporary.replace(path)
-        except BaseException:
+        finally:
+            # there after a failure, and where it was a link to the very file that it was to replace
             with contextlib.suppress(OSError):
                 temporary.unlink()
-            raise
-        sync_folder(path.parent)
+        if hasattr(os, "O_DIRECTORY"):  # elsewhere the system has no call for a folder's entries
+            descriptor = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
@@ -105,17 +110,6 @@ def make_folder(path: Path) -> None:
     """Create a folder and its parents; StorageError if the system refuses."""
     with storing(path):
         path.mkdir(parents=True, exist_ok=True)
-
-
-def sync_folder(path: Path) -> None:
-    """Have a folder's entries on the disk, where the system has a call for it."""
-    if not hasattr(os, "O_DIRECTORY"):
-        return
-    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def read_bounded(path: Path, limit: int) -> bytes:

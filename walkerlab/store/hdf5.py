@@ -29,10 +29,11 @@ def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
     """
     # No file of that name is touched: the memory driver has no backing store.
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
-        for name, value in root.items():
-            file.attrs[name] = value
+        file.attrs.update(root)
         for path, group in sorted(content.items()):
-            write_group(file.require_group(path) if path else file, group)
+            target = file.require_group(path) if path else file
+            target.attrs.update(group.attrs)
+            write_variables(target, sorted(group.variables.items(), key=lambda item: item[1].dims != (item[0],)))
         file.flush()
         return bytes(file.id.get_file_image())
 
@@ -46,8 +47,7 @@ def write_in_turn(
     """
     with h5py.File(path, "w") as file:
         write_variables(file, variables)
-        for name, value in root().items():
-            file.attrs[name] = value
+        file.attrs.update(root())
 
 
 class GroupOnDisk(Group):
@@ -87,15 +87,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
     def _read_anew(self, name: str) -> Variable:
         with h5py.File(self.file) as opened:
-            dataset = opened[self.path][name]
-            return read_variable(name, dataset, self._by_address, Budget(self.file.stat().st_size))
-
-
-def write_group(target: Any, group: Group) -> None:
-    """Write variables, the dimensions they share, and attributes into an open HDF5 group."""
-    for name, value in group.attrs.items():
-        target.attrs[name] = value
-    write_variables(target, sorted(group.variables.items(), key=lambda item: item[1].dims != (item[0],)))
+            return read_variable(name, opened[self.path][name], self._by_address, Budget(self.file.stat().st_size))
 
 
 def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
@@ -113,19 +105,13 @@ def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> N
 
 def write_variable(target: Any, name: str, variable: Variable) -> Any:
     """Write one array with its labels."""
-    values, kind = variable.values, variable.values.dtype.kind
-    if kind == "O":
-        dataset = target.create_dataset(name, data=values, dtype=TEXT)
-    else:
-        # Truth values as bytes, marked as xarray marks them: netCDF has no such type.
-        dataset = target.create_dataset(name, data=values.astype({"f": "<f8", "i": "<i8", "b": "i1"}[kind]))
-    dataset.attrs["units"] = variable.units
-    dataset.attrs["long_name"] = variable.long_name
-    if kind == "b":
-        dataset.attrs["dtype"] = "bool"
-    for mark in ("timing", "missing"):
-        if getattr(variable, mark):
-            dataset.attrs[mark] = 1
+    kind = variable.values.dtype.kind
+    # Truth values as bytes, marked as xarray marks them: netCDF has no such type.
+    dtype = {"O": TEXT, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
+    dataset = target.create_dataset(name, data=variable.values, dtype=dtype)
+    marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
+    labels = {"units": variable.units, "long_name": variable.long_name}
+    dataset.attrs.update(labels | ({"dtype": "bool"} if kind == "b" else {}) | marks)
     return dataset
 
 
@@ -136,9 +122,7 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
     and whatever the HDF5 library raises for what is no HDF5.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
-        root = dict(read_attributes(file))
-        groups = dict(walk_groups(file, "", Budget(len(data))))
-    return groups, root
+        return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)
 
 
 class Budget:
@@ -173,7 +157,7 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
         elif not is_bare_dimension(member):
             variables[name] = read_variable(name, member, names, budget)
     if path:
-        yield path, Group(variables, dict(read_attributes(parent)))
+        yield path, Group(variables, read_attributes(parent))
     elif variables:
         yield path, Group(variables)
 
@@ -185,12 +169,7 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
     """Names by address: a scale is reached by reference, and HDF5 would search the whole file for its name."""
-    return {address(member): name for name, member in members.items()}
-
-
-def address(member: Any) -> int:
-    """Where in the file a group or dataset is."""
-    return int(h5py.h5o.get_info(member.id).addr)
+    return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
@@ -198,9 +177,12 @@ def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Bud
     values = read_values(name, dataset, budget)
     if read_text(dataset, "dtype", "") == "bool":
         values = values.astype(np.bool_)
+    scales = [] if dataset.is_scale else [h5py.h5o.get_info(axis[0].id).addr for axis in dataset.dims]
+    if not all(scale in names for scale in scales):
+        raise ValueError(f"a dimension of {name!r} is not in its group")
     return Variable(
         values,
-        dims=read_dims(name, dataset, names),
+        dims=(name,) if dataset.is_scale else tuple(names[scale] for scale in scales),
         units=read_text(dataset, "units"),
         long_name=read_text(dataset, "long_name"),
         timing="timing" in dataset.attrs,
@@ -239,31 +221,17 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     return values
 
 
-def read_dims(name: str, dataset: Any, names: Mapping[int, str]) -> tuple[str, ...]:
-    """The names of a dataset's dimensions, which are members of its group."""
-    if dataset.is_scale:
-        return (name,)
-    scales = [address(axis[0]) for axis in dataset.dims]
-    if not all(scale in names for scale in scales):
-        raise ValueError(f"a dimension of {name!r} is not in its group")
-    return tuple(names[scale] for scale in scales)
-
-
-def read_attributes(holder: Any) -> Iterator[tuple[str, Attribute]]:
-    """The attributes of a group, each one text or one number."""
+def read_attributes(holder: Any) -> dict[str, Attribute]:
+    """The attributes of a group in Python's own types; ValueError if one is not a text or number as written here."""
+    found: dict[str, Attribute] = {}
     for name in holder.attrs:
-        yield name, read_attribute(holder, name)
-
-
-def read_attribute(holder: Any, name: str) -> Attribute:
-    """One attribute in Python's own type; ValueError if it is of a type that is not written here."""
-    declared = holder.attrs.get_id(name)
-    known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
-    if declared.shape != () or not known:
-        raise ValueError(f"its attribute {name!r} is of a type that is not written here")
-    value = holder.attrs[name]
-    plain: Attribute = value if isinstance(value, str) else value.item()
-    return plain
+        declared = holder.attrs.get_id(name)
+        known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
+        if declared.shape != () or not known:
+            raise ValueError(f"its attribute {name!r} is of a type that is not written here")
+        value = holder.attrs[name]
+        found[name] = value if isinstance(value, str) else value.item()
+    return found
 
 
 def read_text(holder: Any, name: str, default: str | None = None) -> str:

@@ -32,28 +32,18 @@ class Identity:
 
     @property
     def key(self) -> str:
-        """The stage key."""
-        return stage_key(self.schema_version, self.config_slice, self.input_keys, self.code_digest)
-
-
-def stage_key(
-    schema_version: int, config_slice: Mapping[str, Any], input_keys: Mapping[str, str], code_digest: str
-) -> str:
-    """The sha256 of all that a stage's result is determined by; equal for equal values, whatever their order."""
-    parts = [schema_version, dict(config_slice), dict(input_keys), code_digest]
-    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+        """The stage key: the sha256 of it all but the name; equal for equal values, whatever their order."""
+        parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
+        return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
     """What differs between two identities, in words; empty if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
-        if name not in new.input_keys:
-            changes.append(f"input {name} left out")
-        elif name not in old.input_keys:
-            changes.append(f"input {name} added")
-        elif old.input_keys[name] != new.input_keys[name]:
-            changes.append(f"input {name} changed")
+        if old.input_keys.get(name) != new.input_keys.get(name):
+            what = "left out" if name not in new.input_keys else "changed" if name in old.input_keys else "added"
+            changes.append(f"input {name} {what}")
     if old.code_digest != new.code_digest:
         changes.append("code changed")
     if old.schema_version != new.schema_version:

@@ -6,6 +6,7 @@ they belong to. Lines are only ever added; a last one that was cut short is drop
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import zlib
@@ -24,7 +25,16 @@ class Parts:
         self.path, self.key = path, key
         self.kept: dict[str, Numbers] = {}
         self._intact = 0  # bytes of the file that are to be kept
-        self._load()
+        with contextlib.suppress(OSError, ValueError, TypeError):  # of a last line that was cut short
+            lines = self.path.read_bytes().splitlines(keepends=True)
+            for text in lines if lines[:1] == [line([key])] else []:
+                held = json.loads(text.partition(b" ")[2])
+                if text != line(held):
+                    break
+                if self._intact:
+                    name, numbers = held
+                    self.kept[str(name)] = [float(number) for number in numbers]
+                self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
         """Add a part; StorageError if the system refuses."""
@@ -45,35 +55,8 @@ class Parts:
         with storing(self.path):
             self.path.unlink(missing_ok=True)
 
-    def _load(self) -> None:
-        try:
-            lines = self.path.read_bytes().splitlines(keepends=True)
-        except OSError:
-            return
-        if not lines or lines[0] != line([self.key]):
-            return
-        self._intact = len(lines[0])
-        for text in lines[1:]:
-            part = part_in(text)
-            if part is None:
-                return
-            self.kept[part[0]] = part[1]
-            self._intact += len(text)
-
 
 def line(value: object) -> bytes:
     """A value as a line with its checksum; numbers read back as they were."""
     text = json.dumps(value, allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)
-
-
-def part_in(text: bytes) -> tuple[str, Numbers] | None:
-    """The part in a line; None if the line is not whole."""
-    checksum, _, rest = text.partition(b" ")
-    if not rest.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(rest[:-1]):
-        return None
-    try:
-        name, numbers = json.loads(rest)
-        return str(name), [float(number) for number in numbers]
-    except (ValueError, TypeError):
-        return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import importlib.metadata
-import io
 import platform
 import shlex
 import sys
@@ -12,10 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ruamel.yaml import YAML
-
 import walkerlab
 from walkerlab.config.schema import Config
+from walkerlab.config.writer import to_yaml
 from walkerlab.store.commit import commit_of_checkout, commit_of_installation
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
@@ -54,10 +52,11 @@ class Provenance:
 
 def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
     """The provenance of a stage that starts now, in this process."""
+    program = Path(sys.argv[0]).name
     now = utc_now()
     return Provenance(
-        config=resolved_yaml(config),
-        command_line=shlex.join([program(), *sys.argv[1:]]),
+        config=to_yaml(config),
+        command_line=shlex.join(["walkerlab" if program == "__main__.py" else program, *sys.argv[1:]]),
         seed=config.seed,
         started_utc=now,
         ended_utc=now,
@@ -68,22 +67,6 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
         git_commit=git_commit(),
         input_digests=dict(input_digests),
     )
-
-
-def program() -> str:
-    """The name of the program that this process runs."""
-    name = Path(sys.argv[0]).name
-    return "walkerlab" if name == "__main__.py" else name
-
-
-def resolved_yaml(config: Config) -> str:
-    """The config with all its defaults, as YAML text; a block that is left out is left out."""
-    text = io.StringIO()
-    writer = YAML(typ="safe", pure=True)
-    writer.default_flow_style = False
-    writer.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # typed as None alone
-    writer.dump(config.model_dump(mode="json", exclude_none=True), text)
-    return text.getvalue()
 
 
 def utc_now() -> str:
