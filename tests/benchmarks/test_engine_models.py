@@ -5,7 +5,7 @@ import pytest
 from engine_scenes import compass, kneed
 
 from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of, walked
-from walkerlab.benchmarks.engines.follow import crossing, follower
+from walkerlab.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
@@ -68,7 +68,7 @@ def test_coordinates_of_a_kneed_walker_lead_to_an_engine_and_back(doing):
 def knees_seen(scene):
     """Our own walk of two steps, what the rules remember of it, and when knees change: time, places before, after."""
     result, samples = our_samples(scene, 1e-4, 2)
-    rules, changes = follower(scene, 2, *scene.from_base(scene.start)), []
+    rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
         q, v = rules.scene.from_base(tuple(y))
         q[np.abs(q) < 1e-12] = 0.0  # a knee that has just locked is straight but for rounding
@@ -78,9 +78,8 @@ def knees_seen(scene):
             rules.watches = False
             rules.follow(time_s, q, v)
             rules.watches = True
-            rules.turn_knee(q, v)
-        elif rules.is_outdated:
-            rules.release_knee(q, v)
+        if rules.turn is not None or rules.is_outdated:
+            rules.go_on(q, v)
         if rules.scene.knee_places != before:
             changes.append((time_s, before, rules.scene.knee_places))
     return result, rules, changes
@@ -123,12 +122,12 @@ def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
     _, samples = our_samples(scene, 0.05, 3)
     for i in range(1, 20):
         q, v = scene.from_base(tuple(samples.states[i]))
-        rules = follower(scene, 3, *scene.from_base(scene.start))
+        rules = RuleFollower(scene, 3, *scene.from_base(scene.start))
         rules.walk_state.has_ground[:] = samples.has_ground[i]
-        forces = rules.look.forces(q, v).copy()
+        forces = rules.forces(q, v).copy()
         law, friction = scene.ours.normal, scene.ours.friction
         power = 0.0
-        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.look.feet(q, v)):
+        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.feet(q, v)):
             if height < 0.0 and samples.has_ground[i, foot]:
                 depth = -height
                 share = min(1.0, depth / law.full_damping_penetration)
@@ -140,7 +139,7 @@ def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
 
 def test_the_rules_see_our_own_walk_as_it_was(scene):
     result, samples = our_samples(scene, 1e-4, 4)
-    rules = follower(scene, 4, *scene.from_base(scene.start))
+    rules = RuleFollower(scene, 4, *scene.from_base(scene.start))
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
         rules.follow(float(time_s), *scene.from_base(tuple(y)))
     seen = rules.walk_state.touch_time[:3]
@@ -153,14 +152,14 @@ def test_the_rules_see_our_own_walk_as_it_was(scene):
 
 def test_a_walk_whose_numbers_are_lost_is_a_failed_solver(scene):
     q, v = scene.from_base(scene.start)
-    rules = follower(scene, 4, q, v)
+    rules = RuleFollower(scene, 4, q, v)
     rules.follow(1e-3, np.full_like(q, np.nan), v)
     assert rules.outcome is Outcome.SOLVER_FAILED
 
 
 def test_a_walker_whose_hip_is_low_has_fallen(scene):
     q, v = scene.from_base(scene.start)
-    rules = follower(scene, 4, q, v)
+    rules = RuleFollower(scene, 4, q, v)
     rules.follow(1e-3, q - np.array((0.0, 0.6, 0.0, 0.0)), v)
     assert rules.outcome is Outcome.FELL
 

@@ -29,23 +29,15 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
     state = np.array(start)
     for _ in range(steps):
         # the feet are together at the start too: look for the heel strike once the legs have passed each other
-        middle = state
-        if state[0] < state[1]:
-            middle = to_event(passing, state, limit)
-        end = to_event(striking, middle, limit)
-        state = np.array(impact(walker, *end.tolist()))
+        for integrator in (passing, striking) if state[0] < state[1] else (striking,):
+            integrator.time, integrator.state[:] = 0.0, state
+            integrator.reset_cooldowns()
+            outcome = integrator.propagate_until(limit)[0]
+            if outcome.value >= 0 or abs(integrator.time) >= limit:
+                raise ValueError("no heel strike")
+            state = np.array(integrator.state)
+        state = np.array(impact(walker, *state.tolist()))
     return state
-
-
-def to_event(integrator: Any, state: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
-    """The state at the integrator's terminal event."""
-    integrator.time = 0.0
-    integrator.state[:] = state
-    integrator.reset_cooldowns()
-    outcome = integrator.propagate_until(limit)[0]
-    if outcome.value >= 0 or abs(integrator.time) >= limit:
-        raise ValueError("no heel strike")
-    return np.array(integrator.state)
 
 
 def integrators(walker: RigidWalker) -> tuple[Any, Any]:

@@ -17,7 +17,7 @@ from walkerlab.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import Standing
 from walkerlab.paper.appendix_a import RigidWalker
-from walkerlab.solvers.registry import METHODS, Method, Tolerances, finder_for
+from walkerlab.solvers.registry import METHODS, Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
 
 if TYPE_CHECKING:
@@ -71,33 +71,35 @@ class RigidTrial:
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """A function that does the walk with a method, ready to be timed."""
+        """A function that does the walk with a method, ready to be timed.
+
+        Its runs share their memory, as a program that walks often would have it.
+        """
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
-            return lambda: self._as_a_script(rtol, atol, budget)
-        return self._prepared(METHODS[method], rtol, atol, budget)
+            assert self.compass is not None, "the script is not among this walker's methods"
+            compass = self.compass
 
-    def _prepared(self, entry: Method, rtol: float, atol: float, budget: int) -> Callable[[], TrialRun]:
-        """The walk with memory that its runs share, as a program that walks often would have it."""
-        n = len(self.walker.blank)
-        method = entry.new(n, rtol, atol, budget)
-        finder = finder_for(method, RIGID_EVENTS)
+            def as_a_script() -> TrialRun:
+                state, evaluations = walk_as_a_script(compass, self.start, self.steps, rtol, atol, budget)
+                if state is None:
+                    return TrialRun(Outcome.BUDGET_EXHAUSTED.label, np.zeros(0), evaluations, 0, 0)
+                return TrialRun(Outcome.WALKED.label, state, evaluations, 0, 0)
+
+            return as_a_script
+        n, entry = len(self.walker.blank), METHODS[method]
+        solver = entry.new(n, rtol, atol, budget)
+        finder = finder_for(solver, RIGID_EVENTS)
         walker, observer, strikes = np.asarray(self.walker), unwatched(), new_heel_strikes(self.steps, n)
         stride = walk if entry.compiled else uncompiled(walk)
 
         def run() -> TrialRun:
-            clear_counts(method)
-            method.clock[H_NEXT] = 0.0
-            status, _ = stride(walker, method, finder, observer, np.array(self.start), strikes)
-            return finished(Outcome(status), strikes.after[-1], method.counts)
+            clear_counts(solver)
+            solver.clock[H_NEXT] = 0.0
+            status, _ = stride(walker, solver, finder, observer, np.array(self.start), strikes)
+            return finished(Outcome(status), strikes.after[-1], solver.counts)
 
         return run
-
-    def _as_a_script(self, rtol: float, atol: float, budget: int) -> TrialRun:
-        assert self.compass is not None, "the script is not among this walker's methods"
-        state, evaluations = walk_as_a_script(self.compass, self.start, self.steps, rtol, atol, budget)
-        outcome = Outcome.BUDGET_EXHAUSTED if state is None else Outcome.WALKED
-        return TrialRun(outcome.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
 
 
 @dataclass(frozen=True)

@@ -39,27 +39,22 @@ CANNOT_EXPRESS = (
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     """The closed forms above, solved for what the target says."""
-    stiffness = target.mass * target.gravity / target.penetration
-    omega = math.sqrt(target.gravity / target.penetration)
-    settings = {
-        "point_contact_stiffness": stiffness,
-        "hunt_crossley_dissipation": 2.0 * target.damping_ratio * omega / target.gravity,
-        "relaxation_time": 2.0 * target.damping_ratio / omega,
-        "friction": target.friction,
-        "stiction_tolerance": target.creep_velocity / slip_share(model, target.creep_load / target.friction),
-    }
-    unused = {"sap": ("hunt_crossley_dissipation", "stiction_tolerance"), "lagged": ("relaxation_time",)}
-    left = unused.get(model, ("relaxation_time",))
-    return adapter.OwnContact(model, {name: value for name, value in settings.items() if name not in left})
-
-
-def slip_share(model: str, load: float) -> float:
-    """The slip over the stiction tolerance at which a model gives a share `load` of full friction."""
-    if model in APPROXIMATIONS:
-        return load / math.sqrt(1.0 - load * load)
     from scipy.optimize import brentq
 
-    return float(brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15))
+    stiffness = target.mass * target.gravity / target.penetration
+    omega = math.sqrt(target.gravity / target.penetration)
+    load = target.creep_load / target.friction
+    # the slip over the stiction tolerance at which the model gives this share of full friction
+    share = load / math.sqrt(1.0 - load * load)
+    if model not in APPROXIMATIONS:
+        share = brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15)
+    settings = {"point_contact_stiffness": stiffness, "friction": target.friction}
+    if model == "sap":
+        settings["relaxation_time"] = 2.0 * target.damping_ratio / omega
+    else:
+        settings["hunt_crossley_dissipation"] = 2.0 * target.damping_ratio * omega / target.gravity
+        settings["stiction_tolerance"] = target.creep_velocity / share
+    return adapter.OwnContact(model, settings)
 
 
 class EngineRun(adapter.Simulation):
@@ -67,20 +62,22 @@ class EngineRun(adapter.Simulation):
 
     def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
         """Build the diagram and put it into its start state."""
-        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-        from pydrake.systems.analysis import Simulator
+        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
+        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
         from pydrake.systems.framework import DiagramBuilder
 
         logging.getLogger("drake").setLevel(logging.ERROR)
         own, self._h = self.own, self.stepping.step_s
-        self._discrete = self.stepping.integrator == "discrete"
+        name, _, adaptive = self.stepping.integrator.partition(" ")
+        self._discrete = name == "discrete"
         builder = DiagramBuilder()
         self._plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, self._h if self._discrete else 0.0)
         joints, self._feet, self._floor = assembled(self._plant, model, own)
         if self._discrete:
             self._plant.SetUseSampledOutputPorts(False)  # nobody reads them, and they copy all that there is
         if self._discrete and own is not None:
-            set_approximation(self._plant, own.model)
+            approximation = getattr(DiscreteContactApproximation, APPROXIMATIONS[own.model])
+            self._plant.set_discrete_contact_approximation(approximation)
         self._plant.Finalize()
         if own is not None and "stiction_tolerance" in own.settings:
             self._plant.set_stiction_tolerance(own.settings["stiction_tolerance"])
@@ -97,7 +94,15 @@ class EngineRun(adapter.Simulation):
         self._plant.SetPositions(self._at, positions)
         self._plant.SetVelocities(self._at, velocities)
         if not self._discrete:
-            integrate_by(self._simulator, self.stepping)
+            ResetIntegratorFromFlags(self._simulator, name, self._h)
+            integrator = self._simulator.get_mutable_integrator()
+            if adaptive:
+                integrator.set_target_accuracy(self.stepping.tolerance)
+                integrator.set_maximum_step_size(self._h)
+                integrator.set_requested_minimum_step_size(1e-12)
+                integrator.request_initial_step_size_target(1e-5)
+            elif name in EMBEDDED:
+                integrator.set_fixed_step_mode(True)
         self._simulator.Initialize()
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
@@ -105,7 +110,10 @@ class EngineRun(adapter.Simulation):
         from pydrake.systems.framework import EventStatus
 
         if self._discrete:
-            self._march(steps, until_s, on_step)
+            for count in range(1, min(steps, round(until_s / self._h)) + 1):
+                self._simulator.AdvanceTo((count + 0.25) * self._h)
+                if not on_step(count * self._h, *self._state()):
+                    return
             return
         left = [steps]
 
@@ -119,14 +127,6 @@ class EngineRun(adapter.Simulation):
 
         self._simulator.set_monitor(monitor)
         self._simulator.AdvanceTo(until_s)
-
-    def _march(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
-        """Discrete updates, one after the other."""
-        h = self._h
-        for count in range(1, min(steps, round(until_s / h)) + 1):
-            self._simulator.AdvanceTo((count + 0.25) * h)
-            if not on_step(count * h, *self._state()):
-                return
 
     def _state(self) -> tuple[adapter.Floats, adapter.Floats]:
         """Coordinates and velocities."""
@@ -149,57 +149,32 @@ class EngineRun(adapter.Simulation):
             self._declared[ball] = manager.ApplyTransient(declaration)
 
 
-def integrate_by(simulator: Any, stepping: adapter.Stepping) -> None:
-    """Choose the integrator, with steps of one size or adapted ones."""
-    from pydrake.systems.analysis import ResetIntegratorFromFlags
-
-    name, _, adaptive = stepping.integrator.partition(" ")
-    ResetIntegratorFromFlags(simulator, name, stepping.step_s)
-    integrator = simulator.get_mutable_integrator()
-    if adaptive:
-        integrator.set_target_accuracy(stepping.tolerance)
-        integrator.set_maximum_step_size(stepping.step_s)
-        integrator.set_requested_minimum_step_size(1e-12)
-        integrator.request_initial_step_size_target(1e-5)
-    elif name in EMBEDDED:
-        integrator.set_fixed_step_mode(True)
-
-
-def set_approximation(plant: Any, model: str) -> None:
-    """Choose the discrete contact model."""
-    from pydrake.multibody.plant import DiscreteContactApproximation
-
-    plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, APPROXIMATIONS[model]))
-
-
 def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
     """Build bodies, joints and feet; the joints in the order of the coordinates, the feet's geometries, the floor's."""
-    from pydrake.geometry import HalfSpace
+    from pydrake.geometry import HalfSpace, Sphere
+    from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
+    from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 
     plant.mutable_gravity_field().set_gravity_vector(np.array((model.gravity_along, -model.gravity_down, 0.0)))
     bodies: list[Any] = []
     joints: list[Any] = []
     for link in model.links:
-        body = plant.AddRigidBody(link.name, inertia(link))
-        parent = plant.world_body() if link.parent < 0 else bodies[link.parent]
-        joints += joined(plant, model, link, parent, body)
+        inertia, centre = RotationalInertia(*[link.inertia_kg_m2] * 3), np.array((*link.centre_m, 0.0))
+        whole = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
+        body = plant.AddRigidBody(link.name, whole)
+        joints += joined(plant, model, link, plant.world_body() if link.parent < 0 else bodies[link.parent], body)
         bodies.append(body)
-    feet: list[Any] = []
-    floor = None
-    if own is not None:
-        from pydrake.math import RigidTransform
-
-        plant.set_contact_model(ContactModel.kPoint)
-        point = np.array((0.0, model.balls[0].ground_m, 0.0))
-        pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), point)
-        floor = plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "floor", material(own))
-        for number, ball in enumerate(model.balls):
-            from pydrake.geometry import Sphere
-
-            place = RigidTransform(np.array((*ball.centre_m, 0.0)))
-            sphere, surface = Sphere(ball.radius_m), material(own)
-            feet.append(plant.RegisterCollisionGeometry(bodies[ball.link], place, sphere, f"foot {number}", surface))
+    if own is None:
+        return joints, [], None
+    plant.set_contact_model(ContactModel.kPoint)
+    point = np.array((0.0, model.balls[0].ground_m, 0.0))
+    pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), point)
+    floor = plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "floor", material(own))
+    feet = []
+    for number, ball in enumerate(model.balls):
+        shape = RigidTransform(np.array((*ball.centre_m, 0.0))), Sphere(ball.radius_m)
+        feet.append(plant.RegisterCollisionGeometry(bodies[ball.link], *shape, f"foot {number}", material(own)))
     return joints, feet, floor
 
 
@@ -224,29 +199,17 @@ def joined(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -
     return [along, plant.AddJoint(PrismaticJoint("height", carriage.body_frame(), here, y))]
 
 
-def inertia(link: Link) -> Any:
-    """Mass, centre and inertia of a link, alike about all axes."""
-    from pydrake.multibody.tree import RotationalInertia, SpatialInertia
-
-    central, (x, y) = link.inertia_kg_m2, link.centre_m
-    return SpatialInertia.MakeFromCentralInertia(
-        link.mass_kg, np.array((x, y, 0.0)), RotationalInertia(central, central, central)
-    )
-
-
 def material(own: adapter.OwnContact) -> Any:
     """Surface of a foot and of the floor alike: half of the compliance each."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
-    settings = own.settings
-    properties = ProximityProperties()
-    friction = CoulombFriction(settings["friction"], settings["friction"])
-    dissipation = settings.get("hunt_crossley_dissipation")
-    stiffness = settings["point_contact_stiffness"]
-    # two springs in series
+    settings, properties = own.settings, ProximityProperties()
     AddContactMaterial(
-        properties=properties, dissipation=dissipation, point_stiffness=2.0 * stiffness, friction=friction
+        properties=properties,
+        dissipation=settings.get("hunt_crossley_dissipation"),
+        point_stiffness=2.0 * settings["point_contact_stiffness"],  # two springs in series
+        friction=CoulombFriction(settings["friction"], settings["friction"]),
     )
     if "relaxation_time" in settings:
         # times of two surfaces add up

@@ -78,38 +78,30 @@ def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: fl
 
 def truth_of(scene: EngineScene) -> Truth | None:
     """The reference of a scene; None if the walk ends before states can be compared."""
-    (first, first_rtol), (second, second_rtol) = REFERENCES
+    (first, first_rtol), second = REFERENCES
     walk = walked(scene, first, first_rtol, OWN_TOUCHES)
     if walk.touch_time_s.size <= TOUCHES:
         return None
     last, following = walk.touch_time_s[TOUCHES - 1 : TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
-    one = walked(scene, first, first_rtol, TOUCHES + 1, until)
-    other = walked(scene, second, second_rtol, TOUCHES + 1, until)
-    end = state_at_end(one)
-    agreement = float(np.max(np.abs(end - state_at_end(other))))
-    return Truth(until, end, one.touch_time_s[:TOUCHES], agreement, walk)
+    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in ((first, first_rtol), second))
+    end, other_end = end_of(one), end_of(other)
+    assert end is not None, "the walk goes on beyond that time"
+    assert other_end is not None, "so it does by the other method"
+    return Truth(until, end, one.touch_time_s[:TOUCHES], float(np.max(np.abs(end - other_end))), walk)
 
 
-def state_at_end(result: ContactWalkResult) -> Floats:
-    """The state at the second of a walk's samples, the first being its start."""
-    assert result.samples is not None, "this walk was sampled"
-    return np.asarray(result.samples.states[1])
+def end_of(result: ContactWalkResult) -> Floats | None:
+    """The state at the second of a walk's samples, the first being its start; None if it was not reached."""
+    there = result.samples is not None and len(result.samples.states) > 1
+    return np.asarray(result.samples.states[1]) if result.samples is not None and there else None
 
 
 def answered(result: ContactWalkResult, wall_s: float, touches: int) -> runs.WalkAnswer:
     """Our own walk as an engine would have answered, of so many touches."""
-    there = result.samples is not None and len(result.samples.states) > 1
-    return runs.WalkAnswer(
-        result.outcome.label,
-        state_at_end(result) if there else None,
-        result.touch_time_s[:touches],
-        result.touch_along_m[:touches],
-        result.slip_m[:touches],
-        int(result.work[1]),
-        float(result.end_time_s),
-        wall_s,
-    )
+    times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
+    steps, time_s = int(result.work[1]), float(result.end_time_s)
+    return runs.WalkAnswer(result.outcome.label, end_of(result), times, along, slips, steps, time_s, wall_s)
 
 
 @dataclass(frozen=True)
@@ -127,6 +119,9 @@ class EngineExperiment:
     ) -> EngineRow:
         """A run with its errors, or that it was lost with its process or refused by the engine.
 
+        There is an error of the end state and of the touches; on an engine's own law, where only a walk to the end from
+        the gait itself is compared, of the last period.
+
         integrator  or contact model on an engine's own law
         start       velocities of the start over those of the gait
         """
@@ -136,27 +131,24 @@ class EngineExperiment:
             outcome = Outcome.BUDGET_EXHAUSTED if answer.timed_out else Outcome.SOLVER_FAILED
             nothing = (None, None, None, None, None, None)
             return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.why)
-        last = last_step(answer)
-        errors = (None, None) if self.truth is None else self.errors(answer, self.truth, last[0], start)
+        period_s = length_m = slip_m = error = touch_error = None
+        touches, truth = answer.touches_s, self.truth
+        if touches.size >= 2:
+            period_s, length_m = float(np.diff(touches)[-1]), float(np.diff(answer.along_m)[-1])
+            if answer.slips_m.size == touches.size:  # else its foot did not lift
+                slip_m = float(answer.slips_m[-1])
+        if truth is not None and self.experiment == OWN_LAW:
+            if period_s is not None and answer.outcome == Outcome.WALKED.label and start == 1.0:
+                error = abs(period_s - truth.walk.periods_s[-1])
+        elif truth is not None:
+            if answer.end is not None and np.isfinite(answer.end).all():
+                error = float(np.max(np.abs(answer.end - truth.end)))
+            if touches.size >= TOUCHES:
+                touch_error = float(np.max(np.abs(touches[:TOUCHES] - truth.touches_s)))
         if tolerance is not None or self.experiment == SAME_LAW:
             step_s = answer.time_s / max(1, answer.steps)
-        numbers = (*errors, answer.wall_s, *last)
-        return EngineRow(*head, step_s, tolerance, *numbers, answer.touches_s.size, answer.outcome)
-
-    def errors(
-        self, answer: runs.WalkAnswer, truth: Truth, period_s: float | None, start: float
-    ) -> tuple[float | None, float | None]:
-        """Of the end state and of the touches, None where there is none; on an engine's own law, of the last period.
-
-        On its own law only a walk to the end from the gait itself is compared.
-        """
-        if self.experiment == OWN_LAW:
-            whole = answer.outcome == Outcome.WALKED.label and start == 1.0
-            return (None if period_s is None or not whole else abs(period_s - truth.walk.periods_s[-1])), None
-        error = math.inf if answer.end is None else float(np.max(np.abs(answer.end - truth.end)))
-        enough = answer.touches_s.size >= TOUCHES
-        touch = float(np.max(np.abs(answer.touches_s[:TOUCHES] - truth.touches_s))) if enough else None
-        return (error if math.isfinite(error) else None), touch
+        numbers = error, touch_error, answer.wall_s, period_s, length_m, slip_m
+        return EngineRow(*head, step_s, tolerance, *numbers, touches.size, answer.outcome)
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
@@ -180,7 +172,12 @@ def same_law_rows(
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
             continue
-        for stepping in ladder_of(name, integrator, truth.until_s):
+        for asked in steppings(name, integrator, SAME_LAW_STEPS):
+            steps = math.ceil(truth.until_s / asked.step_s)
+            if not integrator.adapts and steps > integrator.most_steps:
+                continue
+            # a whole number of steps leads to the end
+            stepping = asked if integrator.adapts else Stepping(name, truth.until_s / steps)
             task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task, PATIENCE_S)
             row = experiment.row(name, stepping, answer)
@@ -190,33 +187,11 @@ def same_law_rows(
                 break
 
 
-def ladder_of(name: str, integrator: Integrator, until_s: float) -> Iterator[Stepping]:
-    """The runs of one integrator on our law, from coarse to fine; a whole number of steps leads to the end."""
-    for stepping in steppings(name, integrator, SAME_LAW_STEPS):
-        steps = math.ceil(until_s / stepping.step_s)
-        if integrator.adapts:
-            yield stepping
-        elif steps <= integrator.most_steps:
-            yield Stepping(name, until_s / steps)
-
-
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
     """How an integrator is to step, from coarse to fine: by these steps, or where it adapts them by its tolerance."""
     if integrator.adapts:
         return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
-
-
-def last_step(answer: runs.WalkAnswer) -> tuple[float | None, float | None, float | None]:
-    """Period (s), length (m) and slip (m) of the last step; of less than two steps there are none.
-
-    There is no slip either where its foot did not lift.
-    """
-    if answer.touches_s.size < 2:
-        return None, None, None
-    period, length = np.diff(answer.touches_s)[-1], np.diff(answer.along_m)[-1]
-    slip = float(answer.slips_m[-1]) if answer.slips_m.size == answer.touches_s.size else None
-    return float(period), float(length), slip
 
 
 def target_of(scene: EngineScene) -> EngineContact | None:
@@ -316,10 +291,8 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         before = None
         for stepping in steppings(integrator, entry, SWING_STEPS):
-            task = runs.SwingTask(
-                engine.name, stepping, model, chain, scene.ours.slope, start, SWING_S, entry.most_steps
-            )
-            answer: runs.SwingAnswer | TaskLost = process.do(task, PATIENCE_S)
+            swing = model, chain, scene.ours.slope, start, SWING_S, entry.most_steps
+            answer = process.do(runs.SwingTask(engine.name, stepping, *swing), PATIENCE_S)
             if isinstance(answer, TaskLost):
                 lost.append(answer)
                 break

@@ -61,15 +61,14 @@ class EngineRun(adapter.Simulation):
 
         self._container = exu.SystemContainer()
         self._system = self._container.AddSystem()
-        n = model.size
-        node = self._system.AddNode(
-            NodeGenericODE2(
-                referenceCoordinates=[0.0] * n,
-                initialCoordinates=q.tolist(),
-                initialCoordinates_t=v.tolist(),
-                numberOfODE2Coordinates=n,
-            )
+        zero, at, moving = [0.0] * model.size, q.tolist(), v.tolist()
+        start = NodeGenericODE2(
+            referenceCoordinates=zero,
+            initialCoordinates=at,
+            initialCoordinates_t=moving,
+            numberOfODE2Coordinates=len(zero),
         )
+        node = self._system.AddNode(start)
         tree, places = assembled(self._system, model, node, self.forces)
         self._contacts = [] if self.own is None else list(contacts(self._system, model, tree, places, self.own))
         self._system.Assemble()
@@ -123,14 +122,12 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
         for freedom in freedoms:
-            first = not joints
-            last = freedom == freedoms[-1]
-            hangs = link.parent >= 0
+            last, hangs = freedom == freedoms[-1], link.parent >= 0
+            offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)
+            from_hinge = np.subtract(offset, model.links[link.parent].point_m if hangs else (0.0, 0.0))
             joints.append(kinds[freedom])
             parents.append(places[link.parent] if hangs else len(joints) - 2)
-            offset = np.subtract(link.parent_point_m, model.links[link.parent].point_m) if hangs else (0.0, 0.0)
-            at = link.parent_point_m if first else offset
-            offsets.append([*at, 0.0])
+            offsets.append([*from_hinge, 0.0])
             centres.append([*np.subtract(link.centre_m, link.point_m), 0.0] if last else [0.0, 0.0, 0.0])
             masses.append(link.mass_kg if last else 0.0)
             inertias.append(link.inertia_kg_m2 * NO_ROTATION if last else 0.0 * NO_ROTATION)
@@ -140,62 +137,46 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
         assert forces is not None, "it is only called with a law"
         return forces(np.asarray(q), np.asarray(v)).tolist()
 
-    tree = system.AddObject(
-        ObjectKinematicTree(
-            nodeNumber=node,
-            jointTypes=joints,
-            linkParents=parents,
-            jointTransformations=exu.Matrix3DList([NO_ROTATION] * len(joints)),
-            jointOffsets=exu.Vector3DList(offsets),
-            linkInertiasCOM=exu.Matrix3DList(inertias),
-            linkCOMs=exu.Vector3DList(centres),
-            linkMasses=masses,
-            gravity=[model.gravity_along, -model.gravity_down, 0.0],
-            forceUserFunction=0 if forces is None else ground,
-        )
+    tree = ObjectKinematicTree(
+        nodeNumber=node,
+        jointTypes=joints,
+        linkParents=parents,
+        jointTransformations=exu.Matrix3DList([NO_ROTATION] * len(joints)),
+        jointOffsets=exu.Vector3DList(offsets),
+        linkInertiasCOM=exu.Matrix3DList(inertias),
+        linkCOMs=exu.Vector3DList(centres),
+        linkMasses=masses,
+        gravity=[model.gravity_along, -model.gravity_down, 0.0],
+        forceUserFunction=0 if forces is None else ground,
     )
-    return tree, places
+    return system.AddObject(tree), places
 
 
 def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact) -> Iterator[Any]:
     """A ball on a large triangle for each foot; the numbers of these objects."""
-    from exudyn.itemInterface import (
-        MarkerBodyRigid,
-        MarkerKinematicTreeRigid,
-        NodeGenericData,
-        ObjectContactSphereTriangle,
-        ObjectGround,
-    )
-
-    settings = own.settings
-    floor = system.AddObject(ObjectGround())
-    for ball in model.balls:
-        link = model.links[ball.link]
-        place = [*np.subtract(ball.centre_m, link.point_m), 0.0]
-        foot = system.AddMarker(
-            MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=places[ball.link], localPosition=place)
-        )
-        ground = system.AddMarker(MarkerBodyRigid(bodyNumber=floor, localPosition=[0.0, ball.ground_m, 0.0]))
-        state = system.AddNode(NodeGenericData(initialCoordinates=[0.0] * 4, numberOfDataCoordinates=4))
-        yield system.AddObject(
-            ObjectContactSphereTriangle(
-                markerNumbers=[foot, ground],
-                nodeNumber=state,
-                sphereRadius=ball.radius_m,
-                trianglePoints=triangle(),
-                includeEdges=0,
-                dynamicFriction=settings["dynamic_friction"],
-                frictionProportionalZone=settings["friction_proportional_zone"],
-                contactStiffness=settings["contact_stiffness"],
-                contactDamping=settings["contact_damping"],
-                contactStiffnessExponent=settings["contact_stiffness_exponent"],
-            )
-        )
-
-
-def triangle() -> Any:
-    """A large triangle in the ground's plane, its normal upwards."""
     import exudyn as exu
+    from exudyn import itemInterface
 
-    r = PLANE_M
-    return exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])
+    settings, r = own.settings, PLANE_M
+    plane = exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])  # its normal upwards
+    floor = system.AddObject(itemInterface.ObjectGround())
+    for ball in model.balls:
+        place = [*np.subtract(ball.centre_m, model.links[ball.link].point_m), 0.0]
+        foot = itemInterface.MarkerKinematicTreeRigid(
+            objectNumber=tree, linkNumber=places[ball.link], localPosition=place
+        )
+        ground = itemInterface.MarkerBodyRigid(bodyNumber=floor, localPosition=[0.0, ball.ground_m, 0.0])
+        state = itemInterface.NodeGenericData(initialCoordinates=[0.0] * 4, numberOfDataCoordinates=4)
+        contact = itemInterface.ObjectContactSphereTriangle(
+            markerNumbers=[system.AddMarker(foot), system.AddMarker(ground)],
+            nodeNumber=system.AddNode(state),
+            sphereRadius=ball.radius_m,
+            trianglePoints=plane,
+            includeEdges=0,
+            dynamicFriction=settings["dynamic_friction"],
+            frictionProportionalZone=settings["friction_proportional_zone"],
+            contactStiffness=settings["contact_stiffness"],
+            contactDamping=settings["contact_damping"],
+            contactStiffnessExponent=settings["contact_stiffness_exponent"],
+        )
+        yield system.AddObject(contact)

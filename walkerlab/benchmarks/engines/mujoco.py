@@ -10,10 +10,11 @@ Source: MuJoCo documentation, Computation: constraint model, and Modeling: solve
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.benchmarks.engines import adapter
-from walkerlab.benchmarks.engines.planar import Link, PlanarModel
+from walkerlab.benchmarks.engines.planar import Ball, PlanarModel
 
 INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
@@ -88,11 +89,11 @@ def applied(forces: adapter.Forces, data: Any) -> Any:
 
 def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
     """The model in MuJoCo's own language."""
-    contact = own.settings if own is not None else None
-    ratio = f'cone="elliptic" impratio="{contact["impratio"]!r}"' if contact is not None else ""
-    world = body(model, 0, contact)
-    if contact is not None:
-        world = floor(model.balls[0].ground_m) + world
+    ratio, world = "", body(model, 0, own)
+    if own is not None:
+        ratio = f'cone="elliptic" impratio="{own.settings["impratio"]!r}"'
+        place = f'pos="0 0 {model.balls[0].ground_m!r}" contype="0" conaffinity="1"'
+        world = f'<geom name="floor" type="plane" size="0 0 1" {place}/>{world}'
     return f"""<mujoco>
   <compiler autolimits="false" balanceinertia="true"/>
   <option gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {ratio} iterations="100" tolerance="1e-12"/>
@@ -100,44 +101,24 @@ def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
 </mujoco>"""
 
 
-def floor(height: float) -> str:
-    """The ground."""
-    return f'<geom name="floor" type="plane" size="0 0 1" pos="0 0 {height!r}" contype="0" conaffinity="1"/>'
-
-
-def body(model: PlanarModel, place: int, contact: Any) -> str:
+def body(model: PlanarModel, place: int, own: adapter.OwnContact | None) -> str:
     """A link with its hinge, its feet and the links that hang from it."""
     link = model.links[place]
-    joints = (
-        "".join(joint(*AXES[freedom], link) for freedom in model.freedoms)
-        if link.parent < 0
-        else joint(*AXES["turn"], link)
-    )
-    feet = (
-        ""
-        if contact is None
-        else "".join(geom(n, ball, contact) for n, ball in enumerate(model.balls) if ball.link == place)
-    )
-    inside = "".join(body(model, child, contact) for child, other in enumerate(model.links) if other.parent == place)
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
+    inside = ""
+    for kind, axis in (AXES[freedom] for freedom in (model.freedoms if link.parent < 0 else ("turn",))):
+        inside += f'<joint type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"/>'
     i = max(link.inertia_kg_m2, LEAST_INERTIA)
-    return (
-        f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{joints}'
-        f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" '
-        f'diaginertia="{i!r} {i!r} {i!r}"/>{feet}{inside}</body>'
-    )
+    inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
+    feet = [] if own is None else [(n, ball) for n, ball in enumerate(model.balls) if ball.link == place]
+    inside += "".join(foot(number, ball, own.settings) for number, ball in feet if own is not None)
+    inside += "".join(body(model, child, own) for child, other in enumerate(model.links) if other.parent == place)
+    return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
 
 
-def joint(kind: str, axis: str, link: Link) -> str:
-    """One freedom of a link, about its hinge."""
-    x, z = link.point_m
-    return f'<joint type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"/>'
-
-
-def geom(number: int, ball: Any, contact: Any) -> str:
+def foot(number: int, ball: Ball, contact: Mapping[str, float]) -> str:
     """A foot's ball with the contact's settings."""
-    x, z = ball.centre_m
-    d = contact["solimp_d"]
+    (x, z), d = ball.centre_m, contact["solimp_d"]
     return (
         f'<geom name="foot {number}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} 0 {z!r}" contype="1" '
         f'conaffinity="0" condim="3" friction="{contact["friction"]!r} 0 0" priority="1" '

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.mechanics.assembly import Anchor, levers, masses, neighbours
+from walkerlab.mechanics.assembly import masses, neighbours
 from walkerlab.mechanics.parts import Assembly, Knee, Position
 
 Floats = NDArray[np.float64]
@@ -162,8 +162,3 @@ def lumped(
     least = SMALLEST_INERTIA * total * max(float(np.hypot(*(np.array(point) - centre))), SMALLEST_BALL_M) ** 2
     at = (float(centre[0]), float(centre[1]))
     return Link(members[0][0], total, at, max(inertia, least), parent, parent_point, point)
-
-
-def levers_from(assembly: Assembly, base: str, base_point: Position, body: str, at_m: Position) -> Floats:
-    """Levers (n, 2) in m from the base's point to a point of a body."""
-    return levers(assembly, Anchor(base, base_point), Anchor(body, at_m))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines import planar
 from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
-from walkerlab.benchmarks.engines.follow import RuleFollower, follower
+from walkerlab.benchmarks.engines.follow import RuleFollower
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.hybrid.contact_events import STEPS
@@ -72,17 +72,11 @@ class WalkTask:
         outcome = rules.outcome
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
-        done = int(walk_state.feet[STEPS])
-        return WalkAnswer(
-            outcome.label,
-            rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None,
-            walk_state.touch_time[:done].copy(),
-            walk_state.touch_along[:done].copy(),
-            walk_state.slip[: steps_with_lift(walk_state)].copy(),
-            walk.steps,
-            walk.time_s,
-            walk.wall_s,
-        )
+        end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
+        done, lifted = int(walk_state.feet[STEPS]), steps_with_lift(walk_state)
+        touches = walk_state.touch_time[:done].copy(), walk_state.touch_along[:done].copy()
+        slips = walk_state.slip[:lifted].copy()
+        return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)
 
 
 class EngineWalk:
@@ -90,9 +84,9 @@ class EngineWalk:
 
     def __init__(self, task: WalkTask) -> None:
         """At the start."""
-        self.task = task
+        self.task, self.adapter = task, ENGINES[task.engine].adapter()
         self.q, self.v = task.scene.from_base(task.scene.start)
-        self.rules: RuleFollower = follower(task.scene, task.touches, self.q, self.v)
+        self.rules = RuleFollower(task.scene, task.touches, self.q, self.v)
         self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
 
     @property
@@ -101,53 +95,48 @@ class EngineWalk:
         return self.time_s >= (1.0 - ROUNDING) * self.task.until_s
 
     def go(self) -> None:
-        """Walk to the end."""
-        while self.rules.outcome is None and not self.is_over and self.steps < self.task.most:
+        """Walk to the end; a step within which a knee turns is taken again, up to there."""
+        rules = self.rules
+        while rules.outcome is None and not self.is_over and self.steps < self.task.most:
             self._simulate(self.task.until_s)
-            turn = self.rules.turn
-            if turn is not None:
-                self._come_to(turn.share * (self.seen_s - self.time_s))
-                self.q, self.v = self.rules.turn_knee(self.q, self.v)
-            elif self.rules.is_outdated:
-                self.q, self.v = self.rules.release_knee(self.q, self.v)
-
-    def _come_to(self, wait_s: float) -> None:
-        """Take the last step again, up to where a knee turns."""
-        self.rules.watches = False
-        if wait_s > ROUNDING * self.task.stepping.step_s:
-            self._simulate(self.time_s + wait_s)
-        self.rules.watches = True
+            if rules.turn is not None:
+                rules.watches = False
+                wait_s = rules.turn.share * (self.seen_s - self.time_s)
+                if wait_s > ROUNDING * self.task.stepping.step_s:
+                    self._simulate(self.time_s + wait_s)
+                rules.watches = True
+            if rules.turn is not None or rules.is_outdated:
+                self.q, self.v = rules.go_on(self.q, self.v)
 
     def _simulate(self, until_s: float) -> None:
         """Let the engine go on from the present state, by a whole number of steps."""
-        task, span = self.task, until_s - self.time_s
+        task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
-        if not ENGINES[task.engine].adapter().INTEGRATORS[stepping.integrator].adapts:
+        if not self.adapter.INTEGRATORS[stepping.integrator].adapts:
             stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
-        law = self.rules.look.forces if task.own is None else task.own
-        engine = ENGINES[task.engine].adapter().EngineRun(self.rules.scene.model, stepping, self.q, self.v, law)
+        law = rules.forces if task.own is None else task.own
+        engine = self.adapter.EngineRun(rules.scene.model, stepping, self.q, self.v, law)
         since = self.time_s
-        self.hand_over_ground(engine)
+
+        def hand_over_ground() -> None:
+            for foot in range(2):
+                engine.carry(foot, bool(rules.walk_state.has_ground[foot]))
 
         def on_step(time_s: float, q: Floats, v: Floats) -> bool:
             self.seen_s = since + time_s
-            changed = self.rules.follow(self.seen_s, q, v)
-            if self.rules.turn is not None and self.rules.watches:
+            changed = rules.follow(self.seen_s, q, v)
+            if rules.turn is not None and rules.watches:
                 return False
             self.steps += 1
             self.time_s, self.q, self.v = self.seen_s, q.copy(), v.copy()
             if changed:
-                self.hand_over_ground(engine)
-            return self.rules.outcome is None and not (changed and self.rules.is_outdated)
+                hand_over_ground()
+            return rules.outcome is None and not (changed and rules.is_outdated)
 
+        hand_over_ground()
         begun = time.process_time()
         engine.run(task.most - self.steps, span, on_step)
         self.wall_s += time.process_time() - begun
-
-    def hand_over_ground(self, engine: Simulation) -> None:
-        """Tell the engine under which feet there is ground."""
-        for foot in range(2):
-            engine.carry(foot, bool(self.rules.walk_state.has_ground[foot]))
 
 
 @dataclass(frozen=True)
@@ -237,51 +226,36 @@ class TuningTask:
 
     def run(self) -> TuningAnswer:
         """Tune by closed forms, then measure."""
-        adapter = ENGINES[self.engine].adapter()
-        own = adapter.tuned(self.contact, self.target)
-        ball = Bench(self, own)
-        depth = ball.at_rest()
-        ratio = ball.damping_ratio(depth)
-        return TuningAnswer(own, depth, ratio, ball.friction(depth), ball.creep(depth))
+        bench = Bench(self, ENGINES[self.engine].adapter().tuned(self.contact, self.target))
+        depth = bench.at_rest()
+        ratio = bench.damping_ratio(depth)
+        return TuningAnswer(bench.own, depth, ratio, bench.friction(depth), bench.creep(depth))
 
 
 class Bench:
     """A heavy ball that cannot turn, on level or inclined ground: bouncing ball and sliding block in one."""
 
     def __init__(self, task: TuningTask, own: OwnContact) -> None:
-        """Keep what its runs share."""
-        self.task, self.own = task, own
-        self.adapter = ENGINES[task.engine].adapter()
+        """Keep what its runs share: `omega` and `settling_s`, several times the slower time constant, of the target."""
+        self.task, self.own, self.target = task, own, task.target
+        self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
+        slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
+        self.settling_s = 8.0 / slow
 
     def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
         """How the ball moves for a time from `depth` (m) inside the ground, pulled by `along` times its weight.
 
         h  step (s)
         """
-        target = self.task.target
-        radius, ground = planar.ball_and_ground(0.0)
+        target, adapter = self.target, ENGINES[self.task.engine].adapter()
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
-        model = planar.PlanarModel(
-            (link,),
-            planar.UPRIGHT,
-            (planar.Ball(0, (0.0, 0.0), radius, ground),),
-            along * target.gravity,
-            target.gravity,
-        )
-        name = self.adapter.CONTACTS[self.own.model]
-        stepping = Stepping(name, h, ROUNDING if self.adapter.INTEGRATORS[name].adapts else None)
-        engine = self.adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
+        ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
+        model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity)
+        name = adapter.CONTACTS[self.own.model]
+        stepping = Stepping(name, h, ROUNDING if adapter.INTEGRATORS[name].adapts else None)
+        engine = adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
         engine.carry(0, True)
-        steps = max(2, round(time_s / h))
-        return recorded(engine, MANY, steps * h)
-
-    @property
-    def settling_s(self) -> float:
-        """Several times the slower time constant of the target's ball (s)."""
-        omega = math.sqrt(self.task.target.gravity / self.task.target.penetration)
-        ratio = self.task.target.damping_ratio
-        slow = omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else omega * ratio
-        return 8.0 / slow
+        return recorded(engine, MANY, max(2, round(time_s / h)) * h)
 
     def at_rest(self) -> float:
         """Penetration (m) of a ball that was dropped from the surface."""
@@ -289,7 +263,7 @@ class Bench:
 
     def damping_ratio(self, depth: float) -> float:
         """Of the oscillator that fits the ball's motion about its rest (least squares of accelerations)."""
-        omega = math.sqrt(self.task.target.gravity / self.task.target.penetration)
+        omega = self.omega
         motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # means of two ends of a step stand for its middle, whatever the engine's own rule
@@ -300,14 +274,14 @@ class Bench:
 
     def friction(self, depth: float) -> float:
         """Deceleration over gravity of a block that slides, once its penetration has settled."""
-        target, settled = self.task.target, self.settling_s
+        target, settled = self.target, self.settling_s
         start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
-        watched = len(motion.v) // 5
-        fall = motion.v[-1 - watched, 0] - motion.v[-1, 0]
-        return float(fall / ((motion.t[-1] - motion.t[-1 - watched]) * target.gravity))
+        watched = -1 - len(motion.v) // 5
+        fall = motion.v[watched, 0] - motion.v[-1, 0]
+        return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
         """Velocity (m/s) at which a block that stands on an incline creeps down."""
-        target, h = self.task.target, STEADY * self.task.step_s
+        target, h = self.target, STEADY * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, levers_from, planar_model, skeleton
+from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, planar_model, skeleton
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
@@ -16,7 +16,7 @@ from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import knees_at_start
-from walkerlab.mechanics.assembly import masses, total_mass
+from walkerlab.mechanics.assembly import Anchor, levers, masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee, Position
 from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, knee_rules, start_state
@@ -72,13 +72,9 @@ class EngineScene:
     @cached_property
     def knee_places(self) -> tuple[int, ...]:
         """Where each knee's angle is among an engine's coordinates; a locked one is at none, -1."""
-        bends = [self.bends(knee) for knee in self.assembly.knees]
+        ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
+        bends = [self.chain[shank] - self.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
-
-    def bends(self, knee: Knee) -> Floats:
-        """By how much a knee bends with each of the relative angles."""
-        shank, thigh = self.assembly.index(knee.shank), self.assembly.index(knee.thigh)
-        return np.asarray(self.chain[shank] - self.chain[thigh])
 
     def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
         """The scene with those knees locked that are LOCKED."""
@@ -88,10 +84,8 @@ class EngineScene:
     @cached_property
     def centre_levers(self) -> Floats:
         """Levers (n, 2) in m from the base's point to the centre of mass."""
-        every = [
-            mass * levers_from(self.assembly, self.base, self.hip, at.body, at.at_m)
-            for mass, at in masses(self.assembly)
-        ]
+        base = Anchor(self.base, self.hip)
+        every = [mass * levers(self.assembly, base, at) for mass, at in masses(self.assembly)]
         return np.asarray(sum(every) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
@@ -122,24 +116,11 @@ class EngineScene:
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
-def scene_of(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """The config's walker on its own ground, free from its start."""
-    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    assembly = scene.assembly
-    start = start_state(scene, rigid_state)
-    base = assembly.legs[STANCE_FOOT][0]
-    hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
-    d = np.zeros((2, MAX_BODIES, 2))
-    for foot, part in enumerate(assembly.feet):
-        d[foot, : len(assembly.bodies)] = levers_from(assembly, base, hip, part.body, part.centre_m)
-    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1])
-    name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
-    free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
-    return free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start))
-
-
 def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
-    """The walks of a config."""
+    """The walks of a config: its walker on its own ground, free from its start.
+
+    Raises ConfigError for a walker that other engines cannot be told of.
+    """
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
@@ -151,4 +132,14 @@ def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state
             "engines: the compliant stop of a knee is not taken to other engines.", "Choose walker.knee.lock: ideal."
         )
     length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
-    return (scene_of(config, length, rigid_state),)
+    scene = replace(contact_scene(config, length, length), pinned=False)
+    assembly, start = scene.assembly, start_state(scene, rigid_state)
+    base = assembly.legs[STANCE_FOOT][0]
+    hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
+    d = np.zeros((2, MAX_BODIES, 2))
+    for foot, part in enumerate(assembly.feet):
+        d[foot, : len(assembly.bodies)] = levers(assembly, Anchor(base, hip), Anchor(part.body, part.centre_m))
+    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1])
+    name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
+    free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
+    return (free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start)),)
