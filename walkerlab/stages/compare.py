@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,18 @@ import numpy as np
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_the_papers
-from walkerlab.hybrid.comparison import Array, Motion, sampled_at_strikes
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.comparison import (
+    IMPACT_PHASE,
+    PHASES,
+    Array,
+    Motion,
+    WalkDifference,
+    between_impacts,
+    difference_in_phase,
+    difference_in_time,
+    orbit_distances,
+    sampled_at_strikes,
+)
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
@@ -19,7 +30,8 @@ from walkerlab.paper.errata import Erratum, errata
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
-    EnergyRecord,
+    Errors,
+    LegErrors,
     Measured,
     RigidModel,
     characteristics,
@@ -30,61 +42,89 @@ from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.rows import NumberVerdict, paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
-from walkerlab.scene.contact import GAIT, contact_scene, start_state
+from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
 from walkerlab.scene.rigid import compass
-from walkerlab.solvers.system import State
-from walkerlab.stages.compared_motion import Comparison, compare_motion
-from walkerlab.stages.compared_releases import LEFT_OUT, KneedStart, compare_releases
-from walkerlab.stages.compared_tables import numbers_group, table_group
+from walkerlab.stages.compared_releases import LEFT_OUT, compare_releases
 from walkerlab.stages.progress import Progress
-from walkerlab.store.columns import rows_group
-from walkerlab.store.content import Content, Group
+from walkerlab.stages.walk import LEG, STEP, TIME, legs, over_time
+from walkerlab.store.columns import numbered, rows_group
+from walkerlab.store.content import Content, Group, Variable
 
-STEPS_OF_A_STRIDE = 2
-SAMPLES_OF_A_MOTION = 2
+STRIDE = 2  # steps
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
+NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}
+WAYS = ("raw", "aligned", "between_impacts", "settled")
+PHASE, ROW = "phase", "row"
+MODELS = {
+    "as_printed": "rigid model, equations as printed",
+    "corrected": "rigid model, corrected equations",
+    "contact": "contact model",
+}
+MEANINGS = {
+    **MODELS,
+    "quantity": "what it is",
+    "unit": "unit of the row's numbers",
+    "where": "where the paper has it",
+    "paper": "as the paper has it",
+    "used": "as used here",
+    "paper_matlab": "the paper's MATLAB model",
+    "paper_adams": "the paper's MSC ADAMS model",
+    "paper_percent": "difference rate as printed",
+    "percent_of_matlab": "difference in percent of the MATLAB value",
+    "percent_of_adams": "difference in percent of the ADAMS value",
+    "printed": "as printed",
+    "verdict": "reproduced, explained or refuted",
+    "evidence": "why",
+}
+"""Columns of the paper's numbers and tables."""
 
 
 def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
-    if not is_the_papers(config.walker):
-        return models_compared(config, inputs, progress)
-    progress.start("compare", 3)
+    papers = is_the_papers(config.walker)
+    progress.start("compare", 3 if papers else 2)
+    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
+    walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}
+    errors = {model: walk["numerical_error"] for model, walk in walks.items() if "numerical_error" in walk}
+    shared = motion.summary | ({"numerical_error": errors} if errors else {})
+    progress.advance()
+    if papers:
+        groups, said = against_the_paper(config, inputs, motion, progress)
+    else:
+        groups, said = {}, models_compared(config, inputs)
+    progress.advance()
+    left_out = [*said.pop("left_out"), *motion.left_out]
+    return Content({**groups, **motion.groups}, {**said, **shared, "left_out": left_out})
+
+
+def against_the_paper(
+    config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
+) -> tuple[dict[str, Group], dict[str, Any]]:
+    """Groups and summary of both models against the paper's numbers, tables and errata."""
     study = study_the_paper()
     progress.advance()
-    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
-    progress.advance()
     measured = measure(config, inputs, motion)
-    rows = tuple(paper_rows(measured, study))
-    progress.advance()
-    found = errata(study)
+    rows, found = [row.summary for row in paper_rows(measured, study)], errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
-    groups = {name: table_group(table) for name, table in tables.items()}
-    numbers, stored = [row.summary for row in rows], rows_group(found, labels_of(Erratum))
-    return Content(
-        {"paper_numbers": numbers_group(numbers), "errata": stored, **groups, **motion.groups},
-        {
-            "paper_numbers": numbers,
-            "verdicts": {verdict.value: [row.verdict for row in rows].count(verdict) for verdict in NumberVerdict},
-            **tables,
-            **motion.summary,
-            "errata": [vars(erratum) for erratum in found],
-            "departures": list(measured.departures.contact),
-            **errors_of(inputs),
-            "left_out": left_out(inputs, measured, motion),
-        },
-    )
+    groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
+    groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(found, labels_of(Erratum))}
+    verdicts = [row["verdict"] for row in rows]
+    return groups, {
+        "paper_numbers": rows,
+        "verdicts": {verdict.value: verdicts.count(verdict.value) for verdict in NumberVerdict},
+        **tables,
+        "errata": [vars(erratum) for erratum in found],
+        "departures": list(measured.departures.contact),
+        "left_out": left_out(inputs, measured),
+    }
 
 
-def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """The walks of both models against each other alone, and of a walker with knees both instants of their release."""
-    progress.start("compare", 2)
-    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
+def models_compared(config: ContactConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
+    """Summary of the walks of both models alone, and of a walker with knees of both instants of their release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
-    progress.advance()
-    releases = compare_releases(config, KneedStart(as_state(gait["state"]), float(contact["pitch_m"])))
-    summary = {
+    releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
+    return {
         "steps": {
             "rigid": last_step(rigid),
             "contact": {**last_step(contact), "slip_m": contact["slip_per_step_m"]},
@@ -95,24 +135,11 @@ def models_compared(config: ContactConfig, inputs: Mapping[str, Content], progre
             },
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
-        **errors_of(inputs),
         "dissipated_J": contact["dissipated_J"],
         "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
+        "left_out": [NOT_THE_PAPERS, *(() if releases is None else LEFT_OUT)],
     }
-    left_out = [NOT_THE_PAPERS, *motion.left_out, *(() if releases is None else LEFT_OUT)]
-    progress.advance()
-    return Content(dict(motion.groups), {**summary, **motion.summary, "left_out": left_out})
-
-
-def errors_of(inputs: Mapping[str, Content]) -> dict[str, Any]:
-    """The numerical errors of the walks that are compared, by model, of those that have one."""
-    walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}
-    found = {model: walk["numerical_error"] for model, walk in walks.items() if "numerical_error" in walk}
-    return {"numerical_error": found} if found else {}
-
-
-NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
@@ -125,26 +152,106 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
 
 
-def motion_of(walk: Content) -> Motion | None:
-    """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
-    trajectory = walk.groups.get("trajectory")
-    if trajectory is None or "angle" not in trajectory.variables or trajectory["time"].size < SAMPLES_OF_A_MOTION:
-        return None
-    strikes = times_of_steps(walk, "knee_strike_time_s")
-    motion = Motion(
-        trajectory["time"],
-        trajectory["angle"],
-        trajectory["velocity"],
-        times_of_steps(walk, "touch_time_s"),
-        strikes[strikes > 0.0],
-    )
-    return sampled_at_strikes(motion)
+def recorded(walk: Content, group: str, name: str) -> Array | None:
+    """A variable of a stored walk; None if it is not there."""
+    found = walk.groups.get(group, Group({}))
+    return found[name] if name in found.variables else None
 
 
 def times_of_steps(walk: Content, name: str) -> Array:
     """Times (s) that a stored walk has of its steps; none of a walk without a step, and of what the walker has not."""
-    steps = walk.groups.get("steps", Group({}))
-    return steps[name] if name in steps.variables else np.zeros(0)
+    found = recorded(walk, "steps", name)
+    return np.zeros(0) if found is None else found
+
+
+def motion_of(walk: Content) -> Motion | None:
+    """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
+    angle = recorded(walk, "trajectory", "angle")
+    if angle is None or len(angle) < 2:
+        return None
+    trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
+    touches = times_of_steps(walk, "touch_time_s")
+    motion = Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
+    return sampled_at_strikes(motion)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How the contact model's walk differs from the rigid one's.
+
+    errors    in each way in which there was something to compare
+    orbit     distance of each leg's orbits; None if there is none
+    groups    of the artifact
+    left_out  what could not be compared, and why
+    """
+
+    errors: Errors
+    orbit: list[float] | None = None
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    left_out: tuple[dict[str, str], ...] = ()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What the command prints: the larger leg's error and both legs' in every way, None where there is none."""
+        said: dict[str, Any] = {}
+        for name, quantity in (("max_angle_error_rad", "angle"), ("max_velocity_error_rad_s", "velocity")):
+            per_leg = {way: list(getattr(self.errors[way], quantity)) if way in self.errors else None for way in WAYS}
+            said[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
+        orbit = None if self.orbit is None else max(self.orbit)
+        return {**said, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
+
+
+def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
+    """The contact model's walk less the rigid one's, in time, in phase, and as orbits."""
+    if rigid is None or contact is None:
+        why = "no record of both walks: outputs does not ask for states, or a walk ended at once"
+        return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
+    steps, orbit = min(rigid.steps, contact.steps), None
+    time, raw = difference_in_time(contact, rigid)
+    found = {"raw": raw}
+    groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
+    missing = ("differences in phase, and of the orbits", "step")
+    if steps:
+        missing = ("difference of the last stride, and of the orbits", "stride")
+        phases = np.linspace(0.0, 1.0, PHASES)
+        aligned = difference_in_phase(contact, rigid, phases)
+        smooth = between_impacts(contact, rigid, phases)
+        found |= {"aligned": aligned, "between_impacts": part(aligned, smooth)}
+        coordinates = {
+            **numbered(len(aligned.angle), STEP, "step number"),
+            PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
+            **legs(),
+        }
+        in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), "phase")
+        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": IMPACT_PHASE})
+        if steps >= STRIDE:
+            last = slice(-STRIDE, None)
+            found["settled"] = part(part(aligned, last), smooth[last])
+            distances = orbit_distances(contact, rigid)
+            text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
+            groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
+            orbit = distances.tolist()
+    errors = {
+        way: LegErrors(tuple(one.largest_angle.tolist()), tuple(one.largest_velocity.tolist()))
+        for way, one in found.items()
+    }
+    what, needed = missing
+    lacking = {"what": what, "why": f"no {needed} was completed by both models"}
+    return Comparison(errors, orbit, groups, () if steps >= STRIDE else (lacking,))
+
+
+def part(difference: WalkDifference, where: Any) -> WalkDifference:
+    """A difference at some of its steps and phases."""
+    return WalkDifference(difference.angle[where], difference.velocity[where])
+
+
+def differences(way: str, found: WalkDifference, dims: tuple[str, ...], same: str) -> dict[str, Variable]:
+    """Differences at the same time or phase, as variables."""
+    said = f"contact less rigid model, at the same {same}"
+    return {
+        f"{way}_angle_error_rad": Variable(found.angle, dims, "rad", f"angle, {said}"),
+        f"{way}_velocity_error_rad_s": Variable(found.velocity, dims, "rad/s", f"velocity, {said}"),
+    }
 
 
 def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
@@ -154,7 +261,10 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
     models: dict[str, RigidModel] = {
         name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()
     }
-    contact = contact_model(config, inputs["contact-sim"])
+    contact, model = contact_model(config, inputs["contact-sim"]), models.get(config.equations)
+    moved = contact.start is not None and (
+        model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > MOVED)
+    )
     return Measured(
         walker=compass(config, config.equations),
         equations=config.equations,
@@ -162,65 +272,38 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
         spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
         contact=contact,
         errors=motion.errors,
-        departures=departures(config, start_moved(models.get(config.equations), contact.start)),
+        departures=departures(config, moved),
     )
-
-
-def start_moved(model: RigidModel | None, start: State | None) -> bool:
-    """Whether a walk is known to have started elsewhere than at the gait's fixed point."""
-    if start is None:
-        return False
-    return model is None or max(abs(x - y) for x, y in zip(start, model.state, strict=True)) > MOVED
 
 
 def contact_model(config: ContactConfig, walk: Content) -> ContactModel:
     """What is held against the paper's ADAMS model."""
-    contact = config.contact
-    if contact is None:
-        raise ValueError("compare needs a contact block")
-    summary = walk.summary
+    summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
-    stride = STEPS_OF_A_STRIDE * (lengths.size // STEPS_OF_A_STRIDE)
-    energy = energy_of(walk)
-    from_x_p = walk_from_x_p(config, float(summary["pitch_m"]))
+    stride = STRIDE * (lengths.size // STRIDE)
+    angle, joules = (recorded(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
+    touches = times_of_steps(walk, "touch_time_s")
+    energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
+    # from x_p with its printed digits, both feet on the config's slope
+    _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
+    scene = contact_scene(config, pitch, pitch)
+    start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
+    from_x_p = scene.walk(start, 2 * CYCLES, GAIT)
     return ContactModel(
-        law=contact,
+        law=with_contact(config),
         foot_radius=config.walker.foot_radius_m,
         summary=summary,
-        start=start_of(walk),
+        # leg 0 swings first, as in the rigid model's state
+        start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
         table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
-        step_length=float(lengths[stride - STEPS_OF_A_STRIDE : stride].mean()) if stride else None,
+        step_length=float(lengths[stride - STRIDE : stride].mean()) if stride else None,
         energy=energy,
-        from_x_p=(int(from_x_p.touch_time_s.size), from_x_p.outcome.label),
+        from_x_p=(from_x_p.steps, from_x_p.outcome.label),
     )
 
 
-def walk_from_x_p(config: ContactConfig, pitch_m: float) -> ContactWalkResult:
-    """The contact model's walk from x_p with its printed digits, both feet on the config's slope."""
-    _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
-    scene = contact_scene(config, pitch_m, pitch_m)
-    start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
-    return scene.walk(start, 2 * CYCLES, GAIT)
-
-
-def energy_of(walk: Content) -> EnergyRecord | None:
-    """The energy of a stored walk over its last five steps; None if there is none."""
-    trajectory = walk.groups.get("trajectory")
-    if trajectory is None or "mechanical_J" not in trajectory.variables:
-        return None
-    return over_last_steps(trajectory["time"], trajectory["mechanical_J"], times_of_steps(walk, "touch_time_s"))
-
-
-def start_of(walk: Content) -> State | None:
-    """The rigid state that a stored walk starts from: leg 0 swings first."""
-    trajectory = walk.groups.get("trajectory")
-    if trajectory is None or "angle" not in trajectory.variables:
-        return None
-    return as_state([*trajectory["angle"][0], *trajectory["velocity"][0]])
-
-
-def left_out(inputs: Mapping[str, Content], measured: Measured, motion: Comparison) -> list[dict[str, str]]:
-    """What could not be compared, and why."""
+def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str, str]]:
+    """What could not be compared with the paper, and why."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     missing = [
         {"what": f"columns of the {name} equations", "why": str(sets.get(name, {}).get("reason", "no gait was found"))}
@@ -234,4 +317,37 @@ def left_out(inputs: Mapping[str, Content], measured: Measured, motion: Comparis
     if contact.table_3.E_avg is None:
         why = "no step was completed" if contact.steps == 0 else "outputs does not ask for energies"
         missing.append({"what": "energy of the contact model", "why": why})
-    return [*missing, *motion.left_out]
+    return missing
+
+
+def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
+    """Numbers of the paper beside those of the models, as the command prints them.
+
+    Where a model has no value there is none: a model's column has a dimension of its own, whose coordinate says which
+    rows its numbers stand in. Beside it a column of texts has all the rows.
+
+    names  symbols of the rows, if they have any
+    """
+    unit = "see the column of units"
+    variables = numbered(len(rows), ROW, "row")
+    if names:
+        variables["name"] = texts(list(names), "symbol of the row")
+    for name in rows[0]:
+        values, meaning = [row[name] for row in rows], MEANINGS[name]
+        if name in MODELS:
+            variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
+            known = [row for row, value in enumerate(values) if value is not None]
+            if known:
+                dim = f"{name}_{ROW}"
+                variables[dim] = Variable(np.array(known), (dim,), "1", f"rows with a number: {meaning}")
+                variables[name] = Variable(np.array([values[row] for row in known], float), (dim,), unit, meaning)
+        elif isinstance(values[0], str):
+            variables[name] = texts(values, meaning)
+        else:
+            variables[name] = Variable(np.array(values, dtype=float), (ROW,), unit, meaning)
+    return Group(variables)
+
+
+def texts(values: Sequence[str], long_name: str) -> Variable:
+    """A column of texts."""
+    return Variable(np.array(values, dtype=object), (ROW,), "", long_name)

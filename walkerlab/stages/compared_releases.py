@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
-from walkerlab.config.reads import ContactConfig, RigidConfig
+from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.walker import changed_forms
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
 from walkerlab.hybrid.recorded_walk import take_walk
@@ -34,39 +34,25 @@ LEFT_OUT = (
 )
 
 
-class KneedStart(NamedTuple):
-    """A gait to start from, and what lengths are measured by."""
+def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
+    """Up to 20 steps from a gait with each instant of release; None for a walker without knees.
 
-    state: State  # of the rigid model
-    pitch_m: float
-
-
-def compare_releases(config: ContactConfig, start: KneedStart) -> dict[str, Any] | None:
-    """Up to 20 steps with each instant of release; None for a walker without knees."""
-    scene = contact_scene(config, start.pitch_m, start.pitch_m)
+    state    of the rigid model
+    pitch_m  what lengths are measured by
+    """
+    scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed:
         return None
-    return {
-        name: {
-            **told(scene, walked(scene, start.state, at_touch)),
-            "rigid": rigid_counterpart(config, start.state, at_touch),
-        }
-        for name, at_touch in RELEASES.items()
-    }
-
-
-def rigid_counterpart(config: RigidConfig, state: State, free: bool) -> dict[str, Any]:
-    """The rigid model's last step from the same state, its trailing knee rigid or free in the impact."""
-    model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not free)
-    walk = take_walk(model, RIGID, state, RIGID_STEPS)
-    last = {} if not walk.steps else {"period_s": float(walk.periods_s[-1]), "length_m": float(walk.lengths_m[-1])}
-    return {"outcome": walk.outcome.label, "steps": walk.steps, "of": RIGID_STEPS, **last}
-
-
-def walked(scene: ContactScene, state: State, at_touch: bool) -> ContactWalkResult:
-    """A walk from a state of the rigid model; at_touch: released at the leading foot's first touch."""
-    walker = changed_forms(scene.walker, release_at_touch=at_touch)
-    return replace(scene, walker=walker).walk(start_state(scene, state), STEPS, CONTACT)
+    found = {}
+    for name, at_touch in RELEASES.items():
+        released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
+        walk = released.walk(start_state(scene, state), STEPS, CONTACT)
+        model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
+        rigid = take_walk(model, RIGID, state, RIGID_STEPS)
+        last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
+        of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
+        found[name] = {**told(scene, walk), "rigid": of_rigid}
+    return found
 
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
@@ -32,9 +30,10 @@ from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
-from walkerlab.config.reads import ContactConfig, SceneConfig
+from walkerlab.config.reads import SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
+from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
@@ -54,17 +53,15 @@ class EngineFindings:
     left_out: list[dict[str, str]] = field(default_factory=list)
 
     def add(self, other: EngineFindings) -> None:
-        """Take in what was found elsewhere."""
-        self.rows += other.rows
-        self.swings += other.swings
-        self.tuning += other.tuning
-        self.left_out += other.left_out
+        """Take in the rows that were found elsewhere, and what was left out there."""
+        for name in ("rows", "swings", "tuning", "left_out"):
+            getattr(self, name).extend(getattr(other, name))
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
     engines = installed()
-    found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config)])
+    found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config, "engines")])
     if not engines:
         raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
@@ -110,13 +107,6 @@ def not_installed() -> list[dict[str, str]]:
     ]
 
 
-def hinge_left_out(config: ContactConfig) -> list[dict[str, str]]:
-    """That no hinge holds the first step here, if the config has one."""
-    if config.contact is None or config.contact.stance != "pinned":
-        return []
-    return [{"what": "hinged first step", "why": "engines are measured on a walk that is free from its start"}]
-
-
 def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Truth) -> EngineFindings:
     """All experiments of one engine on one scene, in a process of its own."""
     found = EngineFindings()
@@ -140,17 +130,16 @@ def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Trut
 
 
 def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
-    """What is stored and printed."""
-    stored = (("rows", EngineRow, found.rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
-    groups = {name: rows_group(rows, labels_of(kind)) for name, kind, rows in stored if rows}
-    return Content(groups, summary(found, rigid), timed=("ratios", "conclusions", "environment"))
+    """What is stored and printed.
 
-
-def summary(found: EngineFindings, rigid: Mapping[str, Any] | None) -> dict[str, Any]:
-    """What the command prints."""
-    rows = found.rows
+    rigid  summary of `fixedpoint`, if the start or the pads are taken from it
+    """
+    rows, truths = found.rows, found.truths
+    stored = (("rows", EngineRow, rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
+    groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
     engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
-    return {
+    of_rigid = {f"rigid_{key}": rigid[key] for key in ("period_s", "step_length_m")} if rigid is not None else {}
+    summary = {
         "rows": [asdict(row) for row in rows],
         "swings": [asdict(row) for row in found.swings],
         "tuning": [{**asdict(row), "residual": row.residual} for row in found.tuning],
@@ -160,74 +149,71 @@ def summary(found: EngineFindings, rigid: Mapping[str, Any] | None) -> dict[str,
                 "agreement": truth.agreement,
                 "period_s": float(truth.walk.periods_s[-1]),
                 "step_length_m": float(truth.walk.lengths_m[-1]),
-                "steps": int(truth.walk.touch_time_s.size),
+                "steps": truth.walk.steps,
                 "outcome": truth.walk.outcome.label,
-                **({} if rigid is None else {"rigid_period_s": rigid["period_s"]}),
-                **({} if rigid is None else {"rigid_step_length_m": rigid["step_length_m"]}),
+                **of_rigid,
             }
-            for name, truth in found.truths.items()
+            for name, truth in truths.items()
         },
         "versions": {engine.name: engine.version for engine in engines},
         "cannot_express": {engine.name: list(engine.adapter().CANNOT_EXPRESS) for engine in engines},
-        "closest": {name: closest(rows, name) for name in found.truths},
-        "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in found.truths.items()},
-        "convergence": {name: convergence(rows, name) for name in found.truths},
+        "closest": {name: closest(rows, name) for name in truths},
+        "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in truths.items()},
+        "convergence": {name: convergence(rows, name) for name in truths},
         "integrators": {
             engine.name: {name: asdict(one) for name, one in engine.adapter().INTEGRATORS.items()} for engine in engines
         },
         "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
-        "ratios": {name: ratios(rows, name) for name in found.truths},
-        "conclusions": {name: conclusions(rows, name, truth) for name, truth in found.truths.items()},
-        "environment": {
-            "processor": platform.machine(),
-            "cores": os.cpu_count(),
-            "python": platform.python_version(),
+        "ratios": {name: ratios(rows, name) for name in truths},
+        "conclusions": {
+            name: {
+                SAME_LAW: same_law_in_words(rows, name, truth),
+                OWN_LAW: own_law_in_words(rows, name, truth),
+            }
+            for name, truth in truths.items()
         },
+        "environment": environment(),
         "left_out": found.left_out,
     }
+    return Content(groups, summary, timed=("ratios", "conclusions", "environment"))
 
 
-def of(rows: Sequence[EngineRow], scene: str, experiment: str) -> Iterator[EngineRow]:
-    """The engines' rows of one experiment, from the gait."""
+def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
+    """The engines' rows of one experiment, from the gait, by integrator or contact, each from coarse to fine.
+
+    Their names are their engine's and their own.
+    """
+    series: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
-            yield row
+            series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
+    return series
 
 
 def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
     """How many times longer each engine takes than this project, for each error that it reaches on the same law."""
     ours = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
+    by_engine: dict[str, list[EngineRow]] = {}
+    for series in series_of(rows, scene, SAME_LAW).values():
+        by_engine.setdefault(series[0].engine, []).extend(series)
     found: dict[str, dict[str, float]] = {}
     for level in LEVELS:
         own = least_wall(ours, level)
-        for engine in dict.fromkeys(row.engine for row in of(rows, scene, SAME_LAW)):
-            theirs = least_wall([row for row in of(rows, scene, SAME_LAW) if row.engine == engine], level)
+        for engine, runs in by_engine.items():
+            theirs = least_wall(runs, level)
             if own is not None and theirs is not None:
-                found.setdefault(f"{level:.0e}".replace("e-0", "e-"), {})[engine] = theirs / own
+                found.setdefault(plain_power(level), {})[engine] = theirs / own
     return found
 
 
 def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
     """The contact whose walk at its smallest step comes closest to ADAMS's law; None if none walks to the end."""
-    finest = finest_rows(rows, scene)
+    finest = [series[-1] for series in series_of(rows, scene, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == OWN_TOUCHES]
     if not reached:
         return None
     best = min(reached, key=lambda row: float(row.error or 0.0))
     return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
-
-
-def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
-    """The rows of each integrator or contact, from coarse to fine, by its engine's name and its own."""
-    series: dict[str, list[EngineRow]] = {}
-    for row in of(rows, scene, experiment):
-        series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
-    return series
-
-
-def finest_rows(rows: Sequence[EngineRow], scene: str) -> list[EngineRow]:
-    """Each contact's finest walk."""
-    return [mine[-1] for mine in series_of(rows, scene, OWN_LAW).values()]
 
 
 def three_digits(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
@@ -276,18 +262,13 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
     return found
 
 
-def conclusions(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, str]:
-    """What was found, a paragraph for each experiment."""
-    return {SAME_LAW: same_law_in_words(rows, scene, truth), OWN_LAW: own_law_in_words(rows, scene, truth)}
-
-
 def same_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str:
     """What the integrators cost."""
     sentences = []
-    shares = ratios(rows, scene)
-    names = list(dict.fromkeys(row.engine for row in of(rows, scene, SAME_LAW)))
+    shares, series = ratios(rows, scene), series_of(rows, scene, SAME_LAW)
+    names = list(dict.fromkeys(runs[0].engine for runs in series.values()))
     for level in LEVELS:
-        label = f"{level:.0e}".replace("e-0", "e-")
+        label = plain_power(level)
         reached = shares.get(label, {})
         if reached:
             told = ", ".join(
@@ -300,13 +281,13 @@ def same_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> st
     told = steps_in_words(three_digits(rows, scene, truth)[SAME_LAW])
     if told:
         sentences.append(f"Three correct digits of the step period take steps of at most: {told}.")
-    fixed = [name for name, mine in series_of(rows, scene, SAME_LAW).items() if mine[-1].tolerance is None]
+    fixed = [name for name, mine in series.items() if mine[-1].tolerance is None]
     falling = {name: by for name, by in convergence(rows, scene)[SAME_LAW].items() if name in fixed}
     if falling:
         told = ", ".join(f"{name} {by:.2g}" for name, by in falling.items())
         sentences.append(
             f"Fixed steps end where a run would take more of them than it is given; the last halving divides the error "
-            f"by: {told}. Adapted ones end at an error below {EXACT_ENOUGH:.0e}.".replace("e-0", "e-")
+            f"by: {told}. Adapted ones end at an error below {plain_power(EXACT_ENOUGH)}."
         )
     return " ".join(sentences)
 
@@ -330,9 +311,8 @@ def own_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str
     sentences = []
     if best is None:
         sentences.append("No engine's own contact walks to the end.")
-    finest = finest_rows(rows, scene)
-    others = []
-    for row in finest:
+    others, series = [], series_of(rows, scene, OWN_LAW)
+    for row in (contact[-1] for contact in series.values()):
         if best is not None and (row.engine, row.integrator) == (best["engine"], best["contact"]):
             sentences.append(
                 f"Closest to ADAMS's law comes {row.engine}'s contact {row.integrator!r}: its step period is "
@@ -346,7 +326,6 @@ def own_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str
             others.append(f"{row.engine} {row.integrator} {row.outcome} after {steps}")
     if others:
         sentences.append(f"The others: {'; '.join(others)}.")
-    series = series_of(rows, scene, OWN_LAW)
     changes = convergence(rows, scene)[OWN_LAW]
     settled = {name for name in changes if has_settled(*series[name][-2:])}
     for said, names in (
