@@ -13,7 +13,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import plane as plane_of_gaits
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
-from walkerlab.stages.continuation_results import attractor_summary, ending_rows, first_doubling
+from walkerlab.stages.continuation import attractor_summary, ending_rows, first_doubling
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -76,7 +76,7 @@ def test_the_end_of_a_branch_that_the_walker_makes_is_told_in_words():
     branch = SimpleNamespace(period=1, ends=(SimpleNamespace(value=0.2, reason="end of the span"), end), crossings=())
     followed = SimpleNamespace(model="contact", branches=(branch,))
     (row,) = ending_rows(followed, SimpleNamespace(unit="deg"), config())
-    assert (row["model"], row["period"], row["value"], row["outcome"]) == ("contact", 1, 5.0, "slid")
+    assert (row["period"], row["value"], row["outcome"]) == (1, 5.0, "slid")
     assert row["said"].startswith(
         "At 5 deg the contact model's gait of 1 step ends (slid: the stance foot slides away)."
     )
