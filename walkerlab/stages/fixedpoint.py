@@ -72,36 +72,29 @@ def advice(config: RigidConfig) -> str:
 
 def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
     """What the command prints: the chosen gait of the config's equations, and both sets side by side."""
-    sets = {name: set_summary(name, config.slope_rad, search) for name, search in searches.items()}
+    sets = {}
+    for equations, search in searches.items():
+        gaits = [
+            {**gait_summary(gait), "chosen": index == search.chosen, "objection": "; ".join(gait.objections)}
+            for index, gait in enumerate(search.gaits)
+        ]
+        sets[equations] = {
+            **({} if search.gait is None else gait_summary(search.gait)),
+            "equations": equations,
+            "slope_rad": config.slope_rad,
+            "gaits_found": len(gaits),
+            "gaits": gaits,
+            "reason": search.reason,
+            "random_starts": search.random_starts,
+            "random_hits": list(search.random_hits),
+            "lost": list(search.lost),
+        }
     return {**sets[config.equations], "state_names": list(coordinates(config)), "equation_sets": sets}
-
-
-def set_summary(equations: str, slope: float, search: GaitSearch) -> dict[str, Any]:
-    """The chosen gait of one set of equations, if there is one, and how the search went."""
-    found: dict[str, Any] = {} if search.gait is None else gait_summary(search.gait)
-    return {
-        **found,
-        "equations": equations,
-        "slope_rad": slope,
-        "gaits_found": len(search.gaits),
-        "gaits": [listed(search, index) for index in range(len(search.gaits))],
-        "reason": search.reason,
-        "random_starts": search.random_starts,
-        "random_hits": list(search.random_hits),
-        "lost": list(search.lost),
-    }
 
 
 def numbers_of(gait: Gait) -> dict[str, Label]:
     """What is stored and printed of a gait, with or without knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
-
-
-def listed(search: GaitSearch, index: int) -> dict[str, Any]:
-    """One of the gaits found, and why it was or was not chosen."""
-    gait = search.gaits[index]
-    of_gait = gait_summary(gait)
-    return {**of_gait, "chosen": index == search.chosen, "objection": "; ".join(gait.objections)}
 
 
 def gait_summary(gait: Gait) -> dict[str, Any]:

@@ -54,22 +54,15 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
         folder = RunFolder(runs_dir, path.name)
         stages = tuple(stage.name for stage in graph.stages if folder.artifact(stage.name).is_file())
         sweeps = tuple(sorted(file.name for file in path.glob("sweep-*.h5")))
-        if stages or sweeps:
-            yield summary_of(folder, stages, sweeps, graph)
-
-
-def summary_of(folder: RunFolder, stages: tuple[str, ...], sweeps: tuple[str, ...], graph: Graph) -> RunSummary:
-    """What is to be said of one run."""
-    stats = [file.stat() for file in folder.path.rglob("*") if file.is_file()]
-    when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
-    config = config_of(folder)
-    current = None
-    if config is not None:
-        current = tuple(step.stage.name for step in survey(config, folder, graph) if step.action == "reuse")
-    return RunSummary(
-        folder.name, folder.path, stages, current, sweeps, sum(stat.st_size for stat in stats),
-        when.isoformat(timespec="seconds"),
-    )  # fmt: skip
+        if not stages and not sweeps:
+            continue
+        config, current = config_of(folder), None
+        if config is not None:
+            current = tuple(step.stage.name for step in survey(config, folder, graph) if step.action == "reuse")
+        stats = [file.stat() for file in path.rglob("*") if file.is_file()]
+        when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
+        size, changed = sum(stat.st_size for stat in stats), when.isoformat(timespec="seconds")
+        yield RunSummary(folder.name, folder.path, stages, current, sweeps, size, changed)
 
 
 def config_text(folder: RunFolder) -> str | None:
@@ -88,14 +81,8 @@ def stored_in(folder: RunFolder) -> list[str]:
 
 def config_of(folder: RunFolder) -> Config | None:
     """The config of a run; None if nothing tells it, or this program's schema does not take it any more."""
-    text = config_text(folder)
-    return None if text is None else config_in(text)
-
-
-def config_in(text: str) -> Config | None:
-    """A resolved config that is stored as YAML; None if this program's schema does not take it."""
     try:
-        tree = read_text(text, "stored config")
+        tree = read_text(config_text(folder) or "", "stored config")
         return typed(tree) if isinstance(tree, Tree) else None
     except ConfigError:
         return None
@@ -183,7 +170,11 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
     held = config_of(folder)
     if held is None and record is None:  # nothing there can be read
         return
-    changes = ["it is no longer a config"] if held is None else list(differences("", asked_of(held), asked_of(config)))
+    changes = ["it is no longer a config"]
+    if held is not None:
+        changes = list(
+            differences("", *(one.model_dump(mode="json", exclude={"name", "sweep"}) for one in (held, config)))
+        )
     if changes:
         origin = f", made from {record.source}" if record is not None and record.source else ""
         more = ", …" if len(changes) > SHOWN_CHANGES else ""
@@ -198,11 +189,6 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
 def comes_from(record: Record, folder: RunFolder) -> bool:
     """Whether what a folder holds was made under its name from the same file, perhaps before that was edited."""
     return (record.run, record.source) == (folder.name, folder.source)
-
-
-def asked_of(config: Config) -> dict[str, Any]:
-    """What a config asks, without its name and what is swept over."""
-    return config.model_dump(mode="json", exclude={"name", "sweep"})
 
 
 @dataclass(frozen=True)
@@ -235,55 +221,39 @@ class RunDifference:
 def difference(
     first: Mapping[str, Stored], second: Mapping[str, Stored], configs: Sequence[Config | None]
 ) -> RunDifference:
-    """How the results of two runs differ, and the configs of both."""
+    """How the results of two runs differ, and the configs of both; nothing is said of a config that is not known."""
     both = [name for name in first if name in second]
+    one, other = ({} if config is None else dict(leaves(config.model_dump(mode="json"))) for config in configs)
     return RunDifference(
-        config_difference(*configs),
-        {name: pairs(*(dict(single_values(run[name].summary)) for run in (first, second))) for name in both},
+        tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key)),
+        {name: pairs(*(dict(leaves(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
     )
 
 
-def config_difference(first: Config | None, second: Config | None) -> tuple[tuple[str, Any, Any], ...]:
-    """Keys in which two configs differ; none of a config that is not known."""
-    one, other = ({} if one is None else dict(leaves_of(one.model_dump(mode="json"))) for one in (first, second))
-    return tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key))
-
-
-def leaves_of(block: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of nested objects; lists are values."""
+def leaves(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of nested objects; of lists, too, with the places among the names, or as values."""
     for name, value in block.items():
-        if isinstance(value, Mapping):
-            yield from leaves_of(value, f"{prefix}{name}.")
+        inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
+        if isinstance(inner, Mapping):
+            yield from leaves(inner, lists, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
 def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ...]:
     """Numbers and words of two results side by side, by name."""
-    return tuple(Pair(name, first.get(name), second.get(name), change(first.get(name), second.get(name)))
-                 for name in {**first, **second})  # fmt: skip
+    both = {name: (first.get(name), second.get(name)) for name in {**first, **second}}
+    return tuple(Pair(name, *values, change(*values)) for name, values in both.items())
 
 
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers of a stage's summary that say most, by name."""
     last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
-    every = dict(single_values(summary)) | last
+    every = dict(leaves(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
-
-
-def single_values(summary: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Dotted names of all numbers and words in a summary, the places in lists among the names."""
-    for name, value in summary.items():
-        if isinstance(value, Mapping):
-            yield from ((f"{name}.{inner}", item) for inner, item in single_values(value))
-        elif isinstance(value, list):
-            listed = {str(place): item for place, item in enumerate(value)}
-            yield from ((f"{name}.{inner}", item) for inner, item in single_values(listed))
-        else:
-            yield name, value
 
 
 def change(first: Any, second: Any) -> float | None:
