@@ -302,6 +302,15 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
     assert wild.exponent > 5.0 * wild.uncertainty > 0.0
 
 
+@pytest.mark.parametrize("beyond", [2e-6, 1.6e-5])
+def test_just_beyond_a_flip_neighbours_meet_on_the_new_gait_however_slowly_the_old_one_is_left(beyond):
+    step_map = map_of(paper_walker, 0.1)
+    two = next(b for b in compass_family() if b.period == 2 and b.stable_ranges)
+    flip = next(one for one in two.bifurcations if one.kind == "flip")
+    exponent = largest_exponent(step_map, flip.point.x[:-1], flip.value + beyond, 96, 1500)
+    assert exponent.exponent < -3.0 * exponent.uncertainty
+
+
 def test_a_gait_of_three_steps_is_born_in_a_fold():
     follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1))
     start = period_three_start(follower)

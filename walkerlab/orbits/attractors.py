@@ -1,7 +1,8 @@
 """Where walks settle: the attractor of a step map over a parameter, and how fast neighbours on it part.
 
 The largest Lyapunov exponent is the mean growth of a tangent vector led along by the step map's exact derivative, per
-step; its uncertainty is the standard error of the means of blocks, each much longer than the walk's memory.
+step. Its uncertainty is the standard error of the means of blocks, each much longer than the walk's memory; where
+walks do not settle on a gait at least one over their steps, since they cannot tell slower growth from none.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -26,6 +27,8 @@ REPEATS = 1e-5  # distance of points that are called the same
 NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how much so from first to last third
 ASIDE = 1e-2  # of a start from the unstable gait that it is to leave, as a share of the largest coordinate
 BLOCKS = 10
+MAX_WALKS = 8  # for an exponent
+DRIFT = 4.0  # of halves of a walk, in standard errors of the whole: two of their own
 SMALLER_STEPS = 8
 LOSS_HALVINGS = 6
 CANDIDATES = 4  # near returns that are tried, of one number of steps
@@ -60,7 +63,7 @@ def may_part(exponents: Sequence[Lyapunov], value: float) -> bool:
     """Whether neighbours may part at a value: not if the exponents measured around it, in order, say that they meet."""
     below = [one for one in exponents if one.value <= value][-1:]
     above = [one for one in exponents if one.value >= value][:1]
-    return not exponents or any(one.exponent > 0.0 for one in (*below, *above))
+    return not exponents or any(one.exponent > one.uncertainty for one in (*below, *above))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,18 +160,30 @@ def led(step_map: StepMap, last: Attractor, value: float, transient: int, kept: 
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
-    """The largest Lyapunov exponent of the attractor that z lies on; None if the walk ends.
+    """The largest Lyapunov exponent of the attractor that a walk from z comes to; None if the walk ends.
 
     transient  steps that turn the tangent into the direction of fastest growth
     steps      that are averaged over
+
+    Just beyond a flip walks leave the gait that has become unstable as slowly as their tangents grow there. A walk that
+    repeats itself while its tangent grows is pushed off that gait, and one whose halves differ is walked on.
     """
-    tangent = np.full(z.size, 1.0 / math.sqrt(z.size))
-    walk = step_map.iterate(z, value, transient + steps, tangent)
-    if walk.outcome is not Outcome.WALKED:
-        return None
-    growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
-    means = np.array([block.mean() for block in np.array_split(growth, BLOCKS)])
-    return Lyapunov(value, float(growth.mean()), float(means.std(ddof=1) / math.sqrt(BLOCKS)))
+    for _ in range(MAX_WALKS):
+        walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
+        means = np.array([block.mean() for block in np.array_split(growth, BLOCKS)])
+        exponent, error = float(growth.mean()), float(means.std(ddof=1) / math.sqrt(BLOCKS))
+        drift = abs(float(means[: BLOCKS // 2].mean() - means[BLOCKS // 2 :].mean()))
+        repeats = period_of(walk.points[transient:]) > 0
+        if repeats and exponent <= 0.0 and drift < 1.0 / steps:
+            break
+        error = max(error, 1.0 / steps)
+        if not repeats and drift < DRIFT * error:
+            break
+        z = (1.0 + ASIDE * (repeats and exponent > 0.0)) * walk.points[-1]
+    return Lyapunov(value, exponent, error)
 
 
 def feigenbaum_ratios(flips: list[float]) -> list[float]:
