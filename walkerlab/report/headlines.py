@@ -49,10 +49,10 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
     if stage not in HEADLINES:
         found = (name for name in there if "." not in name)
     else:
-        found = (name for wanted in HEADLINES[stage] for name in there if is_meant(wanted, name))
+        found = (
+            name
+            for wanted in HEADLINES[stage]
+            for name in there
+            if name == wanted or (wanted.endswith(".") and name.startswith(wanted))
+        )
     return list(islice(found, MOST))
-
-
-def is_meant(wanted: str, name: str) -> bool:
-    """Whether a headline, or the block of one, stands for a number."""
-    return name.startswith(wanted) if wanted.endswith(".") else name == wanted

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from walkerlab.report.symbols import SUPERSCRIPTS
+
 MINUS = "−"
 NONE = "–"
 SPACE = "\u00a0"
 """Between a number and what belongs to it: no line ends there."""
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LEAST_LENGTH_M = 1e-9
 """Walkers are centimetres to metres tall, and walks are right to some 1e-10 of that: less is no length."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
@@ -53,9 +54,8 @@ def power_of_ten(value: float, digits: int = 3) -> str:
 
 def quantity(value: float | None, unit: str, digits: int = 5) -> str:
     """A number with its unit, as in 0.70365 s, on one line."""
-    if value is None or not math.isfinite(value):
-        return NONE
-    return f"{number(value, digits)}{SPACE}{unit}" if unit not in ("", "1") else number(value, digits)
+    text = number(value, digits)
+    return text if text == NONE or unit in ("", "1") else f"{text}{SPACE}{unit}"
 
 
 def told_apart(value_m: float) -> float:
@@ -83,10 +83,10 @@ def whole(value: int | None) -> str:
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
     """Equal numbers as one, others as 'least to largest', with their unit."""
-    listed = list(values)
-    if not listed:
+    ordered = sorted(values)
+    if not ordered:
         return NONE
-    least, largest = number(min(listed), digits), number(max(listed), digits)
+    least, largest = number(ordered[0], digits), number(ordered[-1], digits)
     spoken = least if least == largest else f"{least} to {largest}"
     return f"{spoken}{SPACE}{unit}" if unit else spoken
 

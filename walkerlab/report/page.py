@@ -6,7 +6,6 @@ import base64
 import hashlib
 import re
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,31 +65,6 @@ def render(page: Page) -> str:
             script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         )
     )
-
-
-@dataclass(frozen=True)
-class SweepPage:
-    """The page of a sweep; all texts are plain but the figure, which is an SVG of this program.
-
-    parameters  for each its name, key, unit, meaning and values
-    rows        of the table, with `head`; `left_out` more are in the file
-    """
-
-    title: str
-    finding: str
-    figure: str | None
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left_out: int
-    file: str
-    parameters: Sequence[tuple[str, str, str, str, str]]
-
-
-def render_sweep(page: SweepPage) -> str:
-    """The HTML of a sweep's page."""
-    figure = None if page.figure is None else Markup(page.figure[page.figure.index("<svg") :])
-    return environment().get_template("sweep.html.j2").render(page=page, figure=figure)
 
 
 def environment(run: str = "") -> Environment:

@@ -16,8 +16,8 @@ from walkerlab.store.content import Content
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
 """Where figures go whose names begin so; all others are on the report itself."""
-
-Figure = Mapping[str, Any]
+TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
@@ -28,51 +28,48 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
 
     Raises FileNotFoundError if a listed file is not there.
     """
-    if "plot" not in stored:
-        return ()
-    figures: list[Figure] = list(stored["plot"].summary.get("figures", []))
-    drawings = [(folder / figure["svg"], folder / figure["png"]) for figure in figures]
-    files = fitting(drawings)
-    return tuple(
-        picture(figure, svg, file, numbered) for figure, (svg, _), file in zip(figures, drawings, files, strict=True)
-    )
+    figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
+    files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
+    return tuple(picture(one, folder, file.suffix, numbered) for one, file in zip(figures, files, strict=True))
 
 
-def picture(figure: Figure, svg: Path, file: Path, numbered: bool) -> Picture:
-    """A figure, drawn into the page unless its drawing is too large.
+def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
+    """A figure as a part of the page.
 
+    figure    its words and its files, which are relative to the folder
+    kind      the file that is embedded: a drawing becomes a part of the page, pixels an image
     numbered  whether the reader has the paper before them
+
+    Raises FileNotFoundError if a file is not there.
     """
-    width, height = pixels(svg)
+    svg = folder / figure["svg"]
+    with svg.open("rb") as file:
+        box = VIEW_BOX.search(file.read(2000))
+    # in CSS pixels, to keep its place while it loads; 0 if it does not say
+    width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
     number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
     title = f"{number}{figure['title']}."
     alt = f"{title} {figure.get('alt', '')}".strip()
-    vector = file == svg
+    embedded = folder / figure[kind.removeprefix(".")]
+    vector = embedded == svg
+    links = [(name.upper(), str(figure[name])) for name in ("svg", "png") if name in figure]
+    links += [(f"{stage}.h5", f"{stage}.h5") for stage in figure.get("results", ())]
     return Picture(
         title=title,
         caption=str(figure["caption"]),
         alt=alt,
         svg=inline(svg, alt) if vector else None,
-        uri="" if vector else data_uri(file),
+        uri="" if vector else f"data:{TYPES[kind]};base64,{base64.b64encode(embedded.read_bytes()).decode()}",
         width=width,
         height=height,
         name=svg.stem,
-        links=links(figure),
+        links=tuple(links),
         page=PAGES.get(svg.stem.partition("-")[0], MAIN),
     )
 
 
-def links(figure: Figure) -> tuple[tuple[str, str], ...]:
-    """The files of the drawing, and of the results that it was drawn from."""
-    kinds = [(kind.upper(), str(figure[kind])) for kind in ("svg", "png") if kind in figure]
-    return (*kinds, *((f"{stage}.h5", f"{stage}.h5") for stage in figure.get("results", ())))
-
-
 MAX_BYTES = 1_400_000
 """Of all images together; the largest drawings are embedded as pixels until they fit."""
-
-TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
-VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
@@ -89,18 +86,6 @@ def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> lis
         if png.stat().st_size < sizes[index]:
             chosen[index], sizes[index] = png, png.stat().st_size
     return chosen
-
-
-def data_uri(path: Path) -> str:
-    """A drawing as the address of itself."""
-    return f"data:{TYPES[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode()}"
-
-
-def pixels(svg: Path) -> tuple[int, int]:
-    """Width and height of a drawing in CSS pixels, to keep its place while it loads; (0, 0) if it does not say."""
-    with svg.open("rb") as file:
-        found = VIEW_BOX.search(file.read(2000))
-    return (round(float(found[1])), round(float(found[2]))) if found else (0, 0)
 
 
 SVG, XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
@@ -137,20 +122,19 @@ def inline(file: Path, alt: str) -> Markup:
     Raises FileNotFoundError if it is not there, ParseError if it is no XML.
     """
     root = ET.fromstring(file.read_bytes())
-    used = {value.removeprefix("url(").strip("#)") for value in references(root)}
-    box = escape(root.get("viewBox", "0 0 1 1"))
+    values = [value for element in root.iter() for value in element.attrib.values()]
+    refers = [found for value in values for found in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
+    used = {value.removeprefix("url(").strip("#)") for value in refers}
     inside = Markup("").join(markup(child, used) for child in root)
+    box = root.get("viewBox", "0 0 1 1")
     return Markup('<svg viewBox="{}" role="img" aria-label="{}">{}</svg>').format(box, alt, inside)
 
 
-def references(root: ET.Element) -> list[str]:
-    """Everything that refers to an id."""
-    values = [value for element in root.iter() for value in element.attrib.values()]
-    return [found for value in values for found in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
-
-
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """An element with what it holds; nothing for one that has no place in a page."""
+    """An element with what it holds; nothing for one that has no place in a page.
+
+    used  the ids that something refers to: others are left out
+    """
     name = element.tag.removeprefix(SVG)
     if name not in SHAPES:
         return Markup("")
@@ -159,26 +143,18 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
         inside += markup(child, used) + spoken(child.tail, name)
     if name in ("g", "defs") and not inside:
         return Markup("")
-    return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes(element, used), inside)
+    attributes = Markup("")
+    for key, value in element.attrib.items():
+        local = "href" if key in (f"{XLINK}href", "href") else key
+        wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
+        if wanted and (local != "id" or value in used) and not FETCHES.search(value):
+            attributes += Markup(' {}="{}"').format(Markup(local), short(local, value))
+    return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
 
 def spoken(text: str | None, name: str) -> Markup:
     """What an element says, if it is one that says something."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
-
-
-def attributes(element: ET.Element, used: set[str]) -> Markup:
-    """The attributes that are taken over, each in the fewest characters; ids only where something refers to them."""
-    found = []
-    for name, value in element.attrib.items():
-        local = "href" if name in (f"{XLINK}href", "href") else name
-        if local == "id" and value not in used:
-            continue
-        if local == "href" and not value.startswith(("#", "data:image/png;base64,")):
-            continue
-        if (local in ATTRIBUTES or local == "href") and not FETCHES.search(value):
-            found.append(Markup(' {}="{}"').format(Markup(local), short(local, value)))
-    return Markup("").join(found)
 
 
 def short(name: str, value: str) -> str:

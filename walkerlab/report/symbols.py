@@ -24,7 +24,7 @@ def raised(found: re.Match[str]) -> str:
 
 def power(found: re.Match[str]) -> str:
     """A power of ten as it is written by hand: 10⁻⁴, or 1.1 × 10⁻⁹."""
-    ten = f"10{exponent(found[2], found[3])}"
+    ten = f"10{f'{found[2]}{found[3]}'.strip('+').translate(SUPERSCRIPTS)}"
     return ten if found[1] == "1" else f"{found[1]} × {ten}"
 
 
@@ -33,7 +33,10 @@ RULES = (
         re.compile(r"\bd(theta|omega|phi)_(\d)\b"),
         lambda found: f"{LETTERS[found[1]]}{DOT}{found[2].translate(SUBSCRIPTS)}",
     ),
-    (re.compile(r"\b(theta|omega|phi|mu|lambda)(?:_(\d))?\b"), lambda found: letter(found[1], found[2])),
+    (
+        re.compile(r"\b(theta|omega|phi|mu|lambda)(?:_(\d))?\b"),
+        lambda found: LETTERS[found[1]] + (found[2] or "").translate(SUBSCRIPTS),
+    ),
     (re.compile(r"\b([A-Za-z])_(\d+|[ape])\b"), lambda found: found[1] + found[2].translate(SUBSCRIPTS)),
     (re.compile(r"\^(-?\d+|[en])\b"), lambda found: found[1].translate(SUPERSCRIPTS)),
     (POWER, power),
@@ -51,13 +54,3 @@ def in_signs(text: str) -> str:
     for pattern, sign in RULES:
         text = pattern.sub(sign, text)
     return text
-
-
-def letter(name: str, index: str | None) -> str:
-    """A Greek letter with its index."""
-    return LETTERS[name] + (index or "").translate(SUBSCRIPTS)
-
-
-def exponent(sign: str, digits: str) -> str:
-    """A power of ten in superscript."""
-    return f"{sign.strip('+')}{digits}".translate(SUPERSCRIPTS)

@@ -125,17 +125,18 @@ def table(
     """A table with a row for each record.
 
     records  all under one head, or by the title of the group in which they stand
+
+    Raises ValueError for a record that is a row of cells and has not one for each column.
     """
     groups = records if isinstance(records, Mapping) else {"": records}
-    bodies = [RowGroup(title, tuple(row(columns, one) for one in found)) for title, found in groups.items()]
+    bodies = []
+    for title, found in groups.items():
+        for record in found:
+            if isinstance(record, list | tuple) and len(record) != len(columns):
+                raise ValueError(f"{record!r} has not {len(columns)} cells")
+        rows = (tuple(column.cell(record, place) for place, column in enumerate(columns)) for record in found)
+        bodies.append(RowGroup(title, tuple(rows)))
     return Table(caption, tuple(columns), tuple(bodies), wordy, note, by)
-
-
-def row(columns: Sequence[Column], record: Any) -> tuple[Cell, ...]:
-    """A record's cells; ValueError for a record that is a row of cells and has not one for each column."""
-    if isinstance(record, list | tuple) and len(record) != len(columns):
-        raise ValueError(f"{record!r} has not {len(columns)} cells")
-    return tuple(column.cell(record, place) for place, column in enumerate(columns))
 
 
 def grouped(records: Iterable[Mapping[str, Any]], key: str) -> dict[str, list[Mapping[str, Any]]]:
@@ -156,14 +157,12 @@ def side_by_side(
     note: str = "",
 ) -> Table:
     """A table with a column for each record, and a row for each line that some record has a value for."""
-    found = [line for line in lines if any(line.value(record) is not None for record in records.values())]
-    rows = [[line.title, *(beside(line, record) for record in records.values())] for line in found]
+    rows = []
+    for line in lines:
+        there = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
+        if there:
+            rows.append([line.title, *(there.get(title, Cell("")) for title in records)])
     return table(caption, [Column(head), *(Column(title, numeric=numeric) for title in records)], rows, note=note)
-
-
-def beside(line: Column, record: Any) -> Cell:
-    """A record's cell in a row; nothing if it has no such value."""
-    return Cell("") if line.value(record) is None else line.cell(record)
 
 
 def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
@@ -196,7 +195,7 @@ def in_lines(shown: Table) -> list[str]:
     """A table on a terminal, without sentences."""
     heads, rows = flat(shown)
     texts = [[cell.text for cell in row] for row in rows]
-    return aligned([heads, *texts] if any(heads) else texts) if texts else []
+    return aligned([heads, *texts] if texts and any(heads) else texts)
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

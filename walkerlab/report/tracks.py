@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
 
 SAMPLES_A_SECOND = 150
@@ -75,15 +74,9 @@ class Track:
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
-def track_of(result: Stored) -> Track | None:
-    """The motion that a stage stored; None if it stored none, or none that tells where the joints are."""
-    trajectory = result.groups.get("trajectory")
-    return None if trajectory is None else track_in(trajectory)
-
-
-def track_in(trajectory: Group) -> Track | None:
-    """The motion in a stored trajectory; None if it does not tell where the joints are."""
-    if "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
+def track_in(trajectory: Group | None) -> Track | None:
+    """The motion in a stored trajectory; None if there is none, or if it does not tell where the joints are."""
+    if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
     there = trajectory.variables.keys()
     channels = {channel: trajectory[name] for name, channel in OF_THE_WALKER.items() if name in there}

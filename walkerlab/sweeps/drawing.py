@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
-from walkerlab.figures.canvas import Drawing
 from walkerlab.figures.sweep import choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
-from walkerlab.report.page import SweepPage, render_sweep
+from walkerlab.report.blocks import Gallery, Picture, Section
+from walkerlab.report.numbers import number
+from walkerlab.report.page import Page, render
+from walkerlab.report.pictures import picture
+from walkerlab.report.tables import Column, table
 from walkerlab.report.words import words
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
@@ -44,15 +47,18 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
     refuse_unknown(group, question.dims, names)
     shown = list(names) or choose(group, question.dims, question.names)
     figure = drawn_figure(group, question.stage, question.names, question.dims, shown) if shown else None
-    stem = swept.path.stem
-    paths = []
+    paths: list[Path] = []
+    pictures: list[Picture] = []
     if figure is not None:
         make_folder(folder.figures)
-        for data, kind in ((figure.svg, "svg"), (figure.png, "png")):
-            paths.append(folder.figures / f"{stem}.{kind}")
-            write_atomically(paths[-1], data)
+        paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
+        for path, data in zip(paths, (figure.svg, figure.png), strict=True):
+            write_atomically(path, data)
+        about = {"title": figure.title, "caption": figure.caption}
+        files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
+        pictures.append(picture({**about, **files}, folder.path))
     page = folder.path / PAGE
-    write_atomically(page, render_sweep(page_of(swept, group, figure, shown)).encode())
+    write_atomically(page, render(page_of(swept, pictures, shown)).encode())
     return Files(page, tuple(paths))
 
 
@@ -64,24 +70,30 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) ->
             raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
 
 
-def page_of(swept: Swept, group: Group, figure: Drawing | None, shown: Sequence[str]) -> SweepPage:
-    """What the page says."""
-    summary, question = swept.summary, swept.question
+PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
+
+
+def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> Page:
+    """What the page says: the figure, the parameters, and the first points."""
+    summary, question, group = swept.summary, swept.question, swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
-    return SweepPage(
-        title=f"{question.stage} over {', '.join(question.names)}",
-        finding=" ".join([f"{summary['points']} points: {outcomes}.", *said_of(summary)]),
-        figure=None if figure is None else figure.svg.decode(),
-        caption="" if figure is None else figure.caption,
-        head=(*question.names, *shown, "outcome", "said"),
-        rows=rows(group, question, shown),
-        left_out=max(0, len(question) - MOST_ROWS),
-        file=swept.path.name,
-        parameters=tuple(
-            (name, axis.key, group.variables[name].units, group.variables[name].long_name, spoken(axis.values))
-            for name, axis in zip(question.names, question.axes, strict=True)
-        ),
+    parameters = [
+        (name, f"`{axis.key}`", group.variables[name].units, spoken(axis.values), group.variables[name].long_name)
+        for name, axis in zip(question.names, question.axes, strict=True)
+    ]
+    columns = [
+        *(Column(name, written=in_words, numeric=True) for name in (*question.names, *shown)),
+        *(Column("outcome"), Column("said", wide=True)),
+    ]
+    listed = f"Of the {len(question)} points the first {MOST_ROWS} are listed. " if len(question) > MOST_ROWS else ""
+    where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
+    tables = (
+        table("Parameters", PARAMETER_COLUMNS, parameters),
+        table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
     )
+    section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
+    lead = (f"{summary['points']} points: {outcomes}.", *said_of(summary))
+    return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
 
 
 def said_of(summary: Mapping[str, Any]) -> list[str]:
@@ -97,17 +109,15 @@ def spoken(values: Sequence[object]) -> str:
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
-def rows(group: Group, question: Question, shown: Sequence[str]) -> list[list[str]]:
-    """The first points as rows of text."""
+def rows(group: Group, question: Question, shown: Sequence[str]) -> list[tuple[Any, ...]]:
+    """The first points: parameters, numbers, outcome, and what was said."""
     count = min(len(question), MOST_ROWS)
     columns = [[parameter_values(question, place)[question.places(i)[place]] for i in range(count)]
                for place in range(len(question.names))]  # fmt: skip
     columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "said")]
-    return [[cell(value) for value in row] for row in zip(*columns, strict=True)]
+    return list(zip(*columns, strict=True))
 
 
-def cell(value: object) -> str:
+def in_words(value: Any) -> str:
     """A value in a table."""
-    if isinstance(value, float):
-        return "–" if value != value else f"{value:.6g}"
-    return str(value)
+    return number(value, 6) if isinstance(value, float) else str(value)

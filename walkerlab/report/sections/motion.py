@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.report.blocks import MAIN, Gallery, Pad, PageBlock, Paragraph, Player, Section, Walker
+from walkerlab.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Section, Walker
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
-from walkerlab.report.tracks import Array, Track, sampling_gap, track_of
+from walkerlab.report.tracks import Array, Track, sampling_gap, track_in
 from walkerlab.report.words import words
 
 MAX_STEPS = 10
@@ -23,68 +23,59 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
-    found = {stage: track_of(results.stored[stage]) for stage in MODELS if stage in results.stored}
-    end = first_steps(results)
+    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
+    # the first steps are shown, of the model that takes longest over them
+    end = max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
+    found = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
     tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
-    return Section("motion", "The walk", (player(results, tracks),)) if tracks else None
-
-
-def player(results: Results, tracks: dict[str, Track]) -> PageBlock:
-    """The walkers on their ground."""
-    config, gap = results.config, sampling_gap(results.config)
+    if not tracks:
+        return None
+    config, torso = results.config, results.config.walker.torso
     length = config.walker.leg_length_m
-    torso = config.walker.torso
-    steps = {MODELS[stage].lower(): len(results.stored[stage].summary["step_periods_s"]) for stage in tracks}
-    return Player(
+    steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
+    player = Player(
         title="The walk.",
         caption=words("motion.caption", max(steps.values()), MAX_STEPS),
         alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
-        walkers=tuple(walker(results, stage, track, gap) for stage, track in tracks.items()),
+        walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,
         leg_m=length,
         foot_radius_m=config.walker.foot_radius_m,
         torso_m=0.0 if torso is None else torso.above_hip_m,
         ordinary_force=weight(tracks),
-        closeup_m=closeup(tracks, length),
+        closeup_m=closeup(tracks.get(CONTACT), length),
         pads=pads(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
     )
+    return Section("motion", "The walk", (player,))
 
 
-def first_steps(results: Results) -> float:
-    """When the first steps are over (s), of the model that takes longest; they are what is shown."""
-    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
-    return max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
-
-
-def walker(results: Results, stage: str, track: Track, gap: float) -> Walker:
+def walker(results: Results, stage: str, track: Track) -> Walker:
     """A model's motion and how it ended."""
-    summary = results.stored[stage].summary
+    summary = results.summary(stage)
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
-    ended = "" if summary["outcome"] == WALKED else ends(summary["outcome"])
     return Walker(
         name=MODELS[stage],
         style=STYLES[stage],
-        track=track.thinned(gap),
+        track=track.thinned(sampling_gap(results.config)),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
-        ends=ended,
+        ends="" if summary["outcome"] == WALKED else ends(summary["outcome"]),
     )
 
 
 def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Postures to be seen at once, each a line from foot over hip to foot (mm): both feet down, and mid-step."""
+    """Postures to be seen at once, both feet down and mid-step: a line from foot over hip to foot (mm, y downwards)."""
     times: Any = np.array([0.0, *strikes])
     wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
-    names = ["f0", "k0", "h", "k1", "f1"] if "kx0" in track.channels else ["f0", "h", "f1"]
-    return tuple(tuple(point(track, name, int(row)) for name in names) for row in rows)
-
-
-def point(track: Track, name: str, row: int) -> tuple[int, int]:
-    """A joint in mm, y downwards."""
-    joint, leg = name[0], name[1:]
-    return round(1000 * float(track[f"{joint}x{leg}"][row])), -round(1000 * float(track[f"{joint}y{leg}"][row]))
+    joints = [("f", "0"), ("k", "0"), ("h", ""), ("k", "1"), ("f", "1")]
+    lines = [
+        (track[f"{joint}x{leg}"], track[f"{joint}y{leg}"])
+        for joint, leg in joints
+        if f"{joint}x{leg}" in track.channels
+    ]
+    return tuple(tuple((round(1000 * float(x[row])), -round(1000 * float(y[row]))) for x, y in lines) for row in rows)
 
 
 def weight(tracks: dict[str, Track]) -> float:
@@ -93,9 +84,8 @@ def weight(tracks: dict[str, Track]) -> float:
     return max((load for load in loads if load > 0.0), default=1.0)
 
 
-def closeup(tracks: dict[str, Track], length: float) -> float:
-    """Height of the close-up (m): some penetrations of a foot that stands."""
-    track = tracks.get(CONTACT)
+def closeup(track: Track | None, length: float) -> float:
+    """Height of the close-up (m): some penetrations of a foot of the contact model that stands."""
     if track is None or "p0" not in track.channels:
         return STILL_VIEW_OF_RIGID * length
     depths = np.concatenate((track["p0"], track["p1"]))
@@ -126,9 +116,5 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 def figures(results: Results) -> Section | None:
     """The figures of the walks and gaits."""
     shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
-    if not shown:
-        return None
-    blocks: list[PageBlock] = [Gallery(shown)]
-    if results.of_the_paper:
-        blocks.insert(0, Paragraph(words("figures.numbered")))
-    return Section("figures", "Figures", tuple(blocks))
+    numbered = (Paragraph(words("figures.numbered")),) if results.of_the_paper else ()
+    return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None

@@ -6,9 +6,9 @@ import datetime
 
 from walkerlab.config.writer import to_yaml
 from walkerlab.report.blocks import Code, PageBlock, Section
-from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, Table, side_by_side, table
+from walkerlab.report.words import words
 from walkerlab.store.artifact import Stored
 
 
@@ -22,18 +22,9 @@ def section(results: Results) -> Section:
         blocks += [table("When each result was made", RESULT_COLUMNS, made), software_table(results), digests]
         commands = dict.fromkeys(result.provenance.command_line for result in made)
         blocks.append(Code("Command lines", "\n".join(commands)))
-    return Section("provenance", "Where this comes from", tuple(blocks), finding(results))
-
-
-def finding(results: Results) -> str:
-    """Which version made the results, and how many there are."""
-    if not results.stored:
-        return "The config of this run."
-    versions = listed(dict.fromkeys(result.provenance.package_version for result in results.stored.values()))
-    commits = dict.fromkeys(result.provenance.git_commit for result in results.stored.values())
-    made_from = listed(commit[:9] for commit in commits if commit)
-    at = f", commit {made_from}" if made_from else ""
-    return f"{count(len(results.stored), 'result')} of walkerlab {versions}{at}; config, machine, keys and digests."
+    made_by = [result.provenance for result in results.stored.values()]
+    finding = words("closing.provenance", made_by)
+    return Section("provenance", "Where this comes from", tuple(blocks), finding)
 
 
 RESULT_COLUMNS = (
@@ -63,16 +54,11 @@ def took_s(result: Stored) -> float:
 def software_table(results: Results) -> Table:
     """Versions, and the machine; more than one column only if results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
-    for name, result in results.stored.items():
-        used.setdefault(software(result), []).append(name)
-    made = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
-    lines = [Column(name, name) for name in dict.fromkeys(name for versions in made.values() for name in versions)]
-    return side_by_side("Software and machine", lines, made, head="software", numeric=False)
-
-
-def software(result: Stored) -> tuple[tuple[str, str], ...]:
-    """What a result was made with."""
-    made = result.provenance
-    libraries = sorted(made.library_versions.items())
-    commit = made.git_commit or "unknown"
-    return (("walkerlab", made.package_version), ("commit", commit), *libraries, ("platform", made.platform))
+    for stage, result in results.stored.items():
+        made = result.provenance
+        versions = {"walkerlab": made.package_version, "commit": made.git_commit or "unknown"}
+        versions |= {**dict(sorted(made.library_versions.items())), "platform": made.platform}
+        used.setdefault(tuple(versions.items()), []).append(stage)
+    columns = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
+    lines = [Column(name, name) for name in dict.fromkeys(name for versions in columns.values() for name in versions)]
+    return side_by_side("Software and machine", lines, columns, head="software", numeric=False)
