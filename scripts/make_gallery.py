@@ -32,7 +32,7 @@ SAMPLES_A_SECOND = 50.0
 def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
     """What the page needs of one point of the sweep: words, and one stride from its state."""
     if str(point.status.item()) != "answered":
-        return {"said": str(point.said.item())}
+        return {"said": str(point.reason.item())}
     stable = "stable" if float(point.spectral_radius) < 1.0 else "unstable"
     said = (
         f"Steps of {float(point.step_length_m):.4f} m in {float(point.period_s):.4f} s; the largest multiplier is "

@@ -64,7 +64,7 @@ def test_bad_points_and_bad_questions_exit_3_with_what_is_allowed(swept):
     toy, _ = swept
     done = toy(*SWEEP, "--over", "gravity_m_s2=[1, -2]")
     assert done.returncode == 3
-    assert "at gravity_m_s2=-2" in done.stderr
+    assert done.stderr.count("gravity_m_s2: -2 is out of bounds") == 1
     assert toy(*SWEEP, "--over", "gravity=[1]").returncode == 3
     assert toy("sweep", "--stage", "page", "--over", "gravity_m_s2=[1]").returncode == 3
     assert toy(*SWEEP, "--over", "gravity_m_s2=[1]", "--engine", "abacus").returncode == 3

@@ -12,22 +12,21 @@ import xarray as xr
 
 from walkerlab.benchmarks.engines import registry
 from walkerlab.config.loader import load
-from walkerlab.errors import ConfigError, StorageError
+from walkerlab.errors import ConfigError
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.numerical_error import SAMPLE
 from walkerlab.stages.plan import Planner
 from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
-from walkerlab.store.content import Variable, untimed
+from walkerlab.store.content import untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, row_of, without_outputs
+from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, row_of, without_outputs
 from walkerlab.sweeps.drawing import said_of
-from walkerlab.sweeps.flat import said_in
 from walkerlab.sweeps.question import asked, axis_of_text
-from walkerlab.sweeps.result import Merge, as_csv, last_of_lists
+from walkerlab.sweeps.result import Merge, as_csv, last_of_each
 
 GRAVITIES = "gravity_m_s2=1:9:5"
 
@@ -57,7 +56,7 @@ def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
 
 def test_a_row_is_what_the_stage_says_for_that_config(toy):
     swept = toy.run("roll", GRAVITIES, "strides=[2, 3]")
-    config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").points.config(7)
+    config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").config(7)
     report = execute(config, "roll", RunFolder(toy.runs / "elsewhere", "one"), graph=toy.graph)
     assert swept.content[""]["way_m"].ravel()[7] == report.summary["way_m"]
     assert set(swept.content[""]["outcome"].ravel()) == {"walked"}
@@ -68,12 +67,12 @@ def test_points_without_an_answer_are_rows_that_say_why(toy):
     assert (swept.done, swept.failed) == (3, 0)
     with opened(swept) as dataset:
         assert dataset.outcome.values.tolist() == ["answered", "answered", "no-answer"]
-        assert str(dataset.said.values[2]) == "too steep: 1.2"
+        assert str(dataset.reason.values[2]) == "too steep: 1.2"
         assert np.isnan(dataset.period_s.values).tolist() == [False, False, True]
         assert dataset.bounces.values.tolist() == [3, 3, 0]
         assert np.isfinite(dataset.slips_m).sum("slips_m_index").values.tolist() == [2, 4, 0]
     needing = toy.run("roll", "slope_rad=[0.1, 1.2]")
-    assert needing.content[""]["said"].tolist() == ["", "it needs drop: too steep: 1.2"]
+    assert needing.content[""]["reason"].tolist() == ["", "it needs drop: too steep: 1.2"]
 
 
 WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those of other tests need
@@ -153,7 +152,7 @@ def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, ma
 
 
 def test_a_single_run_is_taken_over(toy, marks):
-    config = toy.sweep("drop", GRAVITIES).points.config(2)
+    config = toy.sweep("drop", GRAVITIES).config(2)
     execute(config, "drop", RunFolder(toy.runs, "alone"), graph=toy.graph)
     assert marks() == 1
     assert toy.run("drop", GRAVITIES).reused == 1
@@ -161,7 +160,7 @@ def test_a_single_run_is_taken_over(toy, marks):
 
 
 def test_keys_are_those_that_the_pipeline_stores_under(toy):
-    config = toy.sweep("roll", GRAVITIES).points.config(1)
+    config = toy.sweep("roll", GRAVITIES).config(1)
     report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
     keys = Keys(toy.graph).of(config, "roll")
     assert keys == {name: artifact.read(toy.runs / "alone" / f"{name}.h5").identity.key for name in ("drop", "roll")}
@@ -206,24 +205,28 @@ def test_a_damaged_chunk_is_computed_again(toy, marks):
     assert marks() == 5  # the same points, in the same process
 
 
-def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
+@pytest.mark.parametrize("why", [refused(Path("x"), OSError(28, "No space left on device")), KeyboardInterrupt()])
+def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch, why):
     whole = toy.run("drop", "gravity_m_s2=1:9:40").content.digest()
     toy.runs = tmp_path / "again"
-    kept = []
+    kept, notes = [], []
+    reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
 
-    def full_disk(folder, *rest):
+    def stopped(folder, *rest):
         if len(kept) == 2:
-            raise refused(folder.path, OSError(28, "No space left on device"))
+            raise why
         kept.append(store(folder, *rest))
 
     store = sweeps.store
-    monkeypatch.setattr(sweeps, "store", full_disk)
-    with pytest.raises(StorageError, match="No space left"):
-        toy.run("drop", "gravity_m_s2=1:9:40", chunk_s=1e-9)
+    monkeypatch.setattr(sweeps, "store", stopped)
+    with pytest.raises(type(why)):
+        toy.run("drop", "gravity_m_s2=1:9:40", chunk_s=1e-9, reporter=reporter)
     monkeypatch.setattr(sweeps, "store", store)
     resumed = toy.run("drop", "gravity_m_s2=1:9:40")
     assert 0 < resumed.reused < 40
     assert resumed.content.digest() == whole
+    told = [f"sweep: interrupted; {resumed.reused} of 40 points are kept"]
+    assert notes == (told if isinstance(why, KeyboardInterrupt) else [])
 
 
 def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
@@ -287,14 +290,9 @@ def test_the_table_has_headline_numbers_and_lists_only_if_all_is_asked_for(toy):
 
 
 def test_the_last_step_of_walks_of_different_length_is_each_ones_own():
-    lists = {
-        "step_periods_s": Variable(
-            np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]), ("x", "i"), "s", "", missing=True
-        )
-    }
-    last = last_of_lists(lists, 1)["last_step_period_s"]
-    assert last.values[:2].tolist() == [0.8, 0.6]
-    assert np.isnan(last.values[2])
+    last = last_of_each(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
+    assert last[:2].tolist() == [0.8, 0.6]
+    assert np.isnan(last[2])
 
 
 def test_the_file_says_what_was_asked(toy):
@@ -313,7 +311,7 @@ def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     row, _ = row_of(InMemory(), config, stage, keys)
     alone = InMemory().answer(config, stage, keys).content
     assert "trajectory" in alone.groups
-    assert json.loads(row.numbers) == dict(said_in(untimed(alone.summary, alone.timed)))
+    assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))
 
 
 def test_arrays_that_another_stage_draws_on_are_not_left_out():

@@ -30,7 +30,7 @@ def seeds(swept):
 def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
     swept = toy.run("deadly", "seed=5:16:12", engine=LOCAL, order=order())
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
-    said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["said"].tolist(), strict=True))
+    said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["reason"].tolist(), strict=True))
     assert said[7] == "a bug: ZeroDivisionError: a bug"
     assert said[13].startswith("its worker died: WorkerDiedError")
     assert "SIGKILL" in said[13]
@@ -153,7 +153,7 @@ def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
     options = {"cluster": "local", "timeout_min": "5"}
     swept = toy.run("deadly", "seed=11:16:6", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
-    assert "its worker died" in swept.content[""]["said"][2]
+    assert "its worker died" in swept.content[""]["reason"][2]
 
 
 FAKE_SBATCH = """#!/bin/sh

@@ -4,53 +4,51 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import os
-import platform
+import json
+import re
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
+from walkerlab.labels import Label, labels_of
 from walkerlab.stages.graph import Graph
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged
-from walkerlab.store.content import Content, Group, Variable, untimed
+from walkerlab.store.artifact import Damaged, OtherLayout
+from walkerlab.store.columns import rows_group
+from walkerlab.store.content import Content, untimed
 from walkerlab.store.key import Identity
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.flat import flat_text
 
 Status = Literal["answered", "no-answer", "failed"]
 Labels = Mapping[str, tuple[str, str]]
 
 FOLDER: Final = "sweep-chunks"
-TEXTS: Final = ("key", "status", "said", "numbers")
+NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
+UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
 @dataclass(frozen=True)
 class PointResult:
-    """What became of one point.
+    """What became of one point."""
 
-    key      of the stage's result, hex
-    status   answered; no-answer: the stage found none and says why; failed: the computation was not completed
-    said     why there is no answer; empty if there is one
-    numbers  of the stage's summary, flat, as JSON and without run times; some or none if there is no answer
-    wall_s   time it took, s
-    bug      the traceback of the bug that stopped it; empty if none did
-    """
-
-    key: str
-    status: Status
-    said: str
-    numbers: str = "{}"
-    wall_s: float = 0.0
+    key: Annotated[str, Label("", "key of the stage's result, hex")]
+    status: Annotated[
+        Status, Label("", "answered; no-answer: the stage found none; failed: the computation was not completed")
+    ]
+    reason: Annotated[str, Label("", "why there is no answer; empty if there is one")]
+    numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
+    wall_s: Annotated[float, Label("s", "time it took", timing=True)] = 0.0
     bug: str = ""
+    """The traceback of the bug that stopped it; empty if none did."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,6 @@ class ChunkTask:
     configs  of the points
     keys     of each point's result and of the results it needs, by stage
     again    whether each point's walk is taken a second time for its numerical error
-    host     the machine that sends it
     """
 
     graph: str
@@ -70,16 +67,15 @@ class ChunkTask:
     configs: tuple[Config, ...]
     keys: tuple[dict[str, str], ...]
     again: tuple[bool, ...]
-    host: str = ""
 
     def split(self) -> tuple[ChunkTask, ChunkTask]:
         """Both halves of a chunk of at least two points."""
         middle = len(self.configs) // 2
-        first, second = slice(None, middle), slice(middle, None)
-        return (
-            replace(self, configs=self.configs[first], keys=self.keys[first], again=self.again[first]),
-            replace(self, configs=self.configs[second], keys=self.keys[second], again=self.again[second]),
+        halves = (slice(None, middle), slice(middle, None))
+        first, second = (
+            replace(self, configs=self.configs[half], keys=self.keys[half], again=self.again[half]) for half in halves
         )
+        return first, second
 
 
 @dataclass(frozen=True)
@@ -92,9 +88,7 @@ class Chunk:
 
 def compute(task: ChunkTask) -> Chunk:
     """Compute a chunk's points in this process; what goes wrong with one does not end the others."""
-    keep_compiled_code_apart(task.host)
-    graph = graph_at(task.graph)
-    worker = worker_for(task.graph, graph)
+    worker = worker_at(task.graph)
     labels: dict[str, tuple[str, str]] = {}
     rows = []
     for config, keys, again in zip(task.configs, task.keys, task.again, strict=True):
@@ -105,49 +99,72 @@ def compute(task: ChunkTask) -> Chunk:
     return Chunk(tuple(rows), labels)
 
 
-def keep_compiled_code_apart(sender: str) -> None:
-    """On another machine than the sender's, use a folder of this machine's own for compiled code."""
-    if sender and platform.node() != sender and "WALKERLAB_SWEEP_HOST" not in os.environ:
-        os.environ["WALKERLAB_SWEEP_HOST"] = platform.node()
-        shared = os.environ.get("WALKERLAB_CACHE") or str(Path("~/.cache/walkerlab").expanduser())
-        os.environ["WALKERLAB_CACHE"] = str(Path(shared) / f"{platform.node()}-{platform.machine()}")
-
-
-def graph_at(where: str) -> Graph:
-    """The pipeline at module:NAME."""
-    module, _, name = where.partition(":")
-    graph = getattr(importlib.import_module(module), name)
-    assert isinstance(graph, Graph)
-    return graph
-
-
-_WORKERS: dict[str, Any] = {}
-
-
-def worker_for(where: str, graph: Graph) -> Any:
-    """This process's memory of what points need, kept from chunk to chunk."""
+@cache
+def worker_at(where: str) -> Any:
+    """This process's memory of what points need, kept from chunk to chunk; `where` as in `ChunkTask`."""
     from walkerlab.stages.in_memory import InMemory
 
-    return _WORKERS.setdefault(where, InMemory(graph))
+    module, _, name = where.partition(":")
+    return InMemory(getattr(importlib.import_module(module), name))
 
 
 def row_of(
     worker: Any, config: Config, target: str, keys: dict[str, str], again: bool = True
 ) -> tuple[PointResult, Content]:
     """One point's row, and the content it is from; `again` as in `ChunkTask`."""
-    key = keys[target]
     try:
         answer = worker.answer(without_outputs(config, target, worker.graph), target, keys, again=again)
     except WalkerlabError as error:
-        return PointResult(key, "failed", error.message), Content()
+        return PointResult(keys[target], "failed", error.message), Content()
     except Exception as error:
-        said = f"a bug: {type(error).__name__}: {error}"
-        return PointResult(key, "failed", said, bug=traceback.format_exc()), Content()
-    content, no_answer = answer.content, answer.no_answer
-    numbers = flat_text(untimed(content.summary, content.timed))
-    if no_answer is None:
-        return PointResult(key, "answered", "", numbers), content
-    return PointResult(key, "no-answer", no_answer.message, numbers), content
+        why = f"a bug: {type(error).__name__}: {error}"
+        return PointResult(keys[target], "failed", why, bug=traceback.format_exc()), Content()
+    why_not = None if answer.no_answer is None else answer.no_answer.message
+    return told(keys[target], answer.content, why_not), answer.content
+
+
+def told(key: str, content: Content, no_answer: str | None) -> PointResult:
+    """A stage's result as a row.
+
+    no_answer  why there is none
+    """
+    numbers = json.dumps(by_name(untimed(content.summary, content.timed)), allow_nan=False, separators=(",", ":"))
+    return PointResult(key, "answered" if no_answer is None else "no-answer", no_answer or "", numbers)
+
+
+def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything in a summary on one level: numbers, texts, and lists of numbers in a regular shape.
+
+    What is nested has the names above it in front, with points between: `dissipated_J.friction`, `gaits.0.period_s`.
+    """
+    found: dict[str, Any] = {}
+
+    def take(name: str, value: Any) -> None:
+        if isinstance(value, bool | int | float | str):
+            found[name] = value
+        elif isinstance(value, Mapping):
+            for key, inner in value.items():
+                take(f"{name}.{UNFIT.sub('_', key)}", inner)
+        elif isinstance(value, list) and value:
+            if all(isinstance(item, str) for item in value):
+                found[name] = "; ".join(value)
+            elif is_regular(value):
+                found[name] = value
+            else:
+                take(name, {str(number): item for number, item in enumerate(value)})
+
+    for key, value in summary.items():
+        if key not in NOT_OF_THE_POINT:
+            take(UNFIT.sub("_", key), value)
+    return found
+
+
+def is_regular(value: list[Any]) -> bool:
+    """Whether a list holds numbers, or lists of them that are equally long."""
+    if all(isinstance(item, bool | int | float) for item in value):
+        return True
+    lists = [item for item in value if isinstance(item, list) and item]
+    return len(lists) == len(value) and len({len(item) for item in lists}) == 1 and all(map(is_regular, lists))
 
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
@@ -170,72 +187,48 @@ def labels_in(content: Content, known: Mapping[str, Any]) -> dict[str, tuple[str
     return found
 
 
-def stored_name(stage: str, code_digest: str, keys: Iterable[str]) -> str:
-    """The name of a chunk's file: its stage, the code it is of, and what is in it."""
-    content = hashlib.sha256("\n".join(keys).encode()).hexdigest()
-    return f"{stage}-{code_digest[:8]}-{content[:16]}.h5"
-
-
-def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: Provenance) -> Path | None:
+def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: Provenance) -> None:
     """Keep what was computed of a chunk; what failed is not kept. StorageError if the system refuses."""
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
-        return None
-    texts = {
-        "key": [row.key for row in rows],
-        "status": [row.status for row in rows],
-        "said": [row.said for row in rows],
-        "numbers": [row.numbers for row in rows],
-    }
-    variables = {name: Variable(np.array(texts[name], object), ("point",), "", name) for name in TEXTS}
-    walls = np.array([row.wall_s for row in rows])
-    variables["wall_s"] = Variable(walls, ("point",), "s", "time it took", timing=True)
-    labels = {name: list(label) for name, label in chunk.labels.items()}
-    content = Content({"points": Group(variables)}, {"labels": labels})
-    name = stored_name(stage, code_digest, [row.key for row in rows])
+        return
+    points = rows_group(rows, labels_of(PointResult), "point", "point of the chunk")
+    content = Content({"points": points}, {"labels": {name: list(label) for name, label in chunk.labels.items()}})
+    inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
+    name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
     path = folder.path / FOLDER / name
     path.parent.mkdir(exist_ok=True)
     artifact.write(path, content, identity, begun.until_now())
-    return path
 
 
-def stored_chunk(path: Path) -> Chunk:
-    """The chunk in a file; FileNotFoundError if it is gone, Damaged for whatever is not intact."""
-    content = artifact.read(path)
-    try:
-        points = content["points"]
-        columns = [points[name].tolist() for name in (*TEXTS, "wall_s")]
-    except KeyError as error:
-        raise Damaged(f"it has no {error}") from error
-    rows = tuple(PointResult(*row) for row in zip(*columns, strict=True))
-    return Chunk(rows, {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()})
+def stored_chunks(
+    runs_dir: Path, stage: str, code_digest: str, wanted: Mapping[str, Any], warn: Callable[[str], None]
+) -> Iterator[Chunk]:
+    """What is stored of a stage under its present code, in all run folders: chunks of sweeps, and single runs.
 
-
-def chunk_files(runs_dir: Path, stage: str, code_digest: str) -> Iterator[Path]:
-    """The files of all chunks of a stage's present code, in all run folders."""
-    yield from sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5"))
-
-
-def rows_of_single_runs(
-    runs_dir: Path, stage: str, wanted: Mapping[str, Any] | set[str]
-) -> Iterator[tuple[PointResult, Labels]]:
-    """The results of runs of a stage that have one of the wanted keys."""
+    wanted  keys that single runs are looked for of
+    warn    is told of damaged chunks
+    """
+    for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):
+        try:
+            content = artifact.read(path)
+            columns = [content["points"][name].tolist() for name in labels_of(PointResult)]
+        except (FileNotFoundError, OtherLayout):
+            continue
+        except (Damaged, KeyError) as error:
+            warn(f"{path} is damaged: {error}; its points are computed again")
+            continue
+        labels = {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()}
+        yield Chunk(tuple(PointResult(*row) for row in zip(*columns, strict=True)), labels)
     for path in sorted(runs_dir.glob(f"*/{stage}.h5")):
         try:
             stored = artifact.read(path)
         except (OSError, Damaged):
             continue
         if stored.identity.key in wanted:
-            yield row_of_artifact(stored), labels_in(stored, {})
-
-
-def row_of_artifact(stored: artifact.Stored) -> PointResult:
-    """A single run's result as a row."""
-    summary = untimed(stored.summary, stored.timed)
-    said = summary.pop("no_answer", None)
-    status: Status = "answered" if stored.complete else "no-answer"
-    return PointResult(stored.identity.key, status, "" if said is None else str(said["message"]), flat_text(summary))
+            why_not = None if stored.complete else str(stored.summary.get("no_answer", {}).get("message", ""))
+            yield Chunk((told(stored.identity.key, stored, why_not),), labels_in(stored, {}))
 
 
 def median_wall_s(rows: Sequence[PointResult]) -> float | None:

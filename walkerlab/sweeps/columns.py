@@ -14,7 +14,12 @@ from walkerlab.labels import unit_by_name, unit_ending
 from walkerlab.store.content import Variable
 from walkerlab.sweeps.chunk import Labels
 
-OWN: Final = ("outcome", "status", "said")
+OWN: Final = {
+    "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
+    "status": "answered, no-answer, or failed: not computed",
+    "reason": "why there is no answer",
+}
+"""What is told of every result, beside what its stage says."""
 STATES: Final = ("state", "start_state", "final_state")
 TEXT_BYTES: Final = 6
 """What a text of some words takes in a file, in units of what it takes here."""
@@ -44,16 +49,13 @@ class SweepVariable:
         if array.ndim != self.values.ndim:
             return  # a list where others have a number says something else
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
-        self._make_room(array.shape[1:])
+        shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
+        if shape != self.values.shape[1:]:
+            old = self.values
+            self.values = np.full((len(old), *shape), np.nan)
+            self.values[tuple(slice(0, length) for length in old.shape)] = old
         own: tuple[Any, ...] = (places, *(slice(0, length) for length in array.shape[1:]))
         self.values[own] = array
-
-    def _make_room(self, shape: tuple[int, ...]) -> None:
-        grown = tuple(max(old, new) for old, new in zip(self.values.shape[1:], shape, strict=True))
-        if grown != self.values.shape[1:]:
-            old = self.values
-            self.values = np.full((len(old), *grown), np.nan)
-            self.values[tuple(slice(0, length) for length in old.shape)] = old
 
     def typed(self) -> NDArray[Any]:
         """The values in the type that they had, where every result has one; else numbers with gaps."""
@@ -81,7 +83,7 @@ class Columns:
         self._columns: dict[str, SweepVariable] = {}
 
     def put(self, places: Sequence[int], rows: Sequence[Mapping[str, Any]]) -> None:
-        """Take what some results say, each by name as `flat.said_in` tells it."""
+        """Take what some results say, each by name as `chunk.by_name` has it."""
         for name in dict.fromkeys(chain.from_iterable(rows)):
             there = [k for k, row in enumerate(rows) if name in row]
             first = rows[there[0]][name]
@@ -122,18 +124,17 @@ class Columns:
         values = column.typed()[inverse]
         extra = values.shape[1:]
         own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
-        unit, text = ("", name) if column.text else self._label(name)
+        last = name.rpartition(".")[2]
+        if column.text:
+            unit, text = "", OWN.get(name, name)
+        elif last in STATES:
+            unit, text = "rad, rad/s", last.replace("_", " ")
+        elif last in self.labels:
+            unit, text = self.labels[last]
+        else:
+            unit, text = unit_by_name(last), in_words(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
         return Variable(values.reshape(shape + extra), dims + own, unit, text, missing=gaps)
-
-    def _label(self, name: str) -> tuple[str, str]:
-        """Unit and meaning of a number: as the stage labelled it, else by how its name ends."""
-        last = name.rpartition(".")[2]
-        if last in STATES:
-            return "rad, rad/s", last.replace("_", " ")
-        if last in self.labels:
-            return self.labels[last]
-        return unit_by_name(last), in_words(name)
 
 
 def in_words(name: str) -> str:

@@ -20,7 +20,6 @@ from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.question import Question
-from walkerlab.sweeps.result import parameter_values
 from walkerlab.sweeps.sweep import Swept
 
 PAGE = "sweep.html"
@@ -83,7 +82,7 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
     ]
     columns = [
         *(Column(name, written=in_words, numeric=True) for name in (*question.names, *shown)),
-        *(Column("outcome"), Column("said", wide=True)),
+        *(Column("outcome"), Column("reason", wide=True)),
     ]
     listed = f"Of the {len(question)} points the first {MOST_ROWS} are listed. " if len(question) > MOST_ROWS else ""
     where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
@@ -110,11 +109,11 @@ def spoken(values: Sequence[object]) -> str:
 
 
 def rows(group: Group, question: Question, shown: Sequence[str]) -> list[tuple[Any, ...]]:
-    """The first points: parameters, numbers, outcome, and what was said."""
+    """The first points: parameters, numbers, outcome, and the reason where there is no answer."""
     count = min(len(question), MOST_ROWS)
-    columns = [[parameter_values(question, place)[question.places(i)[place]] for i in range(count)]
-               for place in range(len(question.names))]  # fmt: skip
-    columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "said")]
+    places = [question.places(index) for index in range(count)]
+    columns: list[list[Any]] = [[axis.values[at[k]] for at in places] for k, axis in enumerate(question.axes)]
+    columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "reason")]
     return list(zip(*columns, strict=True))
 
 

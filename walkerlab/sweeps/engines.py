@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import os
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,6 @@ from typing import Any
 from walkerlab.errors import ConfigError
 from walkerlab.workers import WorkerPool
 
-POLL_S = 0.5
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -129,7 +127,7 @@ def slurm(order: Order) -> Iterator[Pool]:
     """Jobs of Slurm, one for each chunk; `cluster=local` runs them on this machine, to try a sweep out."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
-    options: dict[str, Any] = {name: number_if_it_is_one(value) for name, value in order.options.items()}
+    options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
     cluster = str(options.pop("cluster", "slurm"))
     python = options.pop("python", None)
     try:
@@ -143,11 +141,14 @@ def slurm(order: Order) -> Iterator[Pool]:
     try:
         yield Pool(executor, order.workers or 16)
     finally:
-        executor.shutdown(wait=False, cancel_futures=True)
+        for job in executor.jobs:
+            with contextlib.suppress(OSError):  # a job that has ended meanwhile
+                if not job.done():
+                    job.cancel(check=False)
 
 
 class JobExecutor(Executor):
-    """Jobs of submitit as futures."""
+    """Jobs of submitit as futures, each waited for by a thread."""
 
     def __init__(self, made: Any) -> None:
         """Nothing is submitted yet.
@@ -155,43 +156,22 @@ class JobExecutor(Executor):
         made  a submitit executor
         """
         self._made = made
-        self._running: dict[Future[Any], Any] = {}
-        self._lock = threading.Lock()
-        self._closed = threading.Event()
-        self._poll = threading.Thread(target=self._collect, daemon=True)
-        self._poll.start()
+        self.jobs: list[Any] = []
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submit one job."""
         future: Future[Any] = Future()
-        future.set_running_or_notify_cancel()
         job = self._made.submit(fn, *args, **kwargs)
-        with self._lock:
-            self._running[future] = job
+        self.jobs.append(job)
+
+        def wait() -> None:
+            try:
+                future.set_result(job.result())
+            except Exception as error:
+                future.set_exception(error)
+
+        threading.Thread(target=wait, daemon=True).start()
         return future
-
-    def _collect(self) -> None:
-        while not self._closed.wait(POLL_S):
-            with self._lock:
-                ended = [(future, job) for future, job in self._running.items() if job.done()]
-                for future, _ in ended:
-                    del self._running[future]
-            for future, job in ended:
-                try:
-                    future.set_result(job.result())
-                except Exception as error:
-                    future.set_exception(error)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Stop looking; cancel jobs that still run if asked."""
-        while wait and self._running:
-            time.sleep(POLL_S)
-        self._closed.set()
-        self._poll.join()
-        if cancel_futures:
-            for job in self._running.values():
-                with contextlib.suppress(OSError):  # a job that has ended meanwhile
-                    job.cancel(check=False)
 
 
 def refuse_address(name: str, order: Order) -> None:
@@ -208,11 +188,6 @@ def extra(module: str, name: str) -> Any:
         raise ConfigError(
             f"--engine {name} needs {module}, which is not installed.", f"pip install 'walkerlab[{name}]'"
         ) from error
-
-
-def number_if_it_is_one(text: str) -> str | int:
-    """An engine's option as it takes it."""
-    return int(text) if text.isdigit() else text
 
 
 ENGINES: dict[str, SweepEngine] = {

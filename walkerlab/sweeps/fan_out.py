@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import platform
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Final
 
 from walkerlab.errors import NoAnswer
 from walkerlab.sweeps.chunk import Chunk, ChunkTask, PointResult, compute
-from walkerlab.sweeps.engines import Order, Pool, SweepEngine
+from walkerlab.sweeps.engines import Order, SweepEngine
 
 SCOUTS: Final = 2
 """Points of the first chunk, which goes ahead alone: it has the kernels compiled once and says what a point takes."""
@@ -69,22 +69,25 @@ class FanOut:
         self.graph, self.target, self.keep = graph, target, keep
         with self.engine.opened(self.order) as pool:
             while self.left or self._again or self._running:
-                self._submit(pool)
-                self._collect()
-
-    def _submit(self, pool: Pool) -> None:
-        """Hand out as much as the pool can work on, and one chunk more for each worker that waits."""
-        most = 1 if self.point_s is None else pool.workers + 1
-        while len(self._running) < most and (self._again or self.left):
-            one = self._again.popleft() if self._again else Try(self._next_task(pool.workers))
-            self._running[pool.executor.submit(compute, one.task)] = one
+                # as much as the pool can work on, and one chunk more for each worker that waits
+                most = 1 if self.point_s is None else pool.workers + 1
+                while len(self._running) < most and (self._again or self.left):
+                    one = self._again.popleft() if self._again else Try(self._next_task(pool.workers))
+                    self._running[pool.executor.submit(compute, one.task)] = one
+                ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    one = self._running.pop(future)
+                    error = future.exception()
+                    if error is None:
+                        self._arrived(future.result())
+                    else:
+                        self._failed(one, error)
 
     def _next_task(self, workers: int) -> ChunkTask:
         size = min(self.left, self._chunk_size(workers))
         self.left -= size
-        points = [next(self.todo) for _ in range(size)]
-        configs, keys, again = zip(*points, strict=True)
-        return ChunkTask(self.graph, self.target, configs, keys, again, platform.node())
+        configs, keys, again = zip(*islice(self.todo, size), strict=True)
+        return ChunkTask(self.graph, self.target, configs, keys, again)
 
     def _chunk_size(self, workers: int) -> int:
         if self.point_s is None:
@@ -92,17 +95,6 @@ class FanOut:
         least = LEAST_CHUNK_S / self.point_s
         fair = self.left / (SHARES * workers)
         return max(1, min(LARGEST_CHUNK, math.ceil(min(self.chunk_s / self.point_s, max(fair, least)))))
-
-    def _collect(self) -> None:
-        """Wait for something to end and deal with it."""
-        ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
-        for future in ended:
-            one = self._running.pop(future)
-            error = future.exception()
-            if error is None:
-                self._arrived(future.result())
-            else:
-                self._failed(one, error)
 
     def _arrived(self, chunk: Chunk) -> None:
         self._alive = True

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Final, Literal
+
+from pydantic.fields import FieldInfo
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import extra, leaves
@@ -15,6 +18,7 @@ from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
+from walkerlab.errors import ConfigError
 
 Value = float | int | str | bool
 Layout = Literal["grid", "list"]
@@ -44,7 +48,7 @@ class Axis:
     def setting(self, index: int) -> ConfigSetting:
         """The `--set` of one value."""
         value = self.values[index]
-        place = Position(f"{self.source}, {value}", 0, 0)
+        place = Position(self.source, 0, 0)
         return ConfigSetting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
 
 
@@ -135,7 +139,7 @@ def asked(
         return Question(stage, sampled(axes, sample, seed), "list")
     for one in axes:
         if not one.values:
-            raise refusal([Problem(Position(one.source, 0, 0), f"{one.key}: it is not said how many values", FORMS)])
+            raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
     if zipped and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
@@ -151,7 +155,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     source = f"--over {text}"
     key = key.strip()
     if not equals or not all(key.split(".")):
-        raise refusal([Problem(Position(source, 0, 0), "is not of the form KEY=VALUES", FORMS)])
+        raise bad(source, "is not of the form KEY=VALUES", FORMS)
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
         assert isinstance(node, Listed)
@@ -159,13 +163,29 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     return key, values.strip(), source
 
 
+def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
+    """What to raise for something wrong with a parameter, an option or a key, which is its place."""
+    return refusal([Problem(Position(source, 0, 0), text, allowed, near)])
+
+
+@cache
+def known_keys() -> dict[str, FieldInfo]:
+    """The keys of a config that have a value, dotted."""
+    return {".".join(path): field for path, field in leaves(Config)} | dict(SlopeInDegrees.model_fields)
+
+
 def axis(key: str, values: Any, source: str) -> Axis:
     """One parameter; ConfigError for an unknown key and for values of no known form."""
-    refuse_unknown(key, source)
+    known = known_keys()
+    if key not in known and not any(key.startswith(f"{one}.") for one in known):
+        if any(one.startswith(f"{key}.") for one in known):
+            raise bad(source, f"{key}: is a block of keys, not a value")
+        if not key.startswith("walker."):  # one of another type has keys of its own, which are checked point by point
+            raise bad(source, f"{key}: unknown key", near=nearest(key, known))
     if isinstance(values, list | tuple):
-        bad = next((value for value in values if not isinstance(value, Value)), None)
-        if bad is not None or not values:
-            raise refusal([Problem(Position(source, 0, 0), f"{key}: {bad if values else 'an empty list'}", FORMS)])
+        odd = next((value for value in values if not isinstance(value, Value)), None)
+        if odd is not None or not values:
+            raise bad(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
     try:
@@ -175,17 +195,15 @@ def axis(key: str, values: Any, source: str) -> Axis:
         count = -1
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise refusal([Problem(Position(source, 0, 0), f"{key}: {values} is not a range of values", FORMS)])
+        raise bad(source, f"{key}: {values} is not a range of values", FORMS)
     if logarithmic and min(low, high) <= 0.0:
-        raise refusal(
-            [Problem(Position(source, 0, 0), f"{key}: {values}", "both ends above 0 for a logarithmic range")]
-        )
+        raise bad(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
     return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
     """Whole numbers as integers where a key takes nothing else; what is not whole is left for the schema to refuse."""
-    field = next((field for path, field in leaves(Config) if ".".join(path) == key), None)
+    field = known_keys().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
     return tuple(int(value) if value.is_integer() else value for value in values)
@@ -199,19 +217,6 @@ def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[floa
     return tuple(float(value) for value in space(low, high, count))
 
 
-def refuse_unknown(key: str, source: str) -> None:
-    """Raise ConfigError for a key that configs do not have."""
-    known = [".".join(path) for path, _ in leaves(Config)]
-    if key == "slope_deg" or key in known or any(key.startswith(f"{one}.") for one in known):
-        return
-    if any(one.startswith(f"{key}.") for one in known):
-        raise refusal([Problem(Position(source, 0, 0), f"{key}: is a block of keys, not a value")])
-    # A walker of another type has keys of its own, which its schema checks point by point.
-    if key.startswith("walker."):
-        return
-    raise refusal([Problem(Position(source, 0, 0), f"{key}: unknown key", "", nearest(key, [*known, "slope_deg"]))])
-
-
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     """Points drawn from the intervals, or from the lists, of all parameters at once; ConfigError for no such sampler.
 
@@ -221,23 +226,20 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MOST_POINTS:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
         raise refusal([Problem(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)])
-    unit = unit_sample(name, len(axes), int(number), seed)
-    return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
-
-
-def unit_sample(name: str, dimensions: int, number: int, seed: int) -> Any:
-    """Points of the unit cube, (number, dimensions)."""
     import numpy as np
 
-    generator = np.random.default_rng(seed)
+    count, dimensions, generator = int(number), len(axes), np.random.default_rng(seed)
     if name == "random":
-        return generator.random((number, dimensions))
-    from scipy.stats import qmc
+        unit = generator.random((count, dimensions))
+    else:
+        from scipy.stats import qmc
 
-    if name == "sobol":
-        # In full powers of two, where the sequence is balanced; its first points are then a prefix of more.
-        return qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(number)))[:number]
-    return qmc.LatinHypercube(dimensions, seed=generator).random(number)
+        if name == "sobol":
+            # In full powers of two, where the sequence is balanced; its first points are then a prefix of more.
+            unit = qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(count)))[:count]
+        else:
+            unit = qmc.LatinHypercube(dimensions, seed=generator).random(count)
+    return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
 
 
 def drawn(one: Axis, column: Any) -> Iterator[Value]:
@@ -251,9 +253,12 @@ def drawn(one: Axis, column: Any) -> Iterator[Value]:
 
 def described(config: Config, key: str) -> tuple[str, str]:
     """Unit and meaning of a config's key; a unit that depends on the block's is that of this config."""
-    fields: Mapping[str, Any] = {".".join(path): field for path, field in leaves(Config)}
-    field = SlopeInDegrees.model_fields["slope_deg"] if key == "slope_deg" else fields.get(key)
-    field = field or own_field(config, key)
+    *above, last = key.split(".")
+    block: Any = config
+    for name in above:
+        block = getattr(block, name, None)
+    # the config's own blocks, which may be of a type that the schema only allows
+    field = known_keys().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key
     unit = extra(field, "unit")
@@ -261,12 +266,3 @@ def described(config: Config, key: str) -> tuple[str, str]:
         contact: Contact | None = config.contact
         unit = unit.split(" or ")[0 if contact is None or contact.units == "adams" else 1]
     return unit, field.description or key
-
-
-def own_field(config: Config, key: str) -> Any:
-    """The field of a key in the config's own blocks, which may be of a type that the schema only allows."""
-    block: Any = config
-    *above, last = key.split(".")
-    for name in above:
-        block = getattr(block, name, None)
-    return getattr(type(block), "model_fields", {}).get(last)

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from walkerlab.config.canonical import canonical_json
 from walkerlab.config.loader import LoadedConfig
+from walkerlab.config.problems import SHOWN_PROBLEMS
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.stages.graph import PIPELINE, Graph
+from walkerlab.stages.in_memory import Keys
 from walkerlab.stages.numerical_error import SAMPLE, evenly_spread
 from walkerlab.stages.progress import Progress, Reporter, Silent
 from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
-from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import (
-    Chunk,
-    PointResult,
-    chunk_files,
-    median_wall_s,
-    rows_of_single_runs,
-    store,
-    stored_chunk,
-)
+from walkerlab.sweeps.chunk import Chunk, PointResult, median_wall_s, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.fan_out import FanOut
-from walkerlab.sweeps.points import Points
 from walkerlab.sweeps.question import Question
-from walkerlab.sweeps.result import Merge, question_slice, result_name, result_path
+from walkerlab.sweeps.result import Merge
 
 PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
 
@@ -103,7 +98,7 @@ class Swept:
     def error(self) -> WalkerlabError:
         """What is to be raised at the edge if points were not computed; the others are stored."""
         said = f"{self.failed} of {len(self.question)} points were not computed"
-        why = f"`said` in {self.path} says why."
+        why = f"`reason` in {self.path} says why."
         if not self.bugs:
             return NoAnswer(f"{said}; {why}", "The same command tries them again and keeps the rest.")
         error = WalkerlabError(
@@ -140,26 +135,61 @@ class SweepRun:
         Raises ConfigError for points that are no configs and for a stage that has no result without files.
         """
         refuse_unknown_stage(question.stage, graph)
-        self.question, self.folder, self.config = question, folder, loaded.config
-        self.points = Points(question, loaded, graph)
-        keys = np.frombuffer(b"".join(self.points.checked_keys()), dtype="S32")
+        self.question, self.folder, self.loaded = question, folder, loaded
+        self.keys = Keys(graph)
+        keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
         self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
         # any one of the points that have a result will do to compute it
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
-        base = self.config.model_dump(mode="json")
-        base.pop("sweep", None)
-        self.slice = question_slice(question, base)
-        self.name = result_name(question, self.slice)
-        self.path = result_path(folder, self.name)
+        over = {axis.key: list(axis.values) for axis in question.axes}
+        base = loaded.config.model_dump(mode="json", exclude={"sweep"})
+        self.slice = {"of": question.stage, "over": over, "layout": question.layout, "config": base}
+        digest = hashlib.sha256(canonical_json(self.slice).encode()).hexdigest()[:8]
+        self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
+
+    def config(self, index: int) -> Config:
+        """One point's config, made when it is asked for: a million are never held at once; ConfigError if none."""
+        return self.loaded.variant(self.question.settings(index))
+
+    def checked_keys(self) -> list[bytes]:
+        """The stage key of every point (32 bytes each), in order.
+
+        Raises ConfigError that names the points that are no configs, with their values, each reason once.
+        """
+        found: list[bytes] = []
+        problems: dict[str, str] = {}
+        for index in range(len(self.question)):
+            try:
+                found.append(bytes.fromhex(self.keys.of(self.config(index), self.question.stage)[self.question.stage]))
+            except ConfigError as error:
+                at = f"at {self.question.said(index)}: " if len(self.question.axes) > 1 else ""
+                problems.setdefault(error.message, f"{at}{error.message}")
+                if len(problems) == SHOWN_PROBLEMS:
+                    problems["more"] = "and perhaps more"
+                    break
+        if problems:
+            raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
+        return found
+
+    def unread(self) -> Iterator[str]:
+        """The parameters that the stage and what it needs do not read: all of their values give one result."""
+        base = self.keys.of(self.config(0), self.question.stage)
+        for number, axis in enumerate(self.question.axes):
+            settings = self.question.settings(0)
+            settings[number] = axis.setting(len(axis.values) - 1)
+            if axis.values[-1] != axis.values[0]:
+                with contextlib.suppress(ConfigError):  # that corner is no config
+                    if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
+                        yield axis.key
 
     def foresee(self, workers: int, shown: int) -> Foreseen:
         """What would be done; touches nothing. Raises ConfigError as `run` would."""
-        refuse_another_config(self.folder, self.config)
+        refuse_another_config(self.folder, self.loaded.config)
         there = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
-        for chunk in self._stored(Silent()):
+        for chunk in self._stored(Silent().warn):
             rows += chunk.rows
             there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
         count = len(self.question)
@@ -177,47 +207,43 @@ class SweepRun:
         """
         started = time.perf_counter()
         reporter = reporter or Silent()
-        for key in self.points.unread():
+        for key in self.unread():
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
-            claim(self.folder, self.config)
+            claim(self.folder, self.loaded.config)
             merge = Merge(len(self.places))
-            if not work.force:
-                self._take_over(merge, reporter)
+            for chunk in () if work.force else self._stored(reporter.warn):
+                merge.put(chunk, self.places)
             reused = int(merge.there[self.inverse].sum())
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points exist already")
-            begun = provenance.begin(self.config, {})
+            begun = provenance.begin(self.loaded.config, {})
             progress = reporter.begin(
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
             )
             try:
                 bugs = self._compute(merge, work, reporter, progress, begun)
+            except KeyboardInterrupt:
+                kept = int(merge.there[self.inverse].sum())
+                reporter.note(f"sweep: interrupted; {kept} of {len(self.question)} points are kept")
+                raise
             finally:
                 progress.end("")
-            content = merge.content(self.question, self.points, self.inverse)
-            identity = Identity("sweep", self.slice, {}, self.points.code_digest)
+            content = merge.content(self.question, self.loaded.config, self.inverse)
+            identity = Identity("sweep", self.slice, {}, self.code_digest)
             complete = content.summary["failed"] == 0
             artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
-    def _stored(self, reporter: Reporter) -> Iterator[Chunk]:
-        """What is stored of the wanted results under the same folder of runs: chunks of sweeps, and single runs."""
-        runs, stage = self.folder.runs_dir, self.question.stage
-        for path in chunk_files(runs, stage, self.points.code_digest):
-            try:
-                yield stored_chunk(path)
-            except (FileNotFoundError, OtherLayout):
-                continue
-            except Damaged as error:
-                reporter.warn(f"{path} is damaged: {error}; its points are computed again")
-        for row, labels in rows_of_single_runs(runs, stage, self.places):
-            yield Chunk((row,), labels)
+    @property
+    def code_digest(self) -> str:
+        """The digest of the stage's code."""
+        return self.keys.code_digest(self.question.stage)
 
-    def _take_over(self, merge: Merge, reporter: Reporter) -> None:
-        for chunk in self._stored(reporter):
-            merge.put(chunk, self.places)
+    def _stored(self, warn: Callable[[str], None]) -> Iterator[Chunk]:
+        """What is stored of the wanted results under the same folder of runs."""
+        return stored_chunks(self.folder.runs_dir, self.question.stage, self.code_digest, self.places, warn)
 
     def _compute(
         self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, begun: provenance.Provenance
@@ -228,7 +254,7 @@ class SweepRun:
             return ()
         bugs: dict[str, str] = {}
         progress.start("sweep", int(missing.size))
-        stage, digest = self.question.stage, self.points.code_digest
+        stage, digest = self.question.stage, self.code_digest
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
@@ -240,8 +266,8 @@ class SweepRun:
                     bugs[place] = bug
             progress.advance(len(chunk.rows))
 
-        chunk_s = work.chunk_s or work.engine.chunk_s
         todo = self._configs(missing.tolist())
+        chunk_s = work.chunk_s or work.engine.chunk_s
         FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
         return tuple(bugs.values())
 
@@ -249,8 +275,8 @@ class SweepRun:
         """Of each point its config, its keys, and whether it is of the sample whose walks are taken again."""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
-            config = self.points.config(index)
-            yield config, self.points.keys(config), index in sample
+            config = self.config(index)
+            yield config, self.keys.of(config, self.question.stage), index in sample
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
