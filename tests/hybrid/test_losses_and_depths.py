@@ -7,16 +7,16 @@ from contact_walks import scene_of, walked
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.hybrid.contact_run import sampled_feet
-from walkerlab.verification.particle_scene import ALONG_RATE, HEIGHT, HEIGHT_RATE, rig, run_until, state
+from walkerlab.verification.known import ALONG_RATE, GRAVITY, HEIGHT, HEIGHT_RATE, rig, run_until, state
 
-MASS, GRAVITY, DROP = 2.0, 9.81, 0.1
+MASS, DROP = 2.0, 0.1
 DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
 def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
     """In the air again, all that is missing went into damping: the law lets go before the ball has left the ground."""
-    ball = rig(MASS, 1.0, ((0.0, 0.0), (0.0, 1e3)), DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0), GRAVITY)
+    ball = rig(MASS, 1.0, DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0))
     run = run_until(ball, state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
     end = np.array(run.end)
     assert end[HEIGHT] > 0.0

@@ -16,7 +16,7 @@ from walkerlab.solvers.registry import METHODS, Method, method_named
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.ordinary import Choice, choices
 from walkerlab.verification.scaling import scaled, to_twin
-from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, configured, prepared
+from walkerlab.verification.starts import JudgedWalk, Start, configured, prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.workers import in_order
 
@@ -65,22 +65,27 @@ def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult
 
 
 def judge(case: Case, config: Config) -> CaseResult:
-    """Run a case of either model and judge it."""
+    """Run a case of either model and judge it; a walk on the ground is sampled unless it is long."""
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepared(config, case)
     if start is None:
         return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="there is no start")
     methods = configured(start, case)
     began = time.perf_counter()
-    walk = first_walk(start, case)
+    walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
-    found: list[Measure | NotMeasured] = [*of_one_walk(walk, start, case)]
+    found: list[Measure | NotMeasured] = [
+        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
+        Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+        *start.measures(walk, case),
+    ]
     remarks: list[str] = []
     second = Second("", None, f"the walk itself ended {walk.outcome.label}")
     if walk.outcome.answered:
         short = start.again(case)
         second = second_walk(
-            start.settings.method,
+            methods.method,
             case.budget,
             lambda method, budget: start.walk(short, replace(methods, method=method.name, budget=budget)),
         )
@@ -90,36 +95,11 @@ def judge(case: Case, config: Config) -> CaseResult:
             if differs and short.steps == case.steps:
                 remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
     found += start.momentum(walk, case)
-    return CaseResult(
-        *about,
-        walk.outcome.label,
-        int(walk.touches.size),
-        finite(walk.residual_J),
-        walk.rhs_evaluations,
-        wall_s,
-        tuple(one for one in found if isinstance(one, Measure)),
-        remarks=tuple(remarks),
-        second_method=second.method,
-        second_tried=second.tried,
-        not_measured=tuple(one for one in found if isinstance(one, NotMeasured)),
-    )
-
-
-def first_walk(start: Start, case: Case) -> JudgedWalk:
-    """The walk that is judged, sampled on the ground unless it is long."""
-    if isinstance(start, ContactStart):
-        return start.walk(case, configured(start, case), sampled=case.steps <= SAMPLED_STEPS)
-    return start.walk(case, configured(start, case))
-
-
-def of_one_walk(walk: JudgedWalk, start: Start, case: Case) -> list[Measure]:
-    """Measures that need no second walk."""
-    return [
-        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
-        Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
-        Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
-        *start.measures(walk, case),
-    ]
+    numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
+    measures = tuple(one for one in found if isinstance(one, Measure))
+    missing = tuple(one for one in found if isinstance(one, NotMeasured))
+    said = tuple(remarks)
+    return CaseResult(*about, walk.outcome.label, *numbers, measures, said, second.method, second.tried, missing)
 
 
 def walked_again(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:

@@ -1,4 +1,8 @@
-"""Problems whose answers are known, run through the contact code; each reference takes a route without that code."""
+"""Problems whose answers are known, run through the contact code; each reference takes a route without that code.
+
+Balls, blocks, rods and wheels are two bodies and two feet, as walkers are, with a second body or foot that takes no
+part, driven by the walkers' own code. The rules by which walks end are put out of reach; a run ends at a given time.
+"""
 
 from __future__ import annotations
 
@@ -10,32 +14,89 @@ from functools import partial
 from typing import Annotated, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
+from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import resting_foot
+from walkerlab.ground.terrain import checkerboard
+from walkerlab.ground.walker import ContactWalker, one_foot_motion
+from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
+from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid.outcome import Outcome
 from walkerlab.labels import Label
+from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
 from walkerlab.scene.contact import normal_law
+from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import State
 from walkerlab.verification import references
-from walkerlab.verification.particle_scene import (
-    ALONG_RATE,
-    ANGLE,
-    ANGLE_RATE,
-    HEIGHT,
-    HEIGHT_RATE,
-    OUT_OF_REACH,
-    first_foot,
-    next_landing,
-    rig,
-    run_until,
-    state,
-)
 
+Array = NDArray[np.float64]
+ENDLESS = 1e7  # m, an area without edges, and a hip that cannot fall
+OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
+BUDGET = 2_000_000  # right-hand sides
+SAMPLES = 4000
+HEIGHT, ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # of the first body, in the state
 GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
 PAPER_LAW: Final = normal_law(Contact())
 PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
+
+
+@dataclass(frozen=True)
+class ParticleRun:
+    """What it did."""
+
+    times: Array  # (samples,) s
+    states: Array  # (samples, 8)
+    end: State
+    dissipated: Array  # (3,) J
+
+
+def rig(
+    mass: float,
+    inertia: float,
+    normal: NormalLaw,
+    friction: Coulomb = PAPER_FRICTION,
+    feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
+    slope: float = 0.0,
+) -> ContactWalker:
+    """One body whose centre of mass is its frame's origin, with point feet fixed to it.
+
+    The second body is hinged at that centre, has the same inertia, no mass, and nothing to do.
+    """
+    assembly = Assembly(
+        bodies=(Body("body", mass, CENTRE, inertia), Body("idle", 0.0, CENTRE, inertia)),
+        joints=(Revolute("hinge", "body", CENTRE, "idle", CENTRE),),
+        feet=(BallFoot("first", "body", feet[0], 0.0), BallFoot("second", "body", feet[1], 0.0)),
+    )
+    return contact_walker(assembly, normal, friction, GRAVITY, slope)
+
+
+def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
+    """A state of the rig: where its centre of mass is along and over the slope, and how it moves and turns."""
+    return (*at, angle, 0.0, *velocity, rate, 0.0)
+
+
+def run_until(
+    walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
+) -> ParticleRun:
+    """Let it move for a time; samples evenly spaced. Raises ArithmeticError if the budget does not suffice."""
+    frame = Frame(-ENDLESS, 2.0 * duration_s / LONGEST_FLIGHT, True)
+    ground = JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame)
+    walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
+    walk_state.at_zero[:] = 0
+    walk_state.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
+    observer = new_observer(walker, walk_state, start, np.arange(SAMPLES, dtype=np.float64) * duration_s / SAMPLES)
+    stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
+    if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
+        raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
+    seen = int(observer.recorded[0])
+    times, states = observer.times[:seen].copy(), observer.states[:seen].copy()
+    return ParticleRun(times, states, stopped.state, observer.dissipated.copy())
 
 
 @dataclass(frozen=True)
@@ -99,18 +160,18 @@ BLOCK_MASS = 20.0
 
 def bouncing_ball_period() -> float:
     """Mean time from landing to landing over five bounces on a linear spring without damping (s)."""
-    ball = rig(1.0, 0.1, (CENTRE, OUT_OF_REACH), SPRING, PAPER_FRICTION, GRAVITY)
+    ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
     run = run_until(ball, state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     y = run.states[-1]
-    landing = float(run.times[-1]) + next_landing(float(y[HEIGHT]), float(y[HEIGHT_RATE]), GRAVITY)
-    return (landing - first) / BOUNCES
+    left = (y[HEIGHT_RATE] + math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[HEIGHT])) / GRAVITY  # in free flight
+    return (float(run.times[-1] + left) - first) / BOUNCES
 
 
 def restitution(law: NormalLaw, speed: float) -> float:
     """Speed after over speed before a ball of the walker's mass meets ground at `speed` (m/s)."""
-    ball = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), law, PAPER_FRICTION, GRAVITY)
+    ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
     start = state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
     flying = [y for y in run_until(ball, start, 0.02).states if y[HEIGHT] > 0.0 and y[HEIGHT_RATE] > 0.0]
@@ -124,7 +185,7 @@ def block_speed(slope: float, start_speed: float) -> float:
     """Speed (m/s) of a block on a slope a second after it had `start_speed`."""
     law = PAPER_LAW
     foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
-    block = rig(BLOCK_MASS, 1.0, (CENTRE, OUT_OF_REACH), law, PAPER_FRICTION, GRAVITY, slope)
+    block = rig(BLOCK_MASS, 1.0, law, slope=slope)
     return float(run_until(block, state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
 
@@ -141,7 +202,7 @@ def rimless_wheel_speed() -> float:
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
-    wheel = rig(1.0, HUB_INERTIA, ((0.0, -1.0), ahead), STIFF, STICKY, GRAVITY, WHEEL_SLOPE)
+    wheel = rig(1.0, HUB_INERTIA, STIFF, STICKY, ((0.0, -1.0), ahead), WHEEL_SLOPE)
     speed = 0.9 * references.wheel_upright_speed(SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA)
     for _ in range(ROUNDS):
         height = 1.0 - GRAVITY * math.cos(WHEEL_SLOPE) / STIFF.stiffness
@@ -162,14 +223,14 @@ def painleve_growth_rate() -> float:
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
     ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
-    rod = rig(1.0, 1.0 / 3.0, (end, OUT_OF_REACH), ground, friction, GRAVITY)
+    rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
     rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
     run = run_until(rod, state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
     picked = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
     picked = picked[0] + (picked[1] - picked[0]) * np.arange(4)
     picked = picked[picked < run.times.size]
     tau = float(run.times[picked[1]] - run.times[picked[0]])
-    first, middle, last = np.diff([-first_foot(rod, run.states[index]).height for index in picked])
+    first, middle, last = np.diff([-one_foot_motion(rod.whole, 0, run.states[index]).height for index in picked])
     return math.acosh(0.5 * (last + first) / middle) / tau
 
 

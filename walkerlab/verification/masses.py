@@ -100,26 +100,9 @@ class RigidMasses:
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
         centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
         place, velocity = self.masses.moving(psi, rate)
-        return Moving(
-            self.masses.mass,
-            centre + place,
-            rolling + velocity,
-            self.masses.inertia,
-            rate,
-            centre + turned(self.to_hip, psi).sum(axis=0),
-            turned(self.to_foot, psi).sum(axis=0),
-        )
-
-    def share_of(self, leg: int) -> Array:
-        """By how much each body (bodies,) turns with a leg when that turns about the hip: a coupled body in part."""
-        names = [body.name for body in self.assembly.bodies]
-        share = np.array([1.0 if name in self.assembly.legs[leg] else 0.0 for name in names])
-        for coupling in self.assembly.couplings:
-            share[names.index(coupling.body)] = sum(
-                weight for name, weight in zip(coupling.of, coupling.weights, strict=True)
-                if name in self.assembly.legs[leg]
-            )  # fmt: skip
-        return share
+        hip, contact = centre + turned(self.to_hip, psi).sum(axis=0), turned(self.to_foot, psi).sum(axis=0)
+        mass, inertia = self.masses.mass, self.masses.inertia
+        return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def momenta(self, state: Array, new: bool) -> tuple[float, float]:
         """The angular momenta that a heel strike keeps (kg m^2/s).
@@ -129,9 +112,13 @@ class RigidMasses:
 
         new  whether the walker stands on the new foothold already
         """
-        moving = self.at(state)
+        moving, leg = self.at(state), self.assembly.legs[SWING if new else STANCE]
+        names = [body.name for body in self.assembly.bodies]
+        share = np.array([1.0 if name in leg else 0.0 for name in names])
+        for coupling in self.assembly.couplings:
+            turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in leg)
+            share[names.index(coupling.body)] = sum(turning)
         foothold = np.zeros(2) if new else moving.contact
-        share = self.share_of(SWING if new else STANCE)
         whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return whole, moving.about(moving.hip, share[self.owner], share)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.ground.friction import steepest_change
-from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, sampled_feet
+from walkerlab.hybrid.contact_run import ContactSamples, sampled_feet
 from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import Tolerances
@@ -62,18 +62,14 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
     found = momentum_balance(config, scene, start, case)
     unknown = found.unsure + found.unresolved
     if unknown > MOST_UNKNOWN:
-        return NotMeasured(MEASURE, why_unknown(found))
+        shares = {
+            "the impulses' sums do not settle": found.unsure,
+            "friction hangs on slip velocities below the tolerance": found.unresolved,
+        }
+        why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
+        return NotMeasured(MEASURE, why)
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(found.residual), limit)
-
-
-def why_unknown(found: Balance) -> str:
-    """What keeps the impulses of a balance from being known."""
-    shares = {
-        "the impulses' sums do not settle": found.unsure,
-        "friction hangs on slip velocities below the tolerance": found.unresolved,
-    }
-    return " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
 
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
@@ -87,13 +83,15 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)
     for _ in range(PASSES):
-        samples = samples_of(scene.walk(start, steps, tolerances, with_middles(grid)))
+        samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
+        assert samples is not None, "the walk was looked at"
         given = impulse_rate(samples, scene, config) / scale
         change = unsettled(samples.time_s, given)
         wanting = change > SETTLED / grid.size
         if not wanting.any() or grid.size > MOST_INTERVALS:
             break
         grid = split(samples.time_s, wanting)
+    assert samples is not None, "it was looked at"
     held = momentum(samples, config) / scale
     apart = np.abs(held - held[0] - impulse(samples.time_s, given))
     accepted = int(walk.work[ACCEPTED])
@@ -101,12 +99,6 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     slip = tolerances.atol + tolerances.rtol * speed
     push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
     return Balance(float(apart.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
-
-
-def samples_of(walk: ContactWalkResult) -> ContactSamples:
-    """The states that a walk was looked at in."""
-    assert walk.samples is not None, "it was looked at"
-    return walk.samples
 
 
 def with_middles(grid: Array) -> Array:
@@ -140,8 +132,8 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
     feet = np.zeros((samples.time_s.size, 2, 5))
     sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
     along, height, normal, friction = np.moveaxis(feet[:, :, :4], 2, 0)
-    mass, gravity, slope = config.walker.total_mass_kg, config.gravity_m_s2, config.slope_rad
-    weight = mass * gravity * np.array([np.sin(slope), -np.cos(slope)])
+    slope = config.slope_rad
+    weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)
     return np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
 

@@ -67,40 +67,30 @@ class CapReachedError(Exception):
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Every ordinary method on a case; none if it has no start or moves nowhere, or is another walker than a compass.
+    """Every ordinary method on a case: on the ground with equations alone, in the rigid model in a script that walks.
 
-    A script without events describes no knee that locks, and Appendix A no other walker than the compass.
+    None if the case has no start or moves nowhere, if no equation without events describes its ground, or for another
+    walker than a compass: a script without events describes no knee that locks, and Appendix A no other walker.
     """
     if not is_plain_compass(config.walker):
         return ()
     short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
-    return rigid_choices(short, config) if case.model == "rigid" else contact_choices(short, config)
-
-
-def contact_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Every ordinary method on a case of the contact model; none if no equation without events describes it."""
-    start = prepared(config, case)
+    start = prepared(config, short)
+    if isinstance(start, RigidStart) and start.compass is not None:
+        walk = start.walk(short, Tolerances(*RIGID_REFERENCE, short.budget)).record
+        if not walk.steps:
+            return ()
+        units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
+        arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
+        return tuple(script(arrival, start.compass, walk, name) for name in LIBRARY)
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.terrain.order_matters:
         return ()
-    walk = start.walk(case, Tolerances(*REFERENCE, case.budget)).record
+    walk = start.walk(short, Tolerances(*REFERENCE, short.budget)).record
     arrival = arrival_of(case.name, walk, natural_units(config))
     if arrival.time_s == 0.0:
         return ()
     found = [library(arrival, start, name) for name in LIBRARY]
     return (*found, *(fixed(arrival, start, h) for h in FIXED_STEPS_S))
-
-
-def rigid_choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """SciPy's methods in a script that walks a case of the rigid model, after as many steps as it takes."""
-    start = prepared(config, case)
-    if not isinstance(start, RigidStart) or start.compass is None:
-        return ()
-    walk = start.walk(case, Tolerances(*RIGID_REFERENCE, case.budget)).record
-    if not walk.steps:
-        return ()
-    units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
-    arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
-    return tuple(script(arrival, start.compass, walk, name) for name in LIBRARY)
 
 
 @dataclass(frozen=True)

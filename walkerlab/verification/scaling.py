@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
@@ -47,10 +46,8 @@ def pendulum_time(config: RigidConfig) -> float:
 
 def to_twin(config: RigidConfig) -> TwinScale:
     """The scale that leads from a config's walker to its twin of ordinary size."""
-    walker = config.walker
-    return TwinScale(
-        TWIN_LEG / walker.leg_length_m, TWIN_MASS / walker.total_mass_kg, TWIN_GRAVITY / config.gravity_m_s2
-    )
+    length, mass = TWIN_LEG / config.walker.leg_length_m, TWIN_MASS / config.walker.total_mass_kg
+    return TwinScale(length, mass, TWIN_GRAVITY / config.gravity_m_s2)
 
 
 def scaled_block(block: B, by: TwinScale) -> B:
@@ -63,20 +60,19 @@ def scaled_block(block: B, by: TwinScale) -> B:
         "stop_stiffness": torque,
         "stop_damping": torque * by.time,
     }
+
+    def value(given: Any, unit: float) -> Any:
+        if isinstance(given, Block):
+            return scaled_block(given, by)
+        if isinstance(given, tuple):
+            return tuple(value(each, unit) for each in given)
+        return given * unit if isinstance(given, float) and unit != 1.0 else given
+
     changed: dict[str, Any] = {}
     for name in type(block).model_fields:
         unit = next((unit for ending, unit in units.items() if name.endswith(ending)), 1.0)
-        changed[name] = scaled_value(getattr(block, name), unit, by)
+        changed[name] = value(getattr(block, name), unit)
     return block.model_copy(update=changed)
-
-
-def scaled_value(value: Any, unit: float, by: TwinScale) -> Any:
-    """A key's value, blocks and lists of measures with all that is in them."""
-    if isinstance(value, Block):
-        return scaled_block(value, by)
-    if isinstance(value, tuple):
-        return tuple(scaled_value(each, unit, by) for each in value)
-    return value * unit if isinstance(value, float) and unit != 1.0 else value
 
 
 def scaled(config: Config, by: TwinScale) -> Config:
@@ -87,16 +83,8 @@ def scaled(config: Config, by: TwinScale) -> Config:
         n = len(config.start) // 2
         changes["start"] = (*config.start[:n], *(rate / by.time for rate in config.start[n:]))
     if config.contact is not None:
-        changes["contact"] = scaled_contact(config.contact, by)
-    return config.model_copy(update=changes)
-
-
-def scaled_contact(contact: Contact, by: TwinScale) -> Contact:
-    """The similar walker's ground."""
-    si = contact.in_si()
-    pitch = contact.pad_pitch
-    return contact.model_copy(
-        update={
+        si, pitch = config.contact.in_si(), config.contact.pad_pitch
+        ground = {
             "units": "si",
             "stiffness": si.stiffness_N_per_m_e * by.force / by.length**si.exponent,
             "damping": si.damping_N_s_m * by.force / by.speed,
@@ -105,4 +93,5 @@ def scaled_contact(contact: Contact, by: TwinScale) -> Contact:
             "friction_velocity": si.friction_velocity_m_s * by.speed,
             "pad_pitch": pitch if isinstance(pitch, str) else pitch * by.length,
         }
-    )
+        changes["contact"] = config.contact.model_copy(update=ground)
+    return config.model_copy(update=changes)

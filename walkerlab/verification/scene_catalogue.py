@@ -14,9 +14,7 @@ from walkerlab.config.walkers import Kneed, PartsWalker
 STEPS, AS_IT_IS_STEPS = 4, 6
 BUDGET = 1_000_000  # right-hand sides
 FAR_TOO_FEW = 500
-ENDS: tuple[Fate, ...] = tuple(
-    fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected")
-)  # fmt: skip
+ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
 """The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
 STOPS: tuple[Fate, ...] = tuple(fate for fate in ENDS if fate != "walked")
 SOFTER, STICKIER = 100.0, 10.0
@@ -27,23 +25,24 @@ B = TypeVar("B", bound=Block)
 
 
 def scene_cases(config: Config) -> list[Judged]:
-    """The cases of a scene, each with its config.
+    """The cases of a scene, each with its config: of the rigid model, and of the contact model where there is ground.
 
     config  with the start spelled out in numbers, and the pads' pitch if there are pads
     """
-    cases = [*rigid_cases(config)]
-    if config.contact is not None:
-        cases += [*ground_cases(config, config.contact), *knee_cases(config), *start_cases(config)]
-    return cases
-
-
-def rigid_cases(config: Config) -> Iterator[Judged]:
-    """The rigid model: as it is with its twin, on another slope, at rest."""
-    yield case("rigid", "the scene's rigid walk", "walkers", model="rigid", steps=10, twin=True), config
-    steep = on_slope(config, 2.0 * config.slope_rad)
-    yield case("rigid-twice-as-steep", "from the same start relative to the slope", "slopes", model="rigid"), steep
-    still = case("rigid-standing-still", "legs apart and at rest fall back", "starts", STOPS, model="rigid")
-    yield still, at_rates(config, 0.0)
+    still, steep = with_start(config, 0.0), with_start(config, 1.0, 2.0 * config.slope_rad)
+    relative, back = "from the same start relative to the slope", "legs apart and at rest fall back"
+    cases = [
+        (case("rigid", "the scene's rigid walk", "walkers", model="rigid", steps=10, twin=True), config),
+        (case("rigid-twice-as-steep", relative, "slopes", model="rigid"), steep),
+        (case("rigid-standing-still", back, "starts", STOPS, model="rigid"), still),
+    ]
+    if config.contact is None:
+        return cases
+    level = case("level", f"nothing gives back what impacts take; {relative}", "slopes")
+    down = case("standing-still", "both feet down and at rest, it takes no step downhill", "starts", STOPS)
+    fast = case("twice-as-fast", "pushed off at twice the speed", "starts")
+    cases += [*ground_cases(config, config.contact), *knee_cases(config), (level, with_start(config, 1.0, 0.0))]
+    return [*cases, (case("twice-as-steep", relative, "slopes"), steep), (down, still), (fast, with_start(config, 2.0))]
 
 
 def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
@@ -71,16 +70,6 @@ def ground_cases(config: Config, ground: Contact) -> Iterator[Judged]:
     tight = case("tight", "three digits tighter than needed", "numerics", agreement=1e-6, balance=1e-9)
     yield tight, solved(1e-10, 1e-12)
     yield case("no-budget", "no step fits into it", "numerics", ("budget-exhausted",), budget=FAR_TOO_FEW), config
-
-
-def start_cases(config: Config) -> Iterator[Judged]:
-    """Other slopes and other starts of the contact model."""
-    relative = "from the same start relative to the slope"
-    yield case("level", f"nothing gives back what impacts take; {relative}", "slopes"), on_slope(config, 0.0)
-    yield case("twice-as-steep", relative, "slopes"), on_slope(config, 2.0 * config.slope_rad)
-    still = case("standing-still", "both feet down and at rest, it takes no step downhill", "starts", STOPS)
-    yield still, at_rates(config, 0.0)
-    yield case("twice-as-fast", "pushed off at twice the speed", "starts"), at_rates(config, 2.0)
 
 
 def knee_cases(config: Config) -> Iterator[Judged]:
@@ -115,19 +104,10 @@ def case(name: str, reason: str, family: str, expected: tuple[Fate, ...] = ENDS,
     return Case(name=f"scene-{name}", family=family, expected=expected, reason=reason, **given)
 
 
-def on_slope(config: Config, slope_rad: float) -> Config:
-    """The scene on another slope, its start turned along: both feet stand on the ground again."""
-    start = config.start
+def with_start(config: Config, factor: float, slope_rad: float | None = None) -> Config:
+    """The scene with its start's velocities scaled; on another slope turned along, so that both feet stand on it."""
+    start, slope = config.start, config.slope_rad if slope_rad is None else slope_rad
     assert not isinstance(start, str), "the start is spelled out"
-    n, turned = len(start) // 2, config.slope_rad - slope_rad
-    return config.model_copy(
-        update={"slope_rad": slope_rad, "start": (*(angle + turned for angle in start[:n]), *start[n:])}
-    )
-
-
-def at_rates(config: Config, factor: float) -> Config:
-    """The scene with its start's velocities scaled."""
-    start = config.start
-    assert not isinstance(start, str), "the start is spelled out"
-    n = len(start) // 2
-    return config.model_copy(update={"start": (*start[:n], *(factor * rate for rate in start[n:]))})
+    n, turned = len(start) // 2, config.slope_rad - slope
+    angles, rates = (angle + turned for angle in start[:n]), (factor * rate for rate in start[n:])
+    return config.model_copy(update={"slope_rad": slope, "start": (*angles, *rates)})

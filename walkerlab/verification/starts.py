@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.reads import ContactConfig, WalksConfig
+from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import SolverSettings
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult
@@ -87,11 +87,12 @@ class RigidStart:
         """As far as a case is walked again: no further than times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
-    def walk(self, case: Case, tolerances: Tolerances) -> JudgedWalk:
-        """Walk a case by a method."""
+    def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
+        """Walk a case by a method; heel strikes are all that is judged, so that there is nothing to sample."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
-        touches, cost = walk.touch_time_s / pendulum_time(self.config), (walk.work.rhs_evaluations, walk.work.accepted)
+        touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
+        cost = work.rhs_evaluations, work.accepted
         return JudgedWalk(walk.outcome, touches, None, walk.energy_drift, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
@@ -143,11 +144,9 @@ class ContactStart:
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
-        times, cost = (
-            (walk.touch_time_s / unit, walk.end_time_s / unit),
-            (int(walk.work[RHS]), int(walk.work[ACCEPTED])),
-        )
-        return JudgedWalk(walk.outcome, *times, walk.energy_balance_residual_J, *cost, numbers, walk)
+        touches, end = walk.touch_time_s / unit, walk.end_time_s / unit
+        cost = int(walk.work[RHS]), int(walk.work[ACCEPTED])
+        return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
         """That friction and damping give nothing back, of a walk that was sampled."""
@@ -181,7 +180,7 @@ def gait_of(walker: Standing, seed: int) -> Gait | None:
 
 
 def prepared(config: WalksConfig, case: Case) -> Start | None:
-    """The start of a case; None if it starts from a gait that there is not."""
+    """The start of a case; None if it starts from a gait that there is not, or its pads are laid for one."""
     walker = rigid_walker(config, config.equations)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)
@@ -192,29 +191,17 @@ def prepared(config: WalksConfig, case: Case) -> Start | None:
         state, length = config.start, abs(float(swing_foot(walker, config.start)[1]))
     if case.model == "rigid":
         return RigidStart(config, walker, state)
-    return on_ground(config, state, length, case.lowered_m)
-
-
-def on_ground(config: WalksConfig, rigid_state: State, length: float, lowered: float) -> ContactStart | None:
-    """The start on compliant ground, from a rigid state of a step length, lowered into it (all m)."""
-    own = own_pitch(config, length, rigid_state)
-    if own is None:
-        return None
-    scene = contact_scene(config, length, own)
-    y = start_state(scene, rigid_state)
-    y = (*y[:HEIGHT], y[HEIGHT] - lowered, *y[HEIGHT + 1 :])
-    leg, rates = config.walker.leg_length_m, len(y) // 2  # where the velocities begin
-    speed = float(np.max(np.abs([*y[rates : rates + 2], *(leg * rate for rate in y[rates + 2 :])])))
-    law = scene.walker.normal
-    stored = 2.0 * law.stiffness * max(0.0, lowered) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    pitch = length
+    if config.contact is not None and wants_own_pitch(config.contact):
+        found = contact_gait(config, length, state).gait
+        if found is None:
+            return None
+        pitch = found.step.length_m
+    scene = contact_scene(config, length, pitch)
+    y = start_state(scene, state)
+    y = (*y[:HEIGHT], y[HEIGHT] - case.lowered_m, *y[HEIGHT + 1 :])
+    leg, rates, law = config.walker.leg_length_m, y[len(y) // 2 :], scene.walker.normal
+    speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
+    stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)
     energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
     return ContactStart(config, scene, y, energy)
-
-
-def own_pitch(config: ContactConfig, rigid_step_m: float, rigid_state: State) -> float | None:
-    """What pads of the contact gait's own pitch are laid for (m), if the case wants them; None if there is no gait."""
-    contact = config.contact
-    if contact is None or not wants_own_pitch(contact):
-        return rigid_step_m
-    found = contact_gait(config, rigid_step_m, rigid_state).gait
-    return None if found is None else found.step.length_m
