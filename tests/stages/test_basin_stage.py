@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.stages import basin
-from walkerlab.stages.basin import RigidQuestion, WalkEnds, unpacked
+from walkerlab.stages.basin import RigidQuestion
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content
@@ -179,16 +179,6 @@ def test_a_window_upside_down_is_refused(tmp_path):
 def test_a_bad_block_is_refused_in_words(setting, said):
     with pytest.raises(ConfigError, match=said):
         load(None, [setting])
-
-
-def test_numbers_of_cells_read_back():
-    found = WalkEnds(np.array([0, 1, 8]), np.array([-1, 3, 0]), np.array([300, 0, 12]))
-    again = unpacked(np.array(found.packed()))
-    assert [column.tolist() for column in (again.outcome, again.attractor, again.steps)] == [
-        [0, 1, 8],
-        [-1, 3, 0],
-        [300, 0, 12],
-    ]
 
 
 def test_nothing_is_stale_without_it():

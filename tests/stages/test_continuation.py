@@ -11,9 +11,10 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import plane as plane_of_gaits
+from walkerlab.orbits.families import ValueSpan
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
-from walkerlab.stages.continuation import attractor_summary, ending_rows, first_doubling
+from walkerlab.stages.continuation import FamilyQuestion, attractor_summary, ending_rows, first_doubling
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -169,6 +170,22 @@ def test_what_follows_from_a_key_follows_it():
     given = config("walker.foot_to_mass_m=0.5")
     assert parameter_of("walker.leg_length_m", given).config_at(given, 1.4).walker.foot_to_mass_m == 0.5
     assert parameter_of("walker.leg_length_m", given).config_at(given, -1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("over", "models"),
+    [
+        ("slope_rad", {"rigid", "contact"}),
+        ("contact.stiffness", {"contact"}),
+        ("walker.hip_mass_kg", {"rigid", "contact"}),
+    ],
+)
+def test_a_key_touches_the_models_that_change_with_it(over, models):
+    own = config()
+    parameter = parameter_of(over, own)
+    span = ValueSpan(*(factor * parameter.value_in(own) for factor in (1.0, 1.1)))
+    asked = FamilyQuestion(own, parameter, span, 1, 10)
+    assert {model for model in ("rigid", "contact") if asked.touches(model)} == models
 
 
 @pytest.mark.parametrize(

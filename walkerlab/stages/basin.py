@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -47,8 +47,6 @@ from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 
-CODES: Final = 16  # more than there are outcomes
-ATTRACTORS: Final = 4096
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
 SAMPLE = 100  # cells that are walked again
 DRAWN = 4_000  # starts from which attractors are sought
@@ -82,7 +80,8 @@ def run(
     begun, shared_from = time.perf_counter(), question.shared_from
     pieces = cells_of(question, window)
     walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
-    found = unpacked(np.concatenate([parts.kept[piece.name] for piece in pieces]))
+    ends = [np.reshape(parts.kept[piece.name], (3, -1)) for piece in pieces]
+    found = WalkEnds(*np.concatenate(ends, axis=1).astype(np.int64))
     walked = found.outcome == Outcome.WALKED
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
     walking = walked.astype(float)
@@ -253,18 +252,6 @@ class WalkEnds:
     attractor: Integers
     steps: Integers
 
-    def packed(self) -> list[float]:
-        """One number for each."""
-        code = self.outcome + CODES * (self.attractor - NONE + ATTRACTORS * self.steps)
-        return [float(number) for number in code]
-
-
-def unpacked(numbers: Floats) -> WalkEnds:
-    """What `packed` made numbers of."""
-    rest, outcome = np.divmod(numbers.astype(np.int64), CODES)
-    steps, attractor = np.divmod(rest, ATTRACTORS)
-    return WalkEnds(outcome, attractor + NONE, steps)
-
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
@@ -336,8 +323,9 @@ def cells_of(question: Question, window: Window) -> list[Piece]:
 
 
 def ends_of(question: Question, window: Window, cells: range) -> list[float]:
-    """One number for each cell, see `unpacked`."""
-    return question.walked(window.starts(np.array(cells))).packed()
+    """Outcomes, attractors and steps of the cells, one after the other."""
+    found = question.walked(window.starts(np.array(cells)))
+    return [float(number) for number in (*found.outcome, *found.attractor, *found.steps)]
 
 
 def edges_of(question: Question, window: Window, edges: Integers, refine: int) -> list[Piece]:

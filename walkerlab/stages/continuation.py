@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
@@ -165,12 +165,12 @@ class FamilyQuestion:
 
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
-        walker_at: Callable[[float], object] = (
-            rigid_walkers(self.config, self.parameter)
-            if model == RIGID
-            else walkers_on_ground(self.config, self.parameter, 1.0)
+        walkers: Callable[..., Callable[[float], Any]] = (
+            rigid_walkers if model == RIGID else partial(walkers_on_ground, step_length_m=1.0)
         )
-        return walker_at(self.span.least) != walker_at(self.span.most)
+        walker_at = walkers(self.config, self.parameter)
+        first, last = ([*numbers_in(walker_at(value))] for value in (self.span.least, self.span.most))
+        return len(first) != len(last) or not all(map(np.array_equal, first, last))
 
     def touched(self, key: str) -> tuple[str, ...]:
         """The models asked for that change over the span; ConfigError, about the block's key, if none does."""
@@ -181,6 +181,15 @@ class FamilyQuestion:
                 "Choose a key that the model is made of, or another model (--model).",
             )
         return touched
+
+
+def numbers_in(value: Any) -> Iterator[Any]:
+    """All that a record and the records in it are made of."""
+    if isinstance(value, tuple) or is_dataclass(value):
+        for one in value if isinstance(value, tuple) else vars(value).values():
+            yield from numbers_in(one)
+    else:
+        yield value
 
 
 NO_ATTRACTORS = AttractorBranch()

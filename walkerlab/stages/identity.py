@@ -20,7 +20,7 @@ class Identities:
         """Read no code yet."""
         self._sources = Sources()
         self._digests: dict[str, str] = {}
-        self._fixed: dict[str, Mapping[str, Any]] = {}
+        self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, stage: Stage, config: Config, input_keys: Mapping[str, str]) -> Identity:
         """The identity of a stage's result under a config.
@@ -28,7 +28,12 @@ class Identities:
         input_keys  keys of the results that it takes, by stage
         """
         if stage.name not in self._fixed:
-            self._fixed[stage.name] = fixed_slice(stage)
+            # as `paper` what its own cases take of the built-in config, as `programs` the versions of those it drives
+            fixed = self._fixed[stage.name] = {}
+            if stage.takes_of_paper is not None:
+                fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
+            if stage.programs is not None:
+                fixed["programs"] = dict(stage.programs())
         own = slice_of(config, stage.takes_under(config))
         return Identity(stage.name, {**own, **self._fixed[stage.name]}, input_keys, self.code_digest(stage))
 
@@ -37,17 +42,3 @@ class Identities:
         if stage.name not in self._digests:
             self._digests[stage.name] = self._sources.code_digest(stage.module)
         return self._digests[stage.name]
-
-
-def fixed_slice(stage: Stage) -> dict[str, Any]:
-    """What a stage's result is determined by under every config.
-
-    As `paper` what its own cases take of the built-in config, as `programs` the versions of other programs that it
-    drives.
-    """
-    fixed: dict[str, Any] = {}
-    if stage.takes_of_paper is not None:
-        fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
-    if stage.programs is not None:
-        fixed["programs"] = dict(stage.programs())
-    return fixed

@@ -12,6 +12,7 @@ from walkerlab.stages.plan import refuse_unsuited
 from walkerlab.stages.progress import Progress, Silent
 from walkerlab.stages.task import StageAnswer, task_of
 from walkerlab.store.content import Content
+from walkerlab.store.parts import Parts
 
 REMEMBERED = 256
 """Results of needed stages that are kept: those of neighbouring points are often the same."""
@@ -21,22 +22,6 @@ def refuse_files(stage: Stage) -> None:
     """Raise ConfigError for a stage that has no result but files of its run."""
     if stage.draws:
         raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
-
-
-class PartsInMemory:
-    """Stands in for the file in which a stage keeps parts of a long result (`store.parts`): nothing outlives it."""
-
-    def __init__(self) -> None:
-        """Nothing is kept."""
-        self.kept: dict[str, list[float]] = {}
-
-    def keep(self, name: str, numbers: list[float]) -> None:
-        """Add a part."""
-        self.kept[name] = numbers
-
-    def forget(self) -> None:
-        """Remove all parts."""
-        self.kept = {}
 
 
 class Keys:
@@ -88,30 +73,20 @@ class InMemory:
         progress = progress or Silent()
         results: dict[str, Content] = {}
         for stage in self.graph.needed_for(target, config):
-            if stage.name == target:
-                return self._computed(stage, config, results, progress, again)
-            found = self._remembered(stage, config, results, progress, (keys[stage.name], again and stage.walks))
+            key = (keys[stage.name], again and stage.walks)
+            if stage.name == target or key not in self._inputs:
+                inputs = {name: results[name] for name in stage.inputs(config)}
+                task = task_of(stage, config, inputs, jobs=1, parts=Parts(None, ""), again=again)
+                answer = task.run(progress)
+                if stage.name == target:
+                    return answer
+                self._inputs[key] = answer
+                if len(self._inputs) > self.remembered:
+                    self._inputs.popitem(last=False)
+            self._inputs.move_to_end(key)
+            found = self._inputs[key]
             if found.no_answer is not None:
                 said = NoAnswer(f"it needs {stage.name}: {found.no_answer.message}", found.no_answer.advice)
                 return StageAnswer(Content(), said)
             results[stage.name] = found.content
         raise AssertionError("a stage needs itself")
-
-    def _remembered(
-        self, stage: Stage, config: Config, results: dict[str, Content], progress: Progress, key: tuple[str, bool]
-    ) -> StageAnswer:
-        if key in self._inputs:
-            self._inputs.move_to_end(key)
-            return self._inputs[key]
-        answer = self._inputs[key] = self._computed(stage, config, results, progress, key[1])
-        if len(self._inputs) > self.remembered:
-            self._inputs.popitem(last=False)
-        return answer
-
-    @staticmethod
-    def _computed(
-        stage: Stage, config: Config, results: dict[str, Content], progress: Progress, again: bool
-    ) -> StageAnswer:
-        inputs = {name: results[name] for name in stage.inputs(config)}
-        task = task_of(stage, config, inputs, jobs=1, parts=PartsInMemory(), again=again)
-        return task.run(progress)

@@ -95,17 +95,17 @@ class Planner:
         """Decide on stages in the order in which they run, taking it that each goes as decided."""
         steps = []
         for stage in stages:
-            self.look_at_current(stage, stages)
-            step = self.decide(stage)
+            step = self.decide(stage, stages)
             if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
                 self.expect(step)
             steps.append(step)
         return tuple(steps)
 
-    def look_at_current(self, stage: Stage, planned: Sequence[Stage]) -> None:
-        """Take note of the results that a stage takes if they are current and that are not planned for themselves.
+    def decide(self, stage: Stage, planned: Sequence[Stage]) -> Step:
+        """What is to happen with a stage, given what became of its inputs.
 
-        One that is damaged is not passed over in silence.
+        Of the results that it takes if they are current those are looked at that are not planned for themselves; one
+        that is damaged is not passed over in silence.
         """
         for name in stage.if_current:
             if self.graph[name] not in planned:
@@ -114,9 +114,6 @@ class Planner:
                     self.expect(step)
                 elif step.damaged:
                     self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} recomputes it"
-
-    def decide(self, stage: Stage) -> Step:
-        """What is to happen with a stage, given what became of its inputs."""
         return self._judge(stage, self.force)
 
     def expect(self, step: Step) -> None:

@@ -34,7 +34,6 @@ from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.stages.task import StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.store import artifact, provenance
-from walkerlab.store.artifact import Stored
 from walkerlab.store.elsewhere import take_over
 from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
@@ -189,17 +188,20 @@ class Execution:
 
     def _one_by_one(self, stages: Sequence[Stage], precompiler: Precompiler) -> None:
         for stage in stages:
-            step = self._decided(stage, stages)
+            step = self.planner.decide(stage, stages)
             self.waiting.remove(stage)
-            if step.action == "run":
-                importlib.import_module(stage.module)
-                if not precompiler.begun and nothing_compiled_yet():
-                    precompiler.begin(self.waiting)
-                precompiler.wait_for(stage)
-                self._run_here(self._begin(step))
-                self._draw_early(stages)
-            else:
+            if step.action != "run":
                 self._pass_over(step)
+                continue
+            importlib.import_module(stage.module)
+            if not precompiler.begun and nothing_compiled_yet():
+                precompiler.begin(self.waiting)
+            precompiler.wait_for(stage)
+            begun = self.running[None] = self._begin(step)
+            with watched(begun.reporter.compiling):
+                answer = begun.task.run(begun.reporter)
+            self._settle(self.running.pop(None), answer)
+            self._draw_early(stages)
 
     def _pass_over(self, step: Step) -> None:
         """Go on without running a stage; its result may lie in another run folder."""
@@ -207,12 +209,6 @@ class Execution:
             take_over(step.origin, self.folder.artifact(step.stage.name))
         self.planner.expect(step)
         self.skip(step)
-
-    def _run_here(self, begun: Begun) -> None:
-        self.running[None] = begun
-        with watched(begun.reporter.compiling):
-            answer = begun.task.run(begun.reporter)
-        self._settle(self.running.pop(None), answer)
 
     def _side_by_side(self, stages: Sequence[Stage], pool: WorkerPool, precompiler: Precompiler) -> None:
         while self.waiting or self.running:
@@ -231,7 +227,7 @@ class Execution:
                 if compiling is not None:
                     self._work(compiling)
                 continue
-            step = self._decided(stage, stages)
+            step = self.planner.decide(stage, stages)
             if step.action != "run":
                 self.waiting.remove(stage)
                 self._pass_over(step)
@@ -247,9 +243,10 @@ class Execution:
         self.working.add(future)
         future.add_done_callback(lambda ended: self.events.put(partial(self._ended, ended)))
 
-    def _heard(self, reporter: StageReporter, told: tuple[Any, ...]) -> None:
-        """Have what a process tells passed on in this thread's turn; it is heard in another one."""
-        self.events.put(partial(pass_on, reporter, *told))
+    def _heard(self, reporter: StageReporter, told: tuple[str, Any]) -> None:
+        """Have what a process tells passed on in this thread's turn; it is heard in another one, and ends nothing."""
+        call, *arguments = told
+        self.events.put(lambda: bool(getattr(reporter, call)(*arguments)))
 
     def _ended(self, future: Future[Any]) -> bool:
         """Store what a stage has returned; True, since a process is free."""
@@ -266,10 +263,6 @@ class Execution:
     def _unsettled(self) -> set[str]:
         """The stages that wait or run."""
         return {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
-
-    def _decided(self, stage: Stage, stages: Sequence[Stage]) -> Step:
-        self.planner.look_at_current(stage, stages)
-        return self.planner.decide(stage)
 
     def _begin(self, step: Step) -> Begun:
         stage, identity = step.stage, step.identity
@@ -290,11 +283,16 @@ class Execution:
             folder=self.folder.path,
             left_out=self.planner.missing_inputs(stage),
         )
+        expected = None
+        if step.found is not None:
+            times = (step.found.provenance.started_utc, step.found.provenance.ended_utc)
+            begun, ended = (datetime.datetime.fromisoformat(time) for time in times)
+            expected = (ended - begun).total_seconds()
         number = self.of - len(self.left) + 1 + len(self.running)
         of = max(self.of, number)
         place = [f"{number} of {of}"] if of > 1 else []
         why = [step.reason] if step.reason != artifact.NOT_THERE else []
-        reporter = self.reporter.begin(stage.name, ", ".join(place + why), seconds_taken(step.found))
+        reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
         return Begun(step, task, provenance.begin(self.planner.config, digests), reporter, time.perf_counter())
 
     def _settle(self, begun: Begun, answer: StageAnswer) -> None:
@@ -383,12 +381,6 @@ class Execution:
         return None
 
 
-def pass_on(reporter: StageReporter, call: str, *arguments: Any) -> bool:
-    """Call a stage's reporter as the stage has done in its process; False, since nothing has ended."""
-    getattr(reporter, call)(*arguments)
-    return False
-
-
 def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     """Whether two of the stages need nothing of each other."""
     needed: dict[str, set[str]] = {}
@@ -396,16 +388,6 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
         own = {name for name in stage.results(config) if name in needed}
         needed[stage.name] = own.union(*(needed[name] for name in own))
     return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
-
-
-def seconds_taken(stored: Stored | None) -> float | None:
-    """How long a stored result took; None if there is none."""
-    if stored is None:
-        return None
-    begun, ended = (
-        datetime.datetime.fromisoformat(t) for t in (stored.provenance.started_utc, stored.provenance.ended_utc)
-    )
-    return (ended - begun).total_seconds()
 
 
 def told_once(why: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk, with_scaled_rates
+from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
@@ -27,8 +27,6 @@ from walkerlab.orbits.scaled_starts import (
     Margin,
     MarginSearch,
     ScaledStarts,
-    StartMap,
-    StartTrial,
     as_map,
     contact_row,
     margins,
@@ -72,10 +70,11 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     rigid_gait = inputs["fixedpoint"].summary  # the start itself may be far from any gait
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
-    found = TuneRun(config, scene, rigid_state, gait).findings(progress, jobs)
-    stored, said = groups(found), summary(found, config) | {"left_out": list(of_adjustment(config))}
+    found = TuneRun(config, scene, rigid_state, gait)
+    found.find(progress, jobs)
+    stored, said = groups(found), summary(found) | {"left_out": list(of_adjustment(config))}
     if gait.gait is not None and config.tune.rigid_limit:
-        limit = limit_findings(config, scene, gait.gait, rigid_gait, found.rigid, progress)
+        limit = limit_findings(config, scene, gait.gait, rigid_gait, found.rigid_walk, progress)
         if limit is not None:
             stored |= limit_groups(limit)
             said |= limit_summary(limit)
@@ -100,108 +99,80 @@ def for_a_map(starts: ScaledStarts, evaluations: int) -> ScaledStarts:
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))
 
 
-@dataclass(frozen=True)
-class TuneFindings:
-    """All that the stage found.
-
-    rigid         the rigid model's walk from its start
-    walks         of the paper's procedure: `hinged`, of a compass, whose first step has a revolute joint at its stance
-                  foot; `released`, without it; and `adjusted`, from the adjusted start, if there is one
-    printed       of these walks
-    paper         the paper's own start; None for another walker than its compass
-    steps         asked for
-    names         of the rigid start's numbers
-    gait_factors  where the gait lies on the map, from the adjusted walk's end
-    """
-
-    scene: ContactScene
-    gait: GaitAnswer
-    rigid: RigidWalkResult
-    walks: Mapping[str, ContactWalkResult]
-    printed: Mapping[str, dict[str, Any]]
-    as_it_stands: StartTrial
-    adjustment: Adjustment | None
-    margins: list[Margin]
-    contact_map: StartMap
-    rigid_map: StartMap
-    paper: AdamsWalk | None
-    steps: int
-    names: tuple[str, ...]
-    adjusted_state: State | None
-    gait_factors: tuple[float, float] | None
-
-
 class TuneRun:
-    """What the parts of the stage share."""
+    """What the parts of the stage share, and all that they find.
+
+    names       of the rigid start's numbers
+    steps       asked for
+    hinge       whether the paper's procedure has a hinged first step, as its compass
+    walks       of that procedure: `hinged`, whose first step has a revolute joint at its stance foot; `released`,
+                without it; and `adjusted`, from the adjusted start, if there is one
+    printed     of these walks
+    adjustment  the smallest change of the velocities that walks; None if none does
+    """
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
         """Nothing is walked yet."""
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
-        self.steps = 2 * config.strides
+        self.names, self.steps = coordinates(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: Standing = rigid_walker(config, config.equations)
-        self.compass = is_plain_compass(config.walker)
+        self.hinge = is_plain_compass(config.walker)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
+        self.walks: dict[str, ContactWalkResult] = {}
+        self.printed: dict[str, dict[str, Any]] = {}
+        self.margins: list[Margin] = []
+        self.adjusted_state: State | None = None
+        self.paper: AdamsWalk | None = None  # None for another walker than the paper's compass
 
-    def findings(self, progress: Progress, jobs: int) -> TuneFindings:
+    def find(self, progress: Progress, jobs: int) -> None:
         """Procedure, margins, map, adjustment and the paper's own start."""
         settings = self.config.tune
-        cells = settings.cells or (COMPASS_CELLS if self.compass else CELLS)
+        cells = settings.cells or (COMPASS_CELLS if self.hinge else CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        walks = {"hinged": self.walk(self.rigid_state, pinned=True)} if self.compass else {}
-        walks["released"] = self.walk(self.rigid_state)
-        printed = {name: self.printed(walk, self.rigid_state, name == "hinged") for name, walk in walks.items()}
-        as_it_stands = self.starts.walk(*AS_IT_STANDS)
+        self.rigid_walk = take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True)
+        if self.hinge:
+            self.take("hinged", self.rigid_state)
+        self.take("released", self.rigid_state)
+        self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
         progress.start("tune: map", swing.size * stance.size)
-        quick = for_a_map(self.starts, as_it_stands.evaluations)
+        quick = for_a_map(self.starts, self.as_it_stands.evaluations)
         rows = []
         for row in in_order([partial(contact_row, quick, swing, float(factor)) for factor in stance], jobs):
             rows.append(row)
             progress.advance(swing.size)
-        walked = as_map(swing, stance, rows)
+        self.contact_map = as_map(swing, stance, rows)
         progress.start("tune: rigid map and margins")
-        rigid_cells = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
-        adjustment = self.adjusted(as_it_stands, quick, walked)
-        state, around = None, []
-        if adjustment is not None:
-            factors = adjustment.swing, adjustment.stance
-            around = margins(self.starts, factors, MarginSearch() if self.compass else COARSE)
-            state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
-            walks["adjusted"] = self.walk(state)
-            printed["adjusted"] = self.printed(walks["adjusted"], state)
-        return TuneFindings(
-            scene=self.scene,
-            gait=self.gait,
-            rigid=take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True),
-            walks=walks,
-            printed=printed,
-            as_it_stands=as_it_stands,
-            adjustment=adjustment,
-            margins=around,
-            contact_map=walked,
-            rigid_map=rigid_cells,
-            paper=adams_walk(self.rigid, self.walk, self.scene.walker) if is_the_papers(self.config.walker) else None,
-            steps=self.steps,
-            names=coordinates(self.config),
-            adjusted_state=state,
-            gait_factors=self.factors_at_the_end(walks["adjusted"]) if "adjusted" in walks else None,
-        )
+        self.rigid_map = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
+        self.adjustment = self.adjusted(quick)
+        if self.adjustment is not None:
+            factors = self.adjustment.swing, self.adjustment.stance
+            self.margins = margins(self.starts, factors, MarginSearch() if self.hinge else COARSE)
+            self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
+            self.take("adjusted", self.adjusted_state)
+        if is_the_papers(self.config.walker):
+            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker)
 
-    def adjusted(self, as_it_stands: StartTrial, quick: ScaledStarts, cells: StartMap) -> Adjustment | None:
+    def adjusted(self, quick: ScaledStarts) -> Adjustment | None:
         """The smallest change of the velocities that walks; None if none does."""
-        if as_it_stands.walks:
-            return Adjustment(*AS_IT_STANDS, as_it_stands)
+        cells = self.contact_map
+        if self.as_it_stands.walks:
+            return Adjustment(*AS_IT_STANDS, self.as_it_stands)
         if not cells.walking.size:
             return None
         swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
         return smallest_change(self.starts, quick, cells.walking, (swing, stance))
 
-    def factors_at_the_end(self, walk: ContactWalkResult) -> tuple[float, float] | None:
-        """Velocities of the last step of a walk, once the foot behind has lifted, over those of the rigid start."""
-        n = len(self.rigid_state) // 2
+    @property
+    def gait_factors(self) -> tuple[float, float] | None:
+        """Where the gait lies on the map, from the adjusted walk's end; None if that does not tell.
+
+        Velocities of its last step, once the foot behind has lifted, over those of the rigid start.
+        """
+        walk, n = self.walks.get("adjusted"), len(self.rigid_state) // 2
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
-        if walk.steps < 2 or walk.samples is None or 0.0 in first:
+        if walk is None or walk.steps < 2 or walk.samples is None or 0.0 in first:
             return None
         time, normal, _ = forces_of(walk, self.scene.walker)
         landed = walk.steps % 2  # leg 0 lands first
@@ -218,14 +189,14 @@ class TuneRun:
         interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
-    def printed(self, walk: ContactWalkResult, state: State, pinned: bool = False) -> dict[str, Any]:
-        """How such a walk went, with its numerical error if it has an answer."""
-        said = walk_summary(walk)
+    def take(self, name: str, state: State) -> None:
+        """Take one of the procedure's walks, and again for its numerical error if it has an answer."""
+        walk = self.walks[name] = self.walk(state, name == "hinged")
+        said = self.printed[name] = walk_summary(walk)
         if walk.outcome.answered:
             said["numerical_error"] = numerical_error(
-                said, self.tolerances, lambda tighter: walk_summary(self.walk(state, pinned, tighter))
+                said, self.tolerances, lambda tighter: walk_summary(self.walk(state, name == "hinged", tighter))
             )
-        return said
 
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
@@ -234,9 +205,10 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     return {key: said[key] for key in OF_WALK}
 
 
-def summary(found: TuneFindings, config: TuneConfig) -> dict[str, Any]:
+def summary(found: TuneRun) -> dict[str, Any]:
     """What the command prints."""
     paper, pitch, ends = found.paper, found.scene.pitch_m, counted(found.contact_map.outcome)
+    pads = Pads((pitch, pitch), laid=str(with_contact(found.config).pad_pitch))
     papers_start = (
         {}
         if paper is None
@@ -264,17 +236,17 @@ def summary(found: TuneFindings, config: TuneConfig) -> dict[str, Any]:
             "walks_share": found.contact_map.share(),
             "contact": ends,
             "rigid": counted(found.rigid_map.outcome),
-            "endings": endings(ends, config, True, Pads((pitch, pitch), laid=str(with_contact(config).pad_pitch))),
+            "endings": endings(ends, found.config, True, pads),
         },
         "slope_rad": found.scene.walker.slope,
         "pitch_m": pitch,
     }
 
 
-def table_2(found: TuneFindings) -> dict[str, dict[str, Any]]:
+def table_2(found: TuneRun) -> dict[str, dict[str, Any]]:
     """The start before and after the adjustment, of the paper's compass beside the paper's two, each on either base."""
     rows, adjusted = {}, found.adjusted_state
-    for k, (name, value) in enumerate(zip(found.names, found.rigid.start, strict=True)):
+    for k, (name, value) in enumerate(zip(found.names, found.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(found.names) // 2 else "rad/s"}
         if found.paper is not None:
             matlab, adams = TABLE_2[k].matlab.value, TABLE_2[k].adams.value
@@ -301,7 +273,7 @@ def percent(value: float, other: float, base: float) -> float | None:
     return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
 
 
-def gait_summary(found: TuneFindings) -> dict[str, Any]:
+def gait_summary(found: TuneRun) -> dict[str, Any]:
     """The contact model's own gait, or why there is none."""
     gait = found.gait.gait
     said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
@@ -344,7 +316,7 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
     ]
 
 
-def adjustment_summary(found: TuneFindings) -> dict[str, Any]:
+def adjustment_summary(found: TuneRun) -> dict[str, Any]:
     """The smallest change that walks, whether any is needed, and the margins around it."""
     change = found.adjustment
     said: dict[str, Any] = {"needed": not found.as_it_stands.walks, "found": change is not None}
@@ -372,7 +344,7 @@ def adjustment_summary(found: TuneFindings) -> dict[str, Any]:
     }
 
 
-def groups(found: TuneFindings) -> dict[str, Group]:
+def groups(found: TuneRun) -> dict[str, Group]:
     """The datasets of the artifact."""
     stored, walker = {"map": map_group(found)}, found.scene.walker
     if found.margins:
@@ -380,10 +352,10 @@ def groups(found: TuneFindings) -> dict[str, Group]:
         stored["margins"] = rows_group(found.margins, labels, "margin", "number")
     if found.gait.gait is not None:
         stored["gait"] = gait_group(found.gait.gait, found.scene)
-    rigid = found.rigid.samples
+    rigid = found.rigid_walk.samples
     if rigid is not None and rigid.time_s.size:
         in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
-        stored["rigid_start"] = Group({**in_time, **of_steps(found.rigid.touch_time_s)})
+        stored["rigid_start"] = Group({**in_time, **of_steps(found.rigid_walk.touch_time_s)})
     for name, walk in found.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
             stored[name] = Group({**legs_in_time(walk, walker), **of_steps(walk.touch_time_s)})
@@ -402,7 +374,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
     return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
 
 
-def map_group(found: TuneFindings) -> Group:
+def map_group(found: TuneRun) -> Group:
     """Outcome and steps of both models over the two factors."""
     cells, rigid, swing, stance = found.contact_map, found.rigid_map, "swing_factor", "stance_factor"
     over = {
@@ -417,8 +389,9 @@ def map_group(found: TuneFindings) -> Group:
     change = found.adjustment
     if change is not None:
         attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
-    if found.gait_factors is not None:
-        attrs |= dict(zip(("gait_swing_factor", "gait_stance_factor"), found.gait_factors, strict=True))
+    factors = found.gait_factors
+    if factors is not None:
+        attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
     return Group(
         {
             swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),

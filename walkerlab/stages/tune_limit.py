@@ -122,7 +122,10 @@ def limit_findings(
 
     found: dict[str, list[Distance]] = {}
     for name in walked:
-        walker = scene.walker if name == ALL else point_footed(config, scene.walker)
+        walker = scene.walker
+        if name != ALL:  # points for feet, as the rigid model has them
+            parts, rules = assembly_of(config.walker, rigid=True), knee_rules(config.walker)
+            walker = contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:
@@ -131,43 +134,25 @@ def limit_findings(
     return LimitFindings(walked, limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
 
 
-def point_footed(config: RigidConfig, walker: ContactWalker) -> ContactWalker:
-    """The same walker on the same ground, with points for feet as the rigid model has them."""
-    parts = assembly_of(config.walker, rigid=True)
-    rules = knee_rules(config.walker)
-    return contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
-
-
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
-    """Orders of convergence, what 1e-4 takes, and what each cause amounts to."""
-    return {
-        "orders": {name: orders(distances) for name, distances in found.series.items()},
-        "reaches": {name: reached(found.series[name]) for name in found.walked},
-        "causes": causes(found),
-    }
-
-
-def orders(distances: list[Distance]) -> list[float]:
-    """Observed orders of the period's convergence, from the config's contact towards the limit."""
-    return [float(order) for order in observed_orders(distances)]
-
-
-def reached(distances: list[Distance]) -> dict[str, Any]:
-    """What the config's contact and the most rigid one amount to, and from which on the paper's claim is met."""
-    claim = ANGLE_ERROR.value
-    walked = [one for one in distances if one.angle is not None]
-    first = next((one for one in walked if one.angle is not None and one.angle <= claim), None)
-    return {
-        "claim_rad": claim,
-        "settings": [setting(one) for one in walked],
-        "first_within_claim": None if first is None else setting(first),
-    }
+    """Orders of convergence, what the paper's claim of 1e-4 rad takes, and what each cause amounts to."""
+    reaches = {}
+    for name in found.walked:
+        walked = [one for one in found.series[name] if one.angle is not None]
+        first = next((one for one in walked if (one.angle or 0.0) <= ANGLE_ERROR.value), None)
+        reaches[name] = {
+            "claim_rad": ANGLE_ERROR.value,
+            "settings": [setting(one) for one in walked],
+            "first_within_claim": None if first is None else setting(first),
+        }
+    orders = {name: [float(order) for order in observed_orders(rows)] for name, rows in found.series.items()}
+    return {"orders": orders, "reaches": reaches, "causes": causes(found)}
 
 
 def setting(one: Distance) -> dict[str, Any]:
     """A setting and how far it is from the rigid walk."""
     differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
-    labels = {name: label for name, label in (DISTANCES | OF_WALKS).items() if name in differences}
+    labels = {name: (DISTANCES | OF_WALKS)[name] for name in differences}
     return {**printed(one.setting, FACTORS), **printed(one, labels), "run_wall_s": one.wall_s}
 
 
@@ -195,23 +180,14 @@ def causes(found: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(found: LimitFindings) -> dict[str, Group]:
-    """One group a series."""
-    return {
-        f"limit/{group_name(name)}": series_group(rows, name in found.walked)
-        for name, rows in found.series.items()
-        if rows
-    }
-
-
-def group_name(series: str) -> str:
-    """Of a series' group in the artifact."""
-    return series.replace(", ", "-").replace(" ", "-")
-
-
-def series_group(rows: list[Distance], walked: bool) -> Group:
-    """A series' settings and distances, and those of whole walks if any were compared."""
-    whole = [one for one in rows if one.angle is not None]
-    rows = whole if walked and whole else rows
-    labels = DISTANCES | (OF_WALKS if walked and whole else {})
-    settings = rows_group([one.setting for one in rows], FACTORS, SETTING, "setting, from the config's contact on")
-    return Group({**settings.variables, **columns(rows, labels, SETTING)})
+    """One group a series: its settings and distances, and those of whole walks if any were compared."""
+    groups = {}
+    for name, rows in found.series.items():
+        whole = [one for one in rows if one.angle is not None and name in found.walked]
+        if rows:
+            of = [one.setting for one in whole or rows]
+            settings = rows_group(of, FACTORS, SETTING, "setting, from the config's contact on")
+            distances = columns(whole or rows, DISTANCES | (OF_WALKS if whole else {}), SETTING)
+            path = f"limit/{name.replace(', ', '-').replace(' ', '-')}"
+            groups[path] = Group({**settings.variables, **distances})
+    return groups

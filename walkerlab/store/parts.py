@@ -20,13 +20,16 @@ Numbers = list[float]
 class Parts:
     """The parts of one result."""
 
-    def __init__(self, path: Path, key: str) -> None:
-        """Take up what a run with the same key has left at `path`; anything else is begun anew with the first part."""
+    def __init__(self, path: Path | None, key: str) -> None:
+        """Take up what a run with the same key has left at `path`; anything else is begun anew with the first part.
+
+        path  of the journal; None keeps parts in memory alone
+        """
         self.path, self.key = path, key
         self.kept: dict[str, Numbers] = {}
         self._intact = 0  # bytes of the file that are to be kept
         with contextlib.suppress(OSError, ValueError, TypeError):  # of a last line that was cut short
-            lines = self.path.read_bytes().splitlines(keepends=True)
+            lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
             for text in lines if lines[:1] == [line([key])] else []:
                 held = json.loads(text.partition(b" ")[2])
                 if text != line(held):
@@ -39,6 +42,8 @@ class Parts:
     def keep(self, name: str, numbers: Numbers) -> None:
         """Add a part; StorageError if the system refuses."""
         self.kept[name] = numbers
+        if self.path is None:
+            return
         with storing(self.path), self.path.open("r+b" if self._intact else "wb") as file:
             file.truncate(self._intact)
             file.seek(self._intact)
@@ -52,8 +57,9 @@ class Parts:
     def forget(self) -> None:
         """Remove all parts; StorageError if the system refuses."""
         self.kept, self._intact = {}, 0
-        with storing(self.path):
-            self.path.unlink(missing_ok=True)
+        if self.path is not None:
+            with storing(self.path):
+                self.path.unlink(missing_ok=True)
 
 
 def line(value: object) -> bytes:
