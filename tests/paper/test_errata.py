@@ -115,8 +115,8 @@ def test_inertia_of_the_impact_gives_the_masses_energy_for_angles_first(study):
         for m, one, other in zip((5.0, 10.0, 5.0), ahead, behind, strict=True)
     )
     assert 0.5 * rates @ inertia_at_impact(walker, *q) @ rates == pytest.approx(kinetic, rel=1e-8)
-    assert study.ordering.angles_first == pytest.approx(study.ordering.of_masses, rel=1e-12)
-    assert study.ordering.foot_first != pytest.approx(study.ordering.of_masses, rel=0.05)
+    assert study.kinetic_energy["angles_first"] == pytest.approx(study.kinetic_energy["masses"], rel=1e-12)
+    assert study.kinetic_energy["foot_first"] != pytest.approx(study.kinetic_energy["masses"], rel=0.05)
 
 
 def test_adams_start_has_the_energy_of_its_masses(study):

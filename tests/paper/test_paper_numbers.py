@@ -37,7 +37,8 @@ from walkerlab.paper.printed import (
     slope_of,
     walker_of_the_paper,
 )
-from walkerlab.paper.rows import NumberVerdict, paper_rows, weigh
+from walkerlab.paper.prose import prose
+from walkerlab.paper.rows import NumberVerdict, paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.solvers.scipy_methods import right_hand_side
 
@@ -74,14 +75,6 @@ def test_comparisons_in_words_are_read_as_their_number():
 )
 def test_agreement_goes_by_the_printed_digits(text, value, found):
     assert printed(text).agreement(value) == found
-
-
-def test_nothing_is_refuted_by_another_scene():
-    verdict, evidence = weigh(False, NumberVerdict.REFUTED, ("slope_rad 0.05 instead of 0.0174",), "0.7 s.")
-    assert verdict == NumberVerdict.EXPLAINED
-    assert "slope_rad 0.05" in evidence
-    assert weigh(True, NumberVerdict.REFUTED, ("any",), "")[0] == NumberVerdict.REPRODUCED
-    assert weigh(False, NumberVerdict.REFUTED, (), "")[0] == NumberVerdict.REFUTED
 
 
 def test_both_feet_of_x_p_stand_on_the_papers_slope():
@@ -210,7 +203,7 @@ def test_the_adams_start_falls_when_another_integration_says_so(study):
 
     fall = solve_ivp(rate, (0.0, 1.0), start, "DOP853", events=hip, rtol=1e-11, atol=1e-12).t_events[0][0]
     assert study.adams.end_time == pytest.approx(fall, abs=1e-5)
-    assert "0.347 s" in study.adams.velocities_in_words
+    assert "0.347 s" in prose("adams_start.velocities", study.adams)
 
 
 def test_another_scene_refutes_only_what_the_paper_itself_contradicts(rows):

@@ -12,7 +12,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
+from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
@@ -48,16 +48,6 @@ class AdamsStart:
     end: str
     end_time: float
 
-    @property
-    def starts_a_gait(self) -> bool:
-        """Whether a foot that can only push carries the rigid model to a heel strike."""
-        return self.heel_strikes > 0 and self.pull_from is None
-
-    @property
-    def velocities_in_words(self) -> str:
-        """What becomes of it."""
-        return prose("adams_start.velocities", self)
-
 
 @dataclass(frozen=True)
 class AdamsWalk:
@@ -87,17 +77,21 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
     """Walk a step of the rigid model from Table 2's ADAMS start."""
     walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
-    start = np.array([state])
+    time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
+    end = float(time[-1])
+    if walk.outcome is Outcome.FELL:  # a fall lies behind the last sample, and is found by inverse interpolation
+        hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
+        end = float(np.polynomial.Polynomial.fit(hip, time[-FALLING:], FALLING - 1)(0.0))
     return AdamsStart(
         state=state,
         slope=walker.slope,
         energy=float(energies(walker, start).sum()),
         weight=float(walker.mass * walker.gravity),
         normal_force=float(reactions(walker, start)[0, 1]),
-        pull_from=first_below_zero(walk.samples.time_s, reactions(walker, walk.samples.state)[:, 1]),
+        pull_from=first_below_zero(time, reactions(walker, states)[:, 1]),
         heel_strikes=walk.steps,
         end=walk.outcome.label,
-        end_time=end_time(walker, walk),
+        end_time=end,
     )
 
 
@@ -121,15 +115,6 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
         normal=normal,
         mechanical=mechanical,
     )
-
-
-def end_time(walker: Standing, walk: RigidWalkResult) -> float:
-    """When a sampled walk ends (s): a fall lies behind the last sample, and is found by inverse interpolation."""
-    assert walk.samples is not None
-    time, hip = walk.samples.time_s, np.cos(walk.samples.state[:, 1] + walker.slope) - FALLEN_HIP
-    if walk.outcome is not Outcome.FELL:
-        return float(time[-1])
-    return float(np.polynomial.Polynomial.fit(hip[-FALLING:], time[-FALLING:], FALLING - 1)(0.0))
 
 
 def first_below_zero(time: Array, values: Array) -> float | None:

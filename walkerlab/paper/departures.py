@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.numbers import same
-from walkerlab.config.reads import ContactConfig, RigidConfig
+from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.paper.measured import Departures
@@ -20,47 +20,36 @@ LAWS: Final = ("friction", "terrain", "pad_pitch")
 
 
 def departures(config: ContactConfig, start_moved: bool) -> Departures:
-    """What differs from the paper's scene, in words.
+    """What differs from the paper's scene, in words; the slope is known to the digits of x_p.
 
     start_moved  the walk did not start from the rigid model's fixed point
     """
-    of_rigid = tuple(of_the_rigid_model(config))
-    moved = ("the start is not the rigid model's fixed point",) if start_moved else ()
-    walker, contact = config.walker, config.contact
-    of_contact: tuple[str, ...] = ()
-    if contact is not None and isinstance(walker, CompassWalker):
-        of_contact = tuple(of_the_contact(walker, contact))
-    return Departures(of_rigid, (*of_rigid, *of_contact, *moved))
+    walker, contact, paper = config.walker, config.contact, CompassWalker()
+    rigid: list[str] = []
+    of_contact: list[str] = []
+    if not isinstance(walker, CompassWalker):
+        rigid.append(said("walker.type", walker.type, paper.type))
+    else:
+        compass = [name for name in CompassWalker.model_fields if name not in PHYSICAL_MODEL_ONLY]
+        rigid += [*different(walker, paper, compass), *different(config, Config(), ["gravity_m_s2"])]
+        slope, rounding = slope_of(*X_P[:2])
+        if abs(config.slope_rad - slope) > rounding:
+            rigid.append(said("slope_rad", config.slope_rad, slope))
+        if contact is not None:
+            laws = contact.in_si()
+            of_contact += different(walker, paper, PHYSICAL_MODEL_ONLY)
+            of_contact += different(laws, Contact().in_si(), [field.name for field in fields(laws)])
+            of_contact += different(contact, Contact(), LAWS, "contact.")
+    if start_moved:
+        of_contact.append("the start is not the rigid model's fixed point")
+    return Departures(tuple(rigid), (*rigid, *of_contact))
 
 
-def of_the_rigid_model(config: RigidConfig) -> Iterator[str]:
-    """Walker, gravity and slope; the slope is known to the digits of x_p."""
-    if not isinstance(config.walker, CompassWalker):
-        yield said("walker.type", config.walker.type, CompassWalker().type)
-        return
-    compass = [name for name in CompassWalker.model_fields if name not in PHYSICAL_MODEL_ONLY]
-    yield from different(config.walker, CompassWalker(), compass)
-    yield from different(config, Config(), ["gravity_m_s2"])
-    slope, rounding = slope_of(*X_P[:2])
-    if abs(config.slope_rad - slope) > rounding:
-        yield said("slope_rad", config.slope_rad, slope)
-
-
-def of_the_contact(walker: CompassWalker, contact: Contact) -> Iterator[str]:
-    """Foot, force laws and terrain."""
-    laws, paper = contact.in_si(), Contact()
-    yield from different(walker, CompassWalker(), PHYSICAL_MODEL_ONLY)
-    yield from different(laws, paper.in_si(), [field.name for field in fields(laws)])
-    for name in LAWS:
-        if getattr(contact, name) != getattr(paper, name):
-            yield said(f"contact.{name}", getattr(contact, name), getattr(paper, name))
-
-
-def different(used: Any, paper: Any, names: Iterable[str]) -> Iterator[str]:
-    """The names by which the two have different values."""
+def different(used: Any, paper: Any, names: Iterable[str], block: str = "") -> Iterator[str]:
+    """The names, of a block, by which the two have different values."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
-            yield said(name, getattr(used, name), getattr(paper, name))
+            yield said(f"{block}{name}", getattr(used, name), getattr(paper, name))
 
 
 def said(name: str, *values: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.config.contact import Contact
 from walkerlab.hybrid.comparison import Array
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
+from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies
 from walkerlab.paper.appendix_a import RigidWalker, assembled, step_length
 from walkerlab.solvers.registry import ENDLESS, Tolerances
@@ -94,22 +94,12 @@ class RigidModel:
     energy_drift: float
 
 
-def five_cycles(walker: RigidWalker, start: State) -> RigidWalkResult:
-    """Ten steps of the rigid model with samples in time."""
-    return take_walk(assembled(walker), TIGHT, start, 2 * CYCLES, sampled=True)
-
-
-def energy_record(walker: RigidWalker, walk: RigidWalkResult) -> Array:
-    """Energy (samples,) in J along a sampled walk, from the current stance foot."""
-    if walk.samples is None:
-        raise ValueError("the walk was not sampled")
-    return np.asarray(energies(assembled(walker), walk.samples.state).sum(axis=1))
-
-
 def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
-    """Walk five cycles from a gait's fixed point, and measure."""
-    walk = five_cycles(walker, state)
-    energy = energy_record(walker, walk)
+    """Walk five cycles from a gait's fixed point, and measure; the energy is that from the current stance foot."""
+    model = assembled(walker)
+    walk = take_walk(model, TIGHT, state, 2 * CYCLES, sampled=True)
+    assert walk.samples is not None
+    energy = energies(model, walk.samples.state).sum(axis=1)
     return RigidModel(
         state=state,
         steps=walk.steps,
@@ -191,11 +181,6 @@ class Measured:
     contact: ContactModel
     errors: Errors
     departures: Departures
-
-    @property
-    def as_printed(self) -> RigidModel | None:
-        """The model with (A.5) as printed, if it has a gait."""
-        return self.models.get("as-printed")
 
     @property
     def corrected(self) -> RigidModel | None:

@@ -83,20 +83,18 @@ class StartRow:
         return self.adams.value / self.matlab.value
 
 
-def start_row(name: str, unit: str, matlab: str, adams: str, percent: str) -> StartRow:
-    """A row of Table 2 from its three texts."""
-    return StartRow(
+TABLE_2: Final = tuple(
+    StartRow(
         Printed("Table 2", f"{name}, MATLAB", unit, matlab),
         Printed("Table 2", f"{name}, MSC ADAMS", unit, adams),
         Printed("Table 2", f"{name}, difference rate", "%", percent),
     )
-
-
-TABLE_2: Final = (
-    start_row("theta_1", "rad", "-0.2022", "-0.2021", "+0.1%"),
-    start_row("theta_2", "rad", "0.1674", "0.1670", "+0.15%"),
-    start_row("dtheta_1", "rad/s", "-0.60", "-1.02", "+41%"),
-    start_row("dtheta_2", "rad/s", "-0.84", "-3.20", "+74%"),
+    for name, unit, matlab, adams, percent in (
+        ("theta_1", "rad", "-0.2022", "-0.2021", "+0.1%"),
+        ("theta_2", "rad", "0.1674", "0.1670", "+0.15%"),
+        ("dtheta_1", "rad/s", "-0.60", "-1.02", "+41%"),
+        ("dtheta_2", "rad/s", "-0.84", "-3.20", "+74%"),
+    )
 )
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 from walkerlab.paper import printed
 from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
@@ -13,7 +15,6 @@ from walkerlab.paper.printed import Printed
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
-STEPS_OF_A_STRIDE = 2
 AROUND = 2.0  # 'around 1e-4' is up to twice that
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
@@ -40,266 +41,206 @@ class JudgedNumber:
     @property
     def summary(self) -> dict[str, str | float | None]:
         """As commands print it."""
-        about = {name: getattr(self.printed, name) for name in ("where", "quantity", "unit")}
-        models = {name: getattr(self, name) for name in ("as_printed", "corrected", "contact")}
-        return {
-            **about,
-            "printed": self.printed.text,
-            **models,
-            "verdict": self.verdict.value,
-            "evidence": self.evidence,
-        }
-
-
-def judged(
-    entry: Printed, rigid: Mapping[str, float], contact: float | None, found: tuple[NumberVerdict, str]
-) -> JudgedNumber:
-    """A printed number beside those of the rigid model, by set of equations, and of the contact model."""
-    return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, *found)
-
-
-def weigh(
-    agrees: bool, otherwise: NumberVerdict, departures: tuple[str, ...], evidence: str
-) -> tuple[NumberVerdict, str]:
-    """The verdict and its evidence.
-
-    agrees      the number came out
-    otherwise   what is said if it did not, of the paper's own scene
-    departures  in what the scene is not the paper's: a mismatch refutes nothing then
-    """
-    if agrees:
-        return NumberVerdict.REPRODUCED, evidence
-    if departures:
-        return NumberVerdict.EXPLAINED, f"Not the paper's scene ({'; '.join(departures)}). {evidence}"
-    return otherwise, evidence
-
-
-def regardless(departures: tuple[str, ...], evidence: str) -> str:
-    """The evidence of a verdict that follows from the paper's own numbers, which another scene does not change."""
-    if not departures:
-        return evidence
-    return f"{evidence} The verdict is about the paper's own numbers, not about this scene ({'; '.join(departures)})."
+        entry = self.printed
+        about = {"where": entry.where, "quantity": entry.quantity, "unit": entry.unit, "printed": entry.text}
+        models = {"as_printed": self.as_printed, "corrected": self.corrected, "contact": self.contact}
+        return {**about, **models, "verdict": self.verdict.value, "evidence": self.evidence}
 
 
 REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
+Scene = Literal["rigid", "contact", "any"]
+"""Whose scene has to be the paper's if a mismatch is to refute it: any, for what the paper's own numbers decide."""
 
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     """All rows, in the paper's order."""
-    contact = measured.contact
+    judge, contact, walker = Judge(measured, study), measured.contact, measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
-        yield input_of_both(entry, float(getattr(measured.walker, parameter)), measured.departures.rigid)
-    for coordinate in range(len(printed.COORDINATES)):
-        yield fixed_point_row(printed.X_P[coordinate], coordinate, measured)
-    yield eigenvalue_row(measured)
-    yield input_of_both(printed.LEG_INERTIA, measured.walker.leg_inertia, measured.departures.rigid)
-    yield input_of_contact(printed.FOOT_RADIUS, contact.foot_radius * MM, measured)
-    yield unitless_row(printed.STIFFNESS, contact.law.stiffness, measured)
-    yield unitless_row(printed.DAMPING, contact.law.damping, measured)
-    yield input_of_contact(printed.STATIC_FRICTION, contact.law.static_friction, measured)
-    yield input_of_contact(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, measured)
-    yield lost_balance_row(measured)
-    for entry, table_row in zip(printed.RAISED, printed.TABLE_2[2:], strict=True):
-        yield raised_row(entry, table_row, measured)
-    for coordinate, table_row in enumerate(printed.TABLE_2):
-        yield fixed_point_row(table_row.matlab, coordinate, measured)
-        yield adams_start_row(table_row.adams, coordinate, measured, study)
-        yield percent_row(table_row, coordinate, measured)
-    yield strides_row(measured)
-    yield error_row(printed.ANGLE_ERROR, measured, study, "angle")
-    yield error_row(printed.VELOCITY_ERROR, measured, study, "velocity")
-    yield step_length_row(measured)
-    yield velocity_difference_row(measured)
-    for result in printed.TABLE_3:
-        yield matlab_row(result, measured, study)
-        yield adams_row(result, measured)
-
-
-def input_of_both(entry: Printed, value: float, departures: tuple[str, ...]) -> JudgedNumber:
-    """A parameter of both models."""
-    text = prose("evidence.input", value, entry.unit)
-    verdict, evidence = weigh(value == entry.value, EXPLAINED, departures, text)
-    return JudgedNumber(entry, value, value, value, verdict, evidence)
-
-
-def input_of_contact(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
-    """A parameter of the contact model alone."""
-    agrees = abs(value - entry.value) <= 1e-12 * abs(entry.value)
-    text = prose("evidence.input", value, entry.unit)
-    return judged(entry, {}, value, weigh(agrees, EXPLAINED, measured.departures.contact, text))
-
-
-def fixed_point_row(entry: Printed, coordinate: int, measured: Measured) -> JudgedNumber:
-    """A coordinate of x_p."""
-    values = {name: model.state[coordinate] for name, model in measured.models.items()}
-    found = {name: entry.agreement(value) for name, value in values.items()}
-    text = prose("evidence.fixed_point", values, found)
-    return judged(entry, values, None, weigh(any(found.values()), REFUTED, measured.departures.rigid, text))
-
-
-def eigenvalue_row(measured: Measured) -> JudgedNumber:
-    """Whether the gait is stable."""
-    radii = measured.spectral_radii
-    stable = bool(radii) and all(radius < printed.EIGENVALUES.value for radius in radii.values())
-    text = prose("evidence.eigenvalue", radii)
-    return judged(printed.EIGENVALUES, radii, None, weigh(stable, REFUTED, measured.departures.rigid, text))
-
-
-def unitless_row(entry: Printed, value: float, measured: Measured) -> JudgedNumber:
-    """Stiffness or damping, which are printed without a unit."""
-    text = prose("evidence.unitless", measured.contact)
-    return judged(entry, {}, value, weigh(False, EXPLAINED, measured.departures.contact, text))
-
-
-def lost_balance_row(measured: Measured) -> JudgedNumber:
-    """The failure from MATLAB's initial conditions."""
-    steps, outcome = measured.contact.from_x_p
-    right = None if measured.departures.rigid else measured.corrected
-    short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
-    text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
-    agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
-    return judged(printed.LOST_BALANCE, {}, float(steps), weigh(agrees, REFUTED, measured.departures.contact, text))
-
-
-def raised_percent(measured: Measured, coordinate: int) -> float | None:
-    """How much larger in magnitude the contact model's start is than the rigid gait (%)."""
-    gait = measured.models.get(measured.equations)
-    start = measured.contact.start
-    if gait is None or start is None or gait.state[coordinate] == 0.0:
-        return None
-    return 100.0 * (start[coordinate] / gait.state[coordinate] - 1.0)
-
-
-def velocities_raised(measured: Measured) -> list[float | None]:
-    """The same of both velocities."""
-    return [raised_percent(measured, coordinate) for coordinate in (2, 3)]
-
-
-def raised_row(entry: Printed, table_row: printed.StartRow, measured: Measured) -> JudgedNumber:
-    """An increase of a velocity that section 4 claims: arithmetic, whatever the config."""
-    agrees = bool(entry.agreement(percent_of(table_row).of_matlab))
-    verdict = REPRODUCED if agrees else REFUTED
-    text = prose("evidence.raised", measured.contact, velocities_raised(measured))
-    text = regardless(measured.departures.contact, text)
-    return judged(entry, {}, raised_percent(measured, printed.TABLE_2.index(table_row)), (verdict, text))
-
-
-def percent_row(table_row: printed.StartRow, coordinate: int, measured: Measured) -> JudgedNumber:
-    """A percentage of Table 2: arithmetic, whatever the config."""
-    entry, percent = table_row.percent, percent_of(table_row)
-    agrees = bool(entry.agreement(percent.of_matlab))
-    otherwise = EXPLAINED if entry.agreement(percent.of_adams) else REFUTED
-    verdict = REPRODUCED if agrees else otherwise
-    text = regardless(measured.departures.contact, prose("evidence.percent", percent, verdict))
-    return judged(entry, {}, raised_percent(measured, coordinate), (verdict, text))
-
-
-def adams_start_row(entry: Printed, coordinate: int, measured: Measured, study: PaperStudy) -> JudgedNumber:
-    """A coordinate of the ADAMS start: what it is, whatever the config, and what ours was."""
-    start = measured.contact.start
-    value = None if start is None else start[coordinate]
-    is_angle = coordinate < 2
-    text = prose("evidence.adams_start", study, is_angle, measured.contact, velocities_raised(measured))
-    otherwise = EXPLAINED if is_angle or study.adams.starts_a_gait else REFUTED
-    verdict = REPRODUCED if entry.agreement(value) else otherwise
-    return judged(entry, {}, value, (verdict, regardless(measured.departures.contact, text)))
-
-
-def strides_row(measured: Measured) -> JudgedNumber:
-    """Five gait cycles."""
-    contact, models = measured.contact, measured.models
-    strides = {name: float(model.steps // STEPS_OF_A_STRIDE) for name, model in models.items()}
-    done = contact.steps // STEPS_OF_A_STRIDE
-    went_on = contact.outcome == "walked"
-    text = prose("evidence.strides", contact, done, went_on and done < printed.STRIDES.value)
-    otherwise = EXPLAINED if went_on else REFUTED
-    return judged(
-        printed.STRIDES,
-        strides,
-        float(done),
-        weigh(done >= printed.STRIDES.value, otherwise, measured.departures.contact, text),
-    )
-
-
-def error_row(entry: Printed, measured: Measured, study: PaperStudy, which: str) -> JudgedNumber:
-    """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config."""
-    errors = measured.errors
+        yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
+    for coordinate, entry in enumerate(printed.X_P):
+        yield judge.fixed_point(entry, coordinate)
+    yield judge.eigenvalue()
+    yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM, "contact")
+    for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
+        # printed without a unit
+        yield judge.row(entry, {}, value, False, EXPLAINED, "contact", prose("evidence.unitless", contact))
+    yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
+    yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
+    yield judge.lost_balance()
+    for coordinate, entry in enumerate(printed.RAISED, 2):
+        agrees = bool(entry.agreement(percent_of(printed.TABLE_2[coordinate]).of_matlab))
+        text = prose("evidence.raised", contact, judge.raised[2:])
+        yield judge.row(entry, {}, judge.raised[coordinate], agrees, REFUTED, "any", text)
+    for coordinate, row in enumerate(printed.TABLE_2):
+        yield judge.fixed_point(row.matlab, coordinate)
+        yield judge.adams_start(row.adams, coordinate)
+        yield judge.percent(row, coordinate)
+    yield judge.strides()
     late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
-    off = study.fastest * late if which == "angle" else study.largest_jump
-    ways = {
-        "raw": "at the same time",
-        "aligned": "at the same phase of each step",
-        "between_impacts": "of that outside the impacts",
-        "settled": "and on the last stride",
-    }
-    found = {words: getattr(errors[way], which) for way, words in ways.items() if way in errors}
-    text = prose("evidence.error", entry, late, off, measured.equations, found)
-    raw, aligned = (max(getattr(errors[way], which)) if way in errors else None for way in ("raw", "aligned"))
-    limit = AROUND * entry.value
-    otherwise = EXPLAINED if aligned is not None and aligned <= limit else REFUTED
-    verdict = REPRODUCED if raw is not None and raw <= limit else otherwise
-    text = regardless(measured.departures.contact, text)
-    return judged(entry, {}, raw if aligned is None else aligned, (verdict, text))
+    yield judge.error(printed.ANGLE_ERROR, "angle", late, study.fastest * late)
+    yield judge.error(printed.VELOCITY_ERROR, "velocity", late, study.largest_jump)
+    yield judge.step_length()
+    yield judge.velocity_difference()
+    for result in printed.TABLE_3:
+        yield from judge.table_3(result)
 
 
-def step_length_row(measured: Measured) -> JudgedNumber:
-    """The step length of section 5."""
-    lengths = {name: model.step_length for name, model in measured.models.items()}
-    contact = measured.contact.step_length
-    found = [*lengths.values(), *([] if contact is None else [contact])]
-    text = prose("evidence.step_length", lengths, contact, max(found, default=None))
-    agrees = any(printed.STEP_LENGTH.agreement(length) for length in lengths.values())
-    return judged(printed.STEP_LENGTH, lengths, contact, weigh(agrees, REFUTED, measured.departures.rigid, text))
+@dataclass(frozen=True)
+class Judge:
+    """Holds what the paper prints against what was measured of a config's scene, and of the paper's own."""
 
+    measured: Measured
+    study: PaperStudy
 
-def velocity_difference_row(measured: Measured) -> JudgedNumber:
-    """The difference of the average velocities: ours in the columns, the paper's own arithmetic in words."""
-    contact = measured.contact.table_3.v_com
-    found: dict[str, float] = {}
-    for name, model in measured.models.items():
-        rigid = model.table_3.v_com
-        if rigid and contact is not None:
-            found[name] = 100.0 * abs(contact - rigid) / abs(rigid)
-    sums = speed_difference(
-        printed.T_LEFT.matlab.value + printed.T_RIGHT.matlab.value,
-        printed.T_LEFT.adams.value + printed.T_RIGHT.adams.value,
-    )
-    by_cycle = speed_difference(printed.T_CYCLE.matlab.value, printed.T_CYCLE.adams.value)
-    text = regardless(measured.departures.contact, prose("evidence.velocity_difference", found, by_cycle, sums))
-    agrees = bool(found) and max(found.values()) < printed.VELOCITY_DIFFERENCE.value
-    refuted = REFUTED if sums >= printed.VELOCITY_DIFFERENCE.value else EXPLAINED
-    verdict = REPRODUCED if agrees else refuted
-    return judged(printed.VELOCITY_DIFFERENCE, found, None, (verdict, text))
+    def row(
+        self,
+        entry: Printed,
+        rigid: Mapping[str, float],
+        contact: float | None,
+        agrees: bool,
+        otherwise: NumberVerdict,
+        scene: Scene,
+        evidence: str,
+    ) -> JudgedNumber:
+        """A printed number beside those of the rigid model, by set of equations, and of the contact model.
 
+        agrees     the number came out
+        otherwise  what is said if it did not, of the paper's own scene: in another one a mismatch refutes nothing
+        """
+        departures = self.measured.departures
+        differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
+        verdict = REPRODUCED if agrees else otherwise
+        if differs and scene == "any":
+            evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
+        elif differs and not agrees:
+            verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}). {evidence}"
+        return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, verdict, evidence)
 
-def columns(entry: printed.ResultRow, measured: Measured) -> tuple[dict[str, float], float | None]:
-    """Ours for a row of Table 3: of each set of equations, and of the contact model."""
-    found = {name: getattr(model.table_3, entry.name) for name, model in measured.models.items()}
-    rigid = {name: value for name, value in found.items() if value is not None}
-    return rigid, getattr(measured.contact.table_3, entry.name)
+    @property
+    def raised(self) -> list[float | None]:
+        """How much larger in magnitude each coordinate of the contact model's start is than the rigid gait's (%)."""
+        gait, start = self.measured.models.get(self.measured.equations), self.measured.contact.start
+        if gait is None or start is None:
+            return [None] * len(printed.COORDINATES)
+        pairs = zip(start, gait.state, strict=True)
+        return [None if ours == 0.0 else 100.0 * (begun / ours - 1.0) for begun, ours in pairs]
 
+    def input(self, entry: Printed, value: float, scene: Scene) -> JudgedNumber:
+        """A parameter of both models, or of the contact model alone."""
+        rigid = dict.fromkeys(printed.SIGNS, value) if scene == "rigid" else {}
+        agrees = math.isclose(value, entry.value, rel_tol=1e-12)
+        return self.row(entry, rigid, value, agrees, EXPLAINED, scene, prose("evidence.input", value, entry.unit))
 
-def names_of(entry: printed.ResultRow) -> tuple[str, ...]:
-    """The entries that a row's evidence has; of the step periods both, as they have one cause."""
-    return ("t_left", "t_right") if entry in (printed.T_LEFT, printed.T_RIGHT) else (entry.name,)
+    def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
+        """A coordinate of x_p."""
+        values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
+        found = {name: entry.agreement(value) for name, value in values.items()}
+        text = prose("evidence.fixed_point", values, found)
+        return self.row(entry, values, None, any(found.values()), REFUTED, "rigid", text)
 
+    def eigenvalue(self) -> JudgedNumber:
+        """Whether the gait is stable."""
+        entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
+        stable = bool(radii) and max(radii.values()) < entry.value
+        return self.row(entry, radii, None, stable, REFUTED, "rigid", prose("evidence.eigenvalue", radii))
 
-def matlab_row(entry: printed.ResultRow, measured: Measured, study: PaperStudy) -> JudgedNumber:
-    """A number of Table 3's MATLAB column against the rigid model."""
-    rigid, contact = columns(entry, measured)
-    means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if entry is printed.E_AVG else {}
-    taken = [steps for steps, mean in means.items() if printed.E_AVG.matlab.agreement(mean)]
-    # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
-    otherwise = EXPLAINED if taken else REFUTED
-    text = prose("evidence.matlab", entry, measured, names_of(entry), study, taken)
-    agrees = any(entry.matlab.agreement(value) for value in rigid.values())
-    return judged(entry.matlab, rigid, contact, weigh(agrees, otherwise, measured.departures.rigid, text))
+    def lost_balance(self) -> JudgedNumber:
+        """The failure from MATLAB's initial conditions."""
+        steps, outcome = self.measured.contact.from_x_p
+        right = None if self.measured.departures.rigid else self.measured.corrected
+        short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
+        text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
+        agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
+        return self.row(printed.LOST_BALANCE, {}, float(steps), agrees, REFUTED, "contact", text)
 
+    def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
+        """A percentage of Table 2: arithmetic, whatever the config."""
+        entry, percent = row.percent, percent_of(row)
+        agrees = bool(entry.agreement(percent.of_matlab))
+        otherwise = EXPLAINED if entry.agreement(percent.of_adams) else REFUTED
+        text = prose("evidence.percent", percent, REPRODUCED if agrees else otherwise)
+        return self.row(entry, {}, self.raised[coordinate], agrees, otherwise, "any", text)
 
-def adams_row(entry: printed.ResultRow, measured: Measured) -> JudgedNumber:
-    """A number of Table 3's ADAMS column against the contact model."""
-    rigid, contact = columns(entry, measured)
-    text = prose("evidence.adams", entry, measured, names_of(entry))
-    otherwise = EXPLAINED if contact is None else REFUTED
-    agrees = bool(entry.adams.agreement(contact))
-    return judged(entry.adams, rigid, contact, weigh(agrees, otherwise, measured.departures.contact, text))
+    def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
+        """A coordinate of the ADAMS start: what it is, whatever the config, and what ours was."""
+        contact, start, is_angle = self.measured.contact, self.study.adams, coordinate < 2
+        value = None if contact.start is None else contact.start[coordinate]
+        # whether a foot that can only push carries the rigid model to a heel strike
+        starts_a_gait = start.heel_strikes > 0 and start.pull_from is None
+        otherwise = EXPLAINED if is_angle or starts_a_gait else REFUTED
+        text = prose("evidence.adams_start", self.study, is_angle, contact, self.raised[2:])
+        return self.row(entry, {}, value, bool(entry.agreement(value)), otherwise, "any", text)
+
+    def strides(self) -> JudgedNumber:
+        """Five gait cycles."""
+        entry, contact = printed.STRIDES, self.measured.contact
+        rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
+        done, went_on = contact.steps // 2, contact.outcome == "walked"
+        all_done = done >= entry.value
+        text = prose("evidence.strides", contact, done, went_on and not all_done)
+        return self.row(entry, rigid, float(done), all_done, EXPLAINED if went_on else REFUTED, "contact", text)
+
+    def error(self, entry: Printed, which: str, late: float, off: float) -> JudgedNumber:
+        """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config.
+
+        late, off  by how much Table 3's periods differ (s), and the error that this makes alone
+        """
+        ways = {
+            "raw": "at the same time",
+            "aligned": "at the same phase of each step",
+            "between_impacts": "of that outside the impacts",
+            "settled": "and on the last stride",
+        }
+        errors: dict[str, tuple[float, ...]] = {way: getattr(legs, which) for way, legs in self.measured.errors.items()}
+        found = {words: errors[way] for way, words in ways.items() if way in errors}
+        text = prose("evidence.error", entry, late, off, self.measured.equations, found)
+        raw, aligned = (max(errors[way]) if way in errors else None for way in ("raw", "aligned"))
+        limit = AROUND * entry.value
+        otherwise = EXPLAINED if aligned is not None and aligned <= limit else REFUTED
+        agrees = raw is not None and raw <= limit
+        return self.row(entry, {}, raw if aligned is None else aligned, agrees, otherwise, "any", text)
+
+    def step_length(self) -> JudgedNumber:
+        """The step length of section 5."""
+        entry, contact = printed.STEP_LENGTH, self.measured.contact.step_length
+        lengths = {name: model.step_length for name, model in self.measured.models.items()}
+        longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
+        text = prose("evidence.step_length", lengths, contact, longest)
+        agrees = any(entry.agreement(length) for length in lengths.values())
+        return self.row(entry, lengths, contact, agrees, REFUTED, "rigid", text)
+
+    def velocity_difference(self) -> JudgedNumber:
+        """The difference of the average velocities: ours in the columns, the paper's own arithmetic in words."""
+        entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
+        speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
+        found = {
+            name: 100.0 * abs(contact - rigid) / abs(rigid)
+            for name, rigid in speeds.items()
+            if rigid and contact is not None
+        }
+        left, right, cycle = printed.T_LEFT, printed.T_RIGHT, printed.T_CYCLE
+        by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
+        sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
+        text = prose("evidence.velocity_difference", found, by_cycle, sums)
+        agrees = bool(found) and max(found.values()) < entry.value
+        return self.row(entry, found, None, agrees, REFUTED if sums >= entry.value else EXPLAINED, "any", text)
+
+    def table_3(self, row: printed.ResultRow) -> Iterator[JudgedNumber]:
+        """A row of Table 3: MATLAB's number against the rigid model, and that of ADAMS against the contact model."""
+        measured, study = self.measured, self.study
+        found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        rigid = {name: value for name, value in found.items() if value is not None}
+        contact: float | None = getattr(measured.contact.table_3, row.name)
+        # of the step periods both are told, as they have one cause
+        names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
+        means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
+        taken = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
+        # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
+        otherwise = EXPLAINED if taken else REFUTED
+        text = prose("evidence.matlab", row, measured, names, study, taken)
+        agrees = any(row.matlab.agreement(value) for value in rigid.values())
+        yield self.row(row.matlab, rigid, contact, agrees, otherwise, "rigid", text)
+        otherwise = EXPLAINED if contact is None else REFUTED
+        text = prose("evidence.adams", row, measured, names)
+        yield self.row(row.adams, rigid, contact, bool(row.adams.agreement(contact)), otherwise, "contact", text)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
+from walkerlab.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.paper import measured, printed
 from walkerlab.paper.adams_start import AdamsStart, adams_start
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
@@ -18,7 +19,6 @@ from walkerlab.paper.misprints import (
     height_over_slope,
     inertia_at_impact,
 )
-from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
 
 SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
@@ -26,37 +26,18 @@ FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
 
 
 @dataclass(frozen=True)
-class Impact:
-    """What (A.55) as printed does, at the heel strike of the fixed point of the equations as printed.
-
-    height         m, that it puts the swing foot of x_p over the slope
-    foothold_speed m/s, of the new stance foot after the impact
-    fixed_point    with both misprints; None if there is none nearby
-    """
-
-    height: float
-    foothold_speed: float
-    fixed_point: State | None
-
-
-@dataclass(frozen=True)
-class Ordering:
-    """Kinetic energy (J) of one state: from the masses' velocities, and from D_e with either order of coordinates."""
-
-    of_masses: float
-    angles_first: float
-    foot_first: float
-
-
-@dataclass(frozen=True)
 class PaperStudy:
-    """All of it.
+    """All of it, in SI units.
 
     as_printed, corrected  the gaits that x_p settles to
     from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
     five_steps_energy      J, time mean over the first five steps of these ten
     fastest                rad/s, largest angular velocity of the gait as printed
     largest_jump           rad/s, largest change of an angular velocity at its heel strike
+    swing_foot_height      m, over the slope, where (A.55) as printed puts the swing foot of x_p
+    foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
+    both_misprints         the fixed point with those of (A.5) and (A.55); None if there is none nearby
+    kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
     """
 
     slope: float
@@ -67,41 +48,38 @@ class PaperStudy:
     five_steps_energy: float
     fastest: float
     largest_jump: float
-    impact: Impact
-    ordering: Ordering
+    swing_foot_height: float
+    foothold_speed: float
+    both_misprints: State | None
+    kinetic_energy: Mapping[str, float]
     adams: AdamsStart
-
-    @property
-    def angles_in_words(self) -> str:
-        """On which slopes the feet of the ADAMS start and of x_p stand."""
-        return prose(
-            "adams_start.angles", self, printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)[1]
-        )
 
 
 def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
     wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
-    gaits = {name: settled(printed.walker_of_the_paper(sign)) for name, sign in printed.SIGNS.items()}
-    one_step = take_walk(assembled(wrong), measured.TIGHT, gaits["as-printed"], 1, sampled=True)
-    cycles = measured.five_cycles(wrong, printed.fixed_point_as_printed())
-    five_steps = take_walk(assembled(wrong), measured.TIGHT, printed.fixed_point_as_printed(), measured.ENERGY_STEPS)
+    x_p = printed.fixed_point_as_printed()
+    as_printed, corrected = settled(wrong), settled(right)
+    one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
+    cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.CYCLES, sampled=True)
+    five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)
+    assert one_step.samples is not None
     slope, rounding = printed.slope_of(*printed.X_P[:2])
+    adams_slope, _ = printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)
     return PaperStudy(
         slope=slope,
         slope_rounding=rounding,
-        as_printed=measured.rigid_model(wrong, gaits["as-printed"]),
-        corrected=measured.rigid_model(right, gaits["corrected"]),
+        as_printed=measured.rigid_model(wrong, as_printed),
+        corrected=measured.rigid_model(right, corrected),
         from_x_p=measured.characteristics(cycles.periods_s, cycles.lengths_m, cycles.mean_energy),
         five_steps_energy=five_steps.mean_energy,
-        fastest=fastest_leg(one_step),
+        fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
-        impact=misprinted_impact(wrong, one_step),
-        ordering=order_of_coordinates(right),
-        adams=adams_start(
-            assembled(right._replace(slope=printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)[0])),
-            printed.adams_start_as_printed(),
-        ),
+        swing_foot_height=height_over_slope(wrong, *x_p[:2], MISPRINTED),
+        foothold_speed=foothold_speed_after_impact(wrong, as_state(one_step.before[0]), MISPRINTED),
+        both_misprints=fixed_point(wrong, as_printed, MISPRINTED),
+        kinetic_energy=kinetic_energy_by_order(right),
+        adams=adams_start(assembled(right._replace(slope=adams_slope)), printed.adams_start_as_printed()),
     )
 
 
@@ -113,24 +91,8 @@ def settled(walker: RigidWalker) -> State:
     return walk.final_state
 
 
-def fastest_leg(walk: RigidWalkResult) -> float:
-    """Largest angular velocity (rad/s) of a sampled walk."""
-    assert walk.samples is not None
-    return float(np.abs(walk.samples.state[:, 2:]).max())
-
-
-def misprinted_impact(walker: RigidWalker, one_step: RigidWalkResult) -> Impact:
-    """What (A.55) as printed does to the gait whose step is given."""
-    theta_1, theta_2 = printed.fixed_point_as_printed()[:2]
-    return Impact(
-        height=height_over_slope(walker, theta_1, theta_2, MISPRINTED),
-        foothold_speed=foothold_speed_after_impact(walker, as_state(one_step.before[0]), MISPRINTED),
-        fixed_point=fixed_point(walker, one_step.start, MISPRINTED),
-    )
-
-
-def order_of_coordinates(walker: RigidWalker) -> Ordering:
-    """Kinetic energies at x_p with a moving foot."""
+def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
+    """Kinetic energies (J) at x_p with a moving foot: of the masses, and of D_e with angles or foot first."""
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
     D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
@@ -145,8 +107,8 @@ def order_of_coordinates(walker: RigidWalker) -> Ordering:
         (walker.hip_mass, hip),
         (walker.leg_mass, hip + (L - a) * along_swing),
     ]
-    return Ordering(
-        of_masses=float(sum(0.5 * mass * velocity @ velocity for mass, velocity in moving)),
-        angles_first=float(0.5 * angles_first @ D @ angles_first),
-        foot_first=float(0.5 * foot_first @ D @ foot_first),
-    )
+    return {
+        "masses": float(sum(0.5 * mass * velocity @ velocity for mass, velocity in moving)),
+        "angles_first": float(0.5 * angles_first @ D @ angles_first),
+        "foot_first": float(0.5 * foot_first @ D @ foot_first),
+    }
