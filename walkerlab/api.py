@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
-from typing import Any, cast
+from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.cli.text import in_words
 from walkerlab.config.contact import Contact
@@ -19,7 +19,6 @@ from walkerlab.config.overlay import tree_of
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
-from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import on_the_slope, typed
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import PIPELINE
@@ -28,7 +27,7 @@ from walkerlab.stages.resolve import resolve
 from walkerlab.stages.runner import Options, execute
 from walkerlab.stages.runs import config_of, headline_values, result_in, run_named
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, Stored
+from walkerlab.store.artifact import Damaged
 from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder
 
@@ -41,6 +40,19 @@ MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
 """Arguments that are blocks of a config: what they may be, and what makes them."""
+
+
+class Combined(TypedDict, total=False):
+    """How the values of a sweep's parameters are combined; what is left out is as the config has it.
+
+    zip     the n-th values of all keys make the n-th point
+    sample  points drawn from the intervals instead, as "sobol:64"
+    seed    of that drawing
+    """
+
+    zip: bool
+    sample: str
+    seed: int | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,7 +146,10 @@ class Run:
     def result(self, stage: str) -> Result:
         """The stored result of a stage, whether or not it is up to date; StaleError if there is none to be read."""
         refuse_unknown_stage(stage)
-        return as_result(stage, result_in(self.folder, stage), self.folder.artifact(stage))
+        found = result_in(self.folder, stage)
+        no_answer = found.summary.get("no_answer")
+        said = None if no_answer is None else str(no_answer["message"])
+        return result_of(stage, found.summary, found, said, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
         """A sweep as one xarray Dataset; without a name the only one there is. StaleError if it cannot be read."""
@@ -207,18 +222,16 @@ def sweep(
     runs: str | Path = RUNS,
     *,
     name: str | None = None,
-    zip: bool = False,
-    sample: str = "",
-    seed: int | None = None,
     engine: str = "local",
     jobs: int = 0,
+    **combined: Unpack[Combined],
 ) -> Any:
     """Do what `walkerlab sweep` does, and give its file as one xarray Dataset.
 
-    over    for each key of a config its values, or "FROM:TO:N"
-    name    of the run's folder; None names it after the config and its changes
-    seed    of a drawing; None is the config's
-    jobs    chunks computed at once; 0 leaves it to the engine
+    over      for each key of a config its values, or "FROM:TO:N"
+    name      of the run's folder; None names it after the config and its changes
+    jobs      chunks computed at once; 0 leaves it to the engine
+    combined  zip, sample and seed: how the values are combined, each with each unless they say otherwise
 
     Raises NoAnswer if points were not computed, and WalkerlabError if a bug is why; the others are stored then, for
     `open_run`.
@@ -236,7 +249,9 @@ def sweep(
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
     block = found.loaded.config.sweep or SweepBlock()
-    question = asked(stage, listed, zip, sample, block.seed if seed is None else seed)
+    seed = combined.get("seed")
+    drawn = block.seed if seed is None else seed
+    question = asked(stage, listed, combined.get("zip", False), combined.get("sample", ""), drawn)
     chosen, address = engine_named(engine)
     order = Order(jobs, address, modules_of(stage, found.loaded.config, PIPELINE), found.folder.path)
     swept = SweepRun(question, found.loaded, found.folder).run(SweepWork(chosen, order))
@@ -250,7 +265,7 @@ def walker(type: str, **keys: Any) -> Any:
 
     Raises ConfigError for a key or value that the type does not have.
     """
-    return typed_lines({"walker": {"type": type, **keys}})[0].walker
+    return typed(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
 
 
 def compass(**keys: Any) -> Any:
@@ -277,7 +292,7 @@ def contact(**keys: Any) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    made = typed_lines({"contact": keys})[0].contact
+    made = typed(tree_of({"contact": keys}, NOWHERE)).contact
     assert made is not None, "a block that is given is there"
     return made
 
@@ -399,7 +414,6 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    assert isinstance(upper, Tree)
     tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
     return on_the_slope(typed(tree), tree)[0]
 
@@ -416,13 +430,6 @@ def two_numbers(name: str, values: Any) -> Sequence[Any]:
     if not isinstance(values, Sequence) or len(values) != 2:
         raise ConfigError(f"{name}: {values!r} is not two numbers.", f"For example {name}=(0.001, 0.09).")
     return values
-
-
-def typed_lines(lines: Mapping[str, Any]) -> tuple[Config, Tree]:
-    """Keys of a config, nested, as plain values, as a config; ConfigError for what is wrong with them."""
-    tree = tree_of(dict(lines), NOWHERE)
-    assert isinstance(tree, Tree)
-    return typed(tree), tree
 
 
 def settings(values: Mapping[str, Any] | None) -> list[str]:
@@ -456,12 +463,6 @@ def refuse_unknown_stage(stage: str) -> None:
     names = [one.name for one in PIPELINE.stages]
     if stage not in names:
         raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
-
-
-def as_result(stage: str, found: Stored, path: Path) -> Result:
-    """A stored artifact as a result."""
-    said = found.summary.get("no_answer")
-    return result_of(stage, found.summary, found, None if said is None else str(said["message"]), path)
 
 
 def result_of(

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from walkerlab.errors import CacheWarning
 from walkerlab.sources import Sources, digest_of
 
 PACKAGE = Path(__file__).parent
@@ -77,22 +78,18 @@ def cache_root() -> Path:
 
 @functools.cache
 def _first_usable(candidates: tuple[Path, ...]) -> Path:
-    usable = next((folder for folder in candidates if _writable(folder)), None)
-    folder = usable or Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
+    for folder in candidates:
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                break
+    else:
+        folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
     if folder != candidates[0]:
-        lost = "" if usable else ", which later processes do not find"
+        lost = "" if folder in candidates else ", which later processes do not find"
         said = f"{candidates[0]} cannot be written into: compiled code is kept in {folder}{lost}"
-        warnings.warn(f"{said}. WALKERLAB_CACHE chooses another folder.", RuntimeWarning, stacklevel=3)
+        warnings.warn(f"{said}. WALKERLAB_CACHE chooses another folder.", CacheWarning, stacklevel=3)
     return folder
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
 
 
 @functools.cache

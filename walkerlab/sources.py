@@ -7,6 +7,7 @@ import importlib.util
 import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from itertools import accumulate, chain
 from pathlib import Path
 
 PACKAGE = __name__.partition(".")[0]
@@ -104,7 +105,8 @@ class Module:
         """Names that may be modules it imports, the packages above them and above itself included."""
         names = {self.name, *self._imported(COMMENT.sub("", self.text.decode()).replace("\\\n", " "))}
         own = {PACKAGE, self.name.partition(".")[0]}
-        return sorted({prefix for name in names if name.partition(".")[0] in own for prefix in prefixes(name)})
+        chains = [accumulate(name.split("."), "{}.{}".format) for name in names if name.partition(".")[0] in own]
+        return sorted(set(chain.from_iterable(chains)))
 
     def _imported(self, text: str) -> Iterator[str]:
         for found in IMPORT.finditer(text):
@@ -156,13 +158,6 @@ def data_files(folder: Path) -> Iterator[Path]:
 def first_words(listed: str) -> Iterator[str]:
     """The names in 'a, b as c'."""
     yield from (entry.split()[0] for entry in listed.split(",") if entry.strip())
-
-
-def prefixes(name: str) -> Iterator[str]:
-    """The name of a module and of each package above it."""
-    parts = name.split(".")
-    for end in range(1, len(parts) + 1):
-        yield ".".join(parts[:end])
 
 
 def code_digest(name: str) -> str:

@@ -12,6 +12,7 @@ from walkerlab.benchmarks.contact_trials import SLOWER, near_rigid_trial
 from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
+from walkerlab.errors import ConfigError
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
 from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity
@@ -70,7 +71,7 @@ class Wordless(NamedTuple):
 
 def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
     monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
-    with pytest.raises(TypeError) as said:
+    with pytest.raises(ConfigError) as said:
         contact_scene(load().config, 0.3714)
     assert str(said.value) == (
         "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, with_creep, in_words, "

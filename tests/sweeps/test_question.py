@@ -35,11 +35,11 @@ def test_a_range_of_whole_numbers_is_of_integers_where_the_key_is_one():
 
 
 def test_zip_pairs_values():
-    pairs = question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10, 15]", zipped=True)
+    pairs = question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10, 15]", zip=True)
     assert [pairs.places(index) for index in range(len(pairs))] == [(0, 0), (1, 1), (2, 2)]
     assert pairs.dims == ("point",)
     with pytest.raises(ConfigError, match=r"different numbers of values: slope_deg 3, walker\.hip_mass_kg 2"):
-        question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10]", zipped=True)
+        question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10]", zip=True)
 
 
 @pytest.mark.parametrize("sampler", ["latin-hypercube", "sobol", "random"])

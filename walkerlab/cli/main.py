@@ -1,5 +1,6 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
+import warnings
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -11,11 +12,19 @@ from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
+from walkerlab.errors import CacheWarning
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
 
 def main() -> None:
     """Run the program on this process's arguments, and exit with its code."""
+    as_python_has_it = warnings.formatwarning
+
+    def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
+        own = category is CacheWarning
+        return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
+
+    warnings.formatwarning = worded
     program()()
 
 

@@ -22,9 +22,7 @@ def over_paper(lines: Keys[str, Any], source: str = "the paper's") -> Config:
 
     Raises ConfigError if they are no config; theta_1 of a start is put on the slope without a word.
     """
-    upper = tree_of(dict(lines), Position(source, 1, 1))
-    assert isinstance(upper, Mapping)
-    return block_over_paper(upper)
+    return block_over_paper(tree_of(lines, Position(source, 1, 1)))
 
 
 def block_over_paper(upper: Mapping) -> Config:
@@ -80,13 +78,17 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
         raise refusal([Problem(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")])
 
 
-def tree_of(value: Any, position: Position) -> Node:
-    """Plain values as a tree, all of it at one position."""
-    if isinstance(value, dict):
-        block = Mapping(position)
-        for name, entry in value.items():
-            block.put(str(name), tree_of(entry, position), position)
-        return block
-    if isinstance(value, list | tuple):
-        return Sequence(position, [tree_of(item, position) for item in value])
-    return Scalar(position, value, str(value))
+def tree_of(block: Keys[str, Any], position: Position) -> Mapping:
+    """Plain values by key as a tree, all of it at one position."""
+
+    def node(value: Any) -> Node:
+        if isinstance(value, Keys):
+            return tree_of(value, position)
+        if isinstance(value, list | tuple):
+            return Sequence(position, [node(item) for item in value])
+        return Scalar(position, value, str(value))
+
+    tree = Mapping(position)
+    for name, value in block.items():
+        tree.put(str(name), node(value), position)
+    return tree

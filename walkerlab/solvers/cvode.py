@@ -31,13 +31,13 @@ class CvodeSolver:
         t: float,
         y: Any,
         _t_bound: float,
-        rtol: float,
-        atol: float,
         jac: Callable[[float, Any], Any],
+        **tolerances: float,
     ) -> None:
         """Start at time t from y.
 
-        family  "BDF" or "Adams"
+        family      "BDF" or "Adams"
+        tolerances  rtol and atol
         """
         from sksundae.cvode import CVODE
 
@@ -48,7 +48,7 @@ class CvodeSolver:
         def slopes(t: float, y: Any, _dy: Any, J: Any) -> None:
             J[:, :] = jac(t, np.array(y))
 
-        self.solver = CVODE(rate, method=family, rtol=rtol, atol=atol, jacfn=slopes)
+        self.solver = CVODE(rate, method=family, jacfn=slopes, **tolerances)
         self.solver.init_step(t, y)
         self.t_old, self.t, self.y = t, t, y
         self.status = "running"

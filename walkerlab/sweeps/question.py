@@ -119,7 +119,7 @@ def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
 def asked(
     stage: str,
     over: Sequence[tuple[str, Any, str]],
-    zipped: bool = False,
+    zip: bool = False,
     sample: str = "",
     seed: int = 1,
 ) -> Question:
@@ -140,10 +140,10 @@ def asked(
     for one in axes:
         if not one.values:
             raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
-    if zipped and len({len(one.values) for one in axes}) > 1:
+    if zip and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
-    question = Question(stage, axes, "list" if zipped else "grid")
+    question = Question(stage, axes, "list" if zip else "grid")
     if len(question) > MOST_POINTS:
         raise refusal([Problem(None, f"sweep: {len(question)} points", f"up to {MOST_POINTS} in one sweep")])
     return question
