@@ -169,19 +169,24 @@ def gait_near(
     return found
 
 
-def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
-    """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid.
+def with_contact(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
+    """The walker on ground whose stiffness, damping and velocities of friction are multiplied by these factors.
 
     The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
     """
-    stiffer, stickier = STIFFER**rigidity, STICKIER**rigidity
     normal = walker.normal
-    harder = normal._replace(
-        stiffness=normal.stiffness * stiffer,
-        damping=normal.damping * math.sqrt(stiffer),
-        full_damping_penetration=normal.full_damping_penetration * stiffer ** (-1.0 / normal.exponent),
+    changed = normal._replace(
+        stiffness=normal.stiffness * stiffness,
+        damping=normal.damping * damping,
+        full_damping_penetration=normal.full_damping_penetration * stiffness ** (-1.0 / normal.exponent),
     )
-    return walker._replace(normal=harder, friction=walker.friction.with_creep(1.0 / stickier))
+    return walker._replace(normal=changed, friction=walker.friction.with_creep(creep))
+
+
+def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
+    """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid."""
+    stiffer = STIFFER**rigidity
+    return with_contact(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
 
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait
+from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait, with_contact
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -52,31 +52,22 @@ class ContactFactors(NamedTuple):
 ALL, ALL_POINT = "all", "all, point foot"
 STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "damping", "stiffness and damping"
 HALF_DECADES = math.sqrt(10.0)
+SERIES = {
+    ALL: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    ALL_POINT: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    STICTION: (15, 2.0, (0.0, 0.0, -1.0)),
+    STIFFNESS: (6, HALF_DECADES, (1.0, 0.0, 0.0)),
+    DAMPING: (6, HALF_DECADES, (0.0, 1.0, 0.0)),
+    NORMAL: (9, HALF_DECADES, (1.0, 0.5, 0.0)),
+}
+"""Settings of a series, by how much each is more rigid than the last, and powers of that in the three factors."""
 
 
 def series_of(name: str, every: int = 1) -> list[ContactFactors]:
     """The settings of a series, from the config's contact towards the limit; of these every first, second or so on."""
-    steps = {ALL: 9, ALL_POINT: 9, STICTION: 15, STIFFNESS: 6, DAMPING: 6, NORMAL: 9}[name]
-    ratio = 2.0 if name == STICTION else HALF_DECADES
-    found = []
-    for step in range(steps):
-        factor = ratio**step
-        stiffness = factor if name in (ALL, ALL_POINT, STIFFNESS, NORMAL) else 1.0
-        damping = factor if name == DAMPING else math.sqrt(factor) if name in (ALL, ALL_POINT, NORMAL) else 1.0
-        stiction = 1.0 / factor if name in (ALL, ALL_POINT, STICTION) else 1.0
-        found.append(ContactFactors(name, factor, stiffness, damping, stiction))
-    return found[::every]
-
-
-def with_contact_of(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """The walker on another ground."""
-    normal = walker.normal
-    normal = normal._replace(
-        stiffness=normal.stiffness * setting.stiffness,
-        damping=normal.damping * setting.damping,
-        full_damping_penetration=normal.full_damping_penetration * setting.stiffness ** (-1.0 / normal.exponent),
-    )
-    return walker._replace(normal=normal, friction=walker.friction.with_creep(setting.stiction))
+    count, ratio, powers = SERIES[name]
+    rigidities = [ratio**step for step in range(0, count, every)]
+    return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
 
 
 @dataclass(frozen=True)
@@ -135,13 +126,21 @@ class Limit:
         """
         found: list[Distance] = []
         for setting in series_of(name, self.every):
-            changed = with_contact_of(walker, setting)
+            changed = with_contact(walker, *setting[2:])
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break
-            gait = near
-            check = self.gait(changed, gait, CHECK_TOLERANCE)
-            distance = self.distance(setting, gait, check)
+            gait, step, check = near, near.step, self.gait(changed, near, CHECK_TOLERANCE)
+            off = step.period_s - self.rigid.period
+            distance = Distance(
+                setting,
+                step.period_s,
+                step.length_m,
+                step.slip_m,
+                off,
+                step.length_m - self.rigid.length,
+                abs(off if check is None else check.step.period_s - step.period_s),
+            )
             found.append(distance if start is None else self.walked(distance, changed, start(changed)))
         return found
 
@@ -151,63 +150,43 @@ class Limit:
         found = find_contact_gait(walker, self.ground, how, near.z, near.step.length_m, most=MAX_EVALUATIONS)
         return found if isinstance(found, ContactGait) else None
 
-    def distance(self, setting: ContactFactors, gait: ContactGait, check: ContactGait | None) -> Distance:
-        """Of the gaits alone."""
-        step = gait.step
-        return Distance(
-            setting,
-            step.period_s,
-            step.length_m,
-            step.slip_m,
-            step.period_s - self.rigid.period,
-            step.length_m - self.rigid.length,
-            abs(check.step.period_s - step.period_s) if check is not None else abs(step.period_s - self.rigid.period),
-        )
-
     def walked(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
         """With the whole walk from the rigid start beside."""
-        walk = self.walk(walker, start, WALK_TOLERANCE, self.sampling)
-        check = self.walk(walker, start, WALK_CHECK, None)
-        wall_s = min(self.timed(walker, start) for _ in range(REPEATS))
-        steps = walk.touch_time_s.size
-        if walk.samples is None or steps == 0 or steps != check.touch_time_s.size:
+
+        def walk(tolerance: float, sampling: float | None) -> ContactWalkResult:
+            how = settings(tolerance)
+            return walk_contact(walker, self.ground, False, STANCE_FOOT, start, how, self.steps, sampling)
+
+        sampled, check = walk(WALK_TOLERANCE, self.sampling), walk(WALK_CHECK, None)
+        times = []
+        for _ in range(REPEATS):
+            begun = time.process_time()
+            walk(WALK_TOLERANCE, None)
+            times.append(time.process_time() - begun)
+        steps = sampled.touch_time_s.size
+        if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
-        angle, velocity = motion_of_legs(walk.samples.states, walker)
-        seen = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
-        motion = sampled_at_strikes(seen)
+        legs = motion_of_legs(sampled.samples.states, walker)
+        motion = sampled_at_strikes(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.rigid.motion, phases)
         smooth = between_impacts(motion, self.rigid.motion, phases)
         _, raw = difference_in_time(motion, self.rigid.motion)
-        return Distance(
-            distance.setting,
-            distance.period,
-            distance.length,
-            distance.slip,
-            distance.period_error,
-            distance.length_error,
-            distance.numerical_period,
+        return replace(
+            distance,
             angle=float(np.abs(aligned.angle[smooth]).max()),
             velocity=float(np.abs(aligned.velocity[smooth]).max()),
             raw_angle=float(raw.largest_angle.max()),
             raw_velocity=float(raw.largest_velocity.max()),
-            numerical_time=float(abs(walk.touch_time_s[-1] - check.touch_time_s[-1])),
-            evaluations=int(walk.work[0]),
-            wall_s=wall_s,
+            numerical_time=float(abs(sampled.touch_time_s[-1] - check.touch_time_s[-1])),
+            evaluations=int(sampled.work[0]),
+            wall_s=min(times),
         )
 
-    def walk(self, walker: ContactWalker, start: State, tolerance: float, sampling: float | None) -> ContactWalkResult:
-        """The walk from the rigid start."""
-        return walk_contact(walker, self.ground, False, STANCE_FOOT, start, settings(tolerance), self.steps, sampling)
 
-    def timed(self, walker: ContactWalker, start: State) -> float:
-        """Processor time of the walk (s), which other programs do not lengthen."""
-        begun = time.process_time()
-        self.walk(walker, start, WALK_TOLERANCE, None)
-        return time.process_time() - begun
-
-
-def motion_of_legs(states: NDArray[np.float64], walker: ContactWalker) -> tuple[NDArray[np.float64], ...]:
+def motion_of_legs(
+    states: NDArray[np.float64], walker: ContactWalker
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
     upper, half = walker.legs[:, 0], states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]
@@ -218,15 +197,15 @@ def settings(tolerance: float) -> Tolerances:
     return Tolerances(METHOD, tolerance, ABSOLUTE * tolerance, BUDGET)
 
 
-def observed_orders(distances: list[Distance]) -> NDArray[np.float64]:
+def observed_orders(distances: list[Distance]) -> list[float]:
     """Order with which the period converges along a series, from each three settings in a row."""
     if len(distances) < 3:
-        return np.zeros(0)
-    periods = np.array([one.period for one in distances])
+        return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
-    changes = np.abs(np.diff(periods))
+    changes = np.abs(np.diff([one.period for one in distances]))
     changes = np.maximum(changes, np.finfo(float).tiny)
-    return np.log(changes[:-1] / changes[1:]) / math.log(ratio)
+    orders: list[float] = (np.log(changes[:-1] / changes[1:]) / math.log(ratio)).tolist()
+    return orders
 
 
 @dataclass(frozen=True)
@@ -248,16 +227,8 @@ def extrapolated(distances: list[Distance]) -> Extrapolation | None:
     periods = periods[: silent[0] + 1] if silent.size else periods
     if periods.size < 4:
         return None
-    estimates = [aitken(*periods[-4 + i : -1 + i if i == 0 else None]) for i in range(2)]
-    if any(estimate is None for estimate in estimates):
+    changes = np.diff(periods[-4:])
+    if changes[0] == 0.0 or (np.abs(changes[1:]) >= np.abs(changes[:-1])).any():
         return None
-    before, last = (float(estimate) for estimate in estimates if estimate is not None)
-    return Extrapolation(last, abs(last - before))
-
-
-def aitken(first: float, second: float, third: float) -> float | None:
-    """Aitken's extrapolation of three numbers; None if their changes do not shrink."""
-    one, two = second - first, third - second
-    if one == 0.0 or not abs(two) < abs(one):
-        return None
-    return third + two * two / (one - two)
+    before, last = periods[-2:] + changes[1:] ** 2 / (changes[:-1] - changes[1:])
+    return Extrapolation(float(last), float(abs(last - before)))

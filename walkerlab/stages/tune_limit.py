@@ -145,7 +145,7 @@ def limit_summary(found: LimitFindings) -> dict[str, Any]:
             "settings": [setting(one) for one in walked],
             "first_within_claim": None if first is None else setting(first),
         }
-    orders = {name: [float(order) for order in observed_orders(rows)] for name, rows in found.series.items()}
+    orders = {name: observed_orders(rows) for name, rows in found.series.items()}
     return {"orders": orders, "reaches": reaches, "causes": causes(found)}
 
 
