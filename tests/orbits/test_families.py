@@ -20,7 +20,7 @@ from walkerlab.orbits.attractors import (
 )
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import BranchFollower, Limits, Seed, ValueSpan, period_amplitude
+from walkerlab.orbits.families import BranchFollower, Limits, Seed, ValueSpan, apart
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.plane import curve_through
@@ -253,7 +253,7 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
 def test_a_doubled_branch_is_followed_away_from_its_flip():
     for branch in compass_family():
         if branch.period > 1:
-            parted = [period_amplitude(point.solved, branch.period) for point in branch.points[:3]]
+            parted = [np.linalg.norm(apart(point.solved, branch.period)) for point in branch.points[:3]]
             assert 0.0 < parted[0] < parted[1] < parted[2]
 
 

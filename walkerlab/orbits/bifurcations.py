@@ -10,13 +10,10 @@ Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
-from itertools import combinations
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.continuation import Segment, Solved, root_along
@@ -50,15 +47,9 @@ class GaitEquations:
         return self.scale * float(x[-1])
 
 
-@lru_cache(16)
-def _pairs(d: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    pairs = np.array(list(combinations(range(d), 2)), np.int64)
-    return pairs[:, 0], pairs[:, 1]
-
-
 def on_pairs(DP: Floats) -> Floats:
     """Action of DP (d, d) on pairs of directions: (d (d-1) / 2, same), eigenvalues the products of pairs of DP's."""
-    first, second = _pairs(DP.shape[0])
+    first, second = np.triu_indices(DP.shape[0], 1)
     straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
     crossed = DP[np.ix_(first, second)] * DP[np.ix_(second, first)]
     return np.asarray(straight - crossed)
@@ -66,10 +57,8 @@ def on_pairs(DP: Floats) -> Floats:
 
 def critical_value(kind: Kind, DP: Floats) -> float:
     """The test function of a kind of bifurcation."""
-    if kind == "torus":
-        pairs = on_pairs(DP)
-        return float(np.linalg.det(pairs - np.eye(pairs.shape[0])))
-    return float(np.linalg.det(DP - np.eye(DP.shape[0]) if kind == "fold" else DP + np.eye(DP.shape[0])))
+    acting = on_pairs(DP) if kind == "torus" else DP
+    return float(np.linalg.det(acting + (1.0 if kind == "flip" else -1.0) * np.eye(len(acting))))
 
 
 @dataclass(frozen=True)
@@ -80,6 +69,11 @@ class Bifurcation:
     value: float  # of the parameter
     multiplier: complex
     point: Solved[IteratedMap]
+    segment: Segment[IteratedMap] = field(repr=False)  # of the branch, that it lies on
+
+    def lies_between(self, one: Solved[IteratedMap], other: Solved[IteratedMap]) -> bool:
+        """Whether these two neighbours on the branch are its segment's ends."""
+        return {id(self.segment.first.x), id(self.segment.second.x)} == {id(one.x), id(other.x)}
 
 
 def bifurcation_in(segment: Segment[IteratedMap], kind: Kind, scale: float) -> Bifurcation | None:
@@ -99,7 +93,7 @@ def bifurcation_in(segment: Segment[IteratedMap], kind: Kind, scale: float) -> B
     else:
         target = 1.0 if kind == "fold" else -1.0
         multiplier = complex(min(multipliers, key=lambda m: abs(m - target)))
-    return Bifurcation(kind, scale * float(point.x[-1]), multiplier, point)
+    return Bifurcation(kind, scale * float(point.x[-1]), multiplier, point, segment)
 
 
 @dataclass(frozen=True)
@@ -129,17 +123,18 @@ def eigenvector(A: Floats, value: float) -> Floats:
     return np.asarray(rows[-1])
 
 
-def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[IteratedMap]) -> FlipForm | None:
-    """The normal form at a flip, by differences of exact maps and derivatives; None if a probe cannot be walked.
-
-    segment  the part of the branch that the flip lies on
-    """
+def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
+    """The normal form at a flip, by differences of exact maps and derivatives; None if a probe cannot be walked."""
     A = flip.point.evaluated.data.DP
     v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
     w = w / (w @ v)
-    rate = _growth_rate(flip, segment, v, w)
-    if rate is None:
+    segment = flip.segment
+    s, gap = float(segment.first.tangent @ (flip.point.x - segment.first.x)), 1e-3 * segment.length
+    beside = [segment.at(s + h) for h in (-gap, gap)]
+    passing = [float(w @ point.evaluated.data.DP @ v) for point in beside if isinstance(point, Solved)]
+    if len(passing) < 2:
         return None
+    rate = (passing[0] - passing[1]) / (2.0 * gap)  # at which the multiplier passes -1 along the branch
     form, probe = None, PROBE
     for _ in range(REFINEMENTS):
         found = _cubic(equations, flip, v, w, probe)
@@ -150,15 +145,6 @@ def flip_form(equations: GaitEquations, flip: Bifurcation, segment: Segment[Iter
             break
         probe = 0.2 * form.amplitude
     return form
-
-
-def _growth_rate(flip: Bifurcation, segment: Segment[IteratedMap], v: Floats, w: Floats) -> float | None:
-    """How fast the multiplier passes -1 along the branch."""
-    s = float(segment.first.tangent @ (flip.point.x - segment.first.x))
-    gap = 1e-3 * segment.length
-    beside = [segment.at(s + h) for h in (-gap, gap)]
-    multipliers = [float(w @ point.evaluated.data.DP @ v) for point in beside if isinstance(point, Solved)]
-    return (multipliers[0] - multipliers[1]) / (2.0 * gap) if len(multipliers) == 2 else None
 
 
 def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h: float) -> tuple[Floats, float] | None:

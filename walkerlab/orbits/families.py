@@ -7,7 +7,7 @@ the period is entered along the eigenvector to -1, as far as the flip's normal f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -119,7 +119,6 @@ class GaitBranch:
     ends: tuple[BranchEnd, BranchEnd]
     bifurcations: tuple[Bifurcation, ...]
     crossings: tuple[Crossing, ...]
-    segments: tuple[tuple[Bifurcation, Segment[IteratedMap]], ...] = field(repr=False, default=())
 
     @cached_property
     def values(self) -> Floats:
@@ -136,7 +135,8 @@ class GaitBranch:
             if one.stable:
                 values.append(one.value)
             if one.stable != other.stable:
-                edge = self._edge(one, other)
+                on_it = (b.value for b in self.bifurcations if b.lies_between(one.solved, other.solved))
+                edge = next(on_it, 0.5 * (one.value + other.value))
                 if stable:
                     found.append([*values, edge])
                 values, stable = [edge], other.stable
@@ -149,15 +149,6 @@ class GaitBranch:
         """Whether all of it lies beyond a flip that is not on it: an odd number of multipliers below -1 throughout."""
         on_it = any(one.kind == "flip" for one in self.bifurcations)
         return not on_it and critical_value("flip", self.points[0].solved.evaluated.data.DP) < 0.0
-
-    def _edge(self, one: GaitPoint, other: GaitPoint) -> float:
-        """The bifurcation between two neighbours, of which one is stable."""
-        both = (one.solved.x, other.solved.x)
-        for bifurcation, segment in self.segments:
-            ends = (segment.first.x, segment.second.x)
-            if all(any(np.array_equal(x, end) for end in ends) for x in both):
-                return bifurcation.value
-        return 0.5 * (one.value + other.value)
 
 
 class Seed(NamedTuple):
@@ -190,12 +181,22 @@ class BranchFollower:
         branches = list(known)
         for seed in seeds:
             start = self.solved_at(seed.z, seed.value, seed.steps)
-            if start is None or repeats_sooner(start, seed.steps):
+            if start is None:
                 continue
+            sooner = (step.z - start.x[:-1] for step in start.evaluated.data.steps[: seed.steps - 1])
             like = [branch for branch in branches if branch.period == seed.steps]
-            if any(self.lies_on(branch, start) for branch in like):
+            if any(np.abs(off).max() < SAME for off in sooner) or any(self.lies_on(branch, start) for branch in like):
                 continue
-            found = self.both_ways(start, seed.steps)
+            rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
+            behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
+            ahead = self.trace(rising, seed.steps)
+            found = GaitBranch(
+                seed.steps,
+                (*reversed(behind.points[1:]), *ahead.points),
+                (behind.ends[1], ahead.ends[1]),
+                (*reversed(behind.bifurcations), *ahead.bifurcations),
+                (*reversed(behind.crossings), *ahead.crossings),
+            )
             # between a flip and the first gait beyond it a branch that is known has no points
             if not any(self.lies_on(found, branch.points[0].solved) for branch in like):
                 branches.append(found)
@@ -232,21 +233,13 @@ class BranchFollower:
                 return True
         return False
 
-    def both_ways(self, start: Solved[IteratedMap], period: int) -> GaitBranch:
-        """The branch through a gait, in the order in which the parameter rises at it."""
-        rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
-        ahead = self.trace(rising, period)
-        behind = self.trace(replace(rising, tangent=-rising.tangent), period)
-        return joined(behind, ahead)
-
     def doubled(self, parent: GaitBranch, known: Iterable[GaitBranch]) -> list[GaitBranch]:
         """The branches of twice the period that begin at the flips of a branch."""
         found: list[GaitBranch] = []
-        equations = self.equations(parent.period)
-        for flip, segment in parent.segments:
+        for flip in parent.bifurcations:
             if flip.kind != "flip" or any(ends_at(branch, flip, 2 * parent.period) for branch in (*known, *found)):
                 continue
-            form = flip_form(equations, flip, segment)
+            form = flip_form(self.equations(parent.period), flip)
             start = None if form is None else self.beyond(flip, form, parent.period)
             if start is not None:
                 branch = self.trace(start, 2 * parent.period)
@@ -255,29 +248,29 @@ class BranchFollower:
         return found
 
     def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[IteratedMap] | None:
-        """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away."""
-        doubled = self.equations(2 * period)
+        """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away.
+
+        Its tangent is turned so that the halves of its cycle part further.
+        """
         for halving in range(HALVINGS):
             guess, normal, xi = onto_doubled(flip, form, 0.5**halving)
-            found = corrected(doubled, guess, normal, self.control.tolerance)
+            found = corrected(self.equations(2 * period), guess, normal, self.control.tolerance)
             if isinstance(found, Solved) and np.linalg.norm(found.x - guess) < 0.5 * xi:
-                return self.pointing_apart(found, period)
+                half = self.equations(period).at(found.x)
+                parting = half.value @ (half.jacobian @ found.tangent)
+                return found if parting > 0.0 else replace(found, tangent=-found.tangent)
         return None
-
-    def pointing_apart(self, start: Solved[IteratedMap], period: int) -> Solved[IteratedMap]:
-        """A gait of twice `period` steps with its tangent turned so that the halves of its cycle part further."""
-        equations = self.equations(period)
-        half = equations.at(start.x)
-        parting = half.value @ (half.jacobian @ start.tangent)
-        return start if parting > 0.0 else replace(start, tangent=-start.tangent)
 
     def trace(self, start: Solved[IteratedMap], period: int) -> GaitBranch:
         """The branch from a gait along its tangent until it ends."""
         equations = self.equations(period)
-        points, bifurcations, segments = [self.point(start, period)], [], []
-        crossings: list[Crossing] = []
-        step = min(self.control.first, 0.5 * period_amplitude(start, period))
-        before, last, end = None, start, None
+        points, before, last, end = [self.point(start, period)], None, start, None
+        bifurcations, crossings = list[Bifurcation](), list[Crossing]()
+        step = (
+            min(self.control.first, 0.5 * float(np.linalg.norm(apart(start, period))))
+            if period > 1
+            else self.control.first
+        )
         while end is None:
             if len(points) >= self.limits.points:
                 end = BranchEnd(points[-1].value, f"{self.limits.points} points are used up")
@@ -288,23 +281,19 @@ class BranchFollower:
                 break
             solved, _, step = following
             end, solved = self.within(equations, last, solved)
-            segment = Segment(equations, last, solved, self.control.tolerance)
-            closing = closes(last, solved, period)
-            if closing:
+            if period % 2 == 0 and apart(last, period) @ apart(solved, period) < 0.0:  # the halves changed places
                 end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
                 break
-            for kind in KINDS:
-                bifurcation = bifurcation_in(segment, kind, equations.scale)
-                if bifurcation is not None:
-                    bifurcations.append(bifurcation)
-                    segments.append((bifurcation, segment))
+            segment = Segment(equations, last, solved, self.control.tolerance)
+            located = (bifurcation_in(segment, kind, equations.scale) for kind in KINDS)
+            bifurcations += [one for one in located if one is not None]
             points.append(self.point(solved, period))
             crossings += crossings_between(self.step_map.monitors, points[-2], points[-1])
             if end is None and abs(points[-1].multipliers[0]) > self.limits.growth:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {self.limits.growth:g}-fold a cycle")
             before, last = last, solved
         first = BranchEnd(points[0].value, "start")
-        return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings), tuple(segments))
+        return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def near_enough(self, last: Solved[IteratedMap]) -> Callable[[Solved[IteratedMap]], bool]:
         """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
@@ -361,25 +350,9 @@ def steps_word(n: int) -> str:
     return "step" if n == 1 else "steps"
 
 
-def repeats_sooner(solved: Solved[IteratedMap], period: int) -> bool:
-    """Whether a gait of `period` steps is one of fewer."""
-    steps = solved.evaluated.data.steps[: period - 1]
-    return any(float(np.max(np.abs(step.z - solved.x[:-1]))) < SAME for step in steps)
-
-
 def apart(solved: Solved[IteratedMap], period: int) -> Floats:
     """From a gait's first state to that half a cycle on: zero where it is a gait of half as many steps."""
     return np.asarray(solved.evaluated.data.steps[period // 2 - 1].z - solved.x[:-1])
-
-
-def period_amplitude(solved: Solved[IteratedMap], period: int) -> float:
-    """How far apart the halves of a cycle are; no bound for one step."""
-    return float(np.linalg.norm(apart(solved, period))) if period > 1 else np.inf
-
-
-def closes(last: Solved[IteratedMap], solved: Solved[IteratedMap], period: int) -> bool:
-    """Whether between two neighbours the halves of the cycle changed places: the branch met its parent."""
-    return period % 2 == 0 and float(apart(last, period) @ apart(solved, period)) < 0.0
 
 
 def ends_at(branch: GaitBranch, flip: Bifurcation, period: int) -> bool:
@@ -424,15 +397,3 @@ def crossings_between(monitors: Iterable[Monitor], one: GaitPoint, other: GaitPo
             share = (limit - before) / (after - before)
             found.append(Crossing(monitor, one.value + share * (other.value - one.value)))
     return found
-
-
-def joined(behind: GaitBranch, ahead: GaitBranch) -> GaitBranch:
-    """Two halves of a branch that begin at one gait."""
-    return GaitBranch(
-        ahead.period,
-        (*reversed(behind.points[1:]), *ahead.points),
-        (behind.ends[1], ahead.ends[1]),
-        (*reversed(behind.bifurcations), *ahead.bifurcations),
-        (*reversed(behind.crossings), *ahead.crossings),
-        (*reversed(behind.segments), *ahead.segments),
-    )

@@ -754,13 +754,11 @@ class Mark(NamedTuple):
 
 def marks_on(branch: GaitBranch) -> list[Mark]:
     """The bifurcations of a branch in their order along it."""
-    found = []
-    for one, segment in branch.segments:
-        ends = (segment.first.x, segment.second.x)
-        for index, pair in enumerate(pairwise(branch.points)):
-            if all(any(np.array_equal(point.solved.x, end) for end in ends) for point in pair):
-                found.append(Mark(index, one.kind, one.value, one.point.evaluated.data))
-    return sorted(found, key=lambda mark: mark.after)
+    return [
+        Mark(index, one.kind, one.value, one.point.evaluated.data)
+        for index, (before, after) in enumerate(pairwise(branch.points))
+        for one in branch.bifurcations if one.lies_between(before.solved, after.solved)
+    ]  # fmt: skip
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
