@@ -356,7 +356,7 @@ def test_a_branch_that_uses_up_its_points_says_so():
 class Circle:
     """x^2 + y^2 = 1, which folds twice over either unknown."""
 
-    def at(self, x):
+    def __call__(self, x):
         return Evaluated(Outcome.WALKED, np.array([x @ x - 1.0]), 2.0 * x[None, :], None)
 
 

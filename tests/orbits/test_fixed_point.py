@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.fixed_point import (
-    DAMPING,
     RANDOM_START,
+    SHORTEST_MOVE,
     Gait,
     Search,
     SearchSettings,
@@ -59,7 +59,7 @@ def shooting(walker):
 
 
 def solve(shooting, walker, z, tolerance):
-    return newton(StepEquations(shooting, section_of(assembled(walker))), np.array(z), tolerance, 60, DAMPING)
+    return newton(StepEquations(shooting, section_of(assembled(walker))), np.array(z), tolerance, 60, SHORTEST_MOVE)
 
 
 # from two other integrations of the same equations

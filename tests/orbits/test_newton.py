@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.newton import Damping, Evaluated, NotConverged, Solution, newton
+from walkerlab.orbits.newton import Evaluated, NotConverged, Solution, newton
 
 
 class Counted:
@@ -13,7 +13,7 @@ class Counted:
     def __init__(self, f, slope):
         self.f, self.slope, self.evaluations = f, slope, 0
 
-    def at(self, x):
+    def __call__(self, x):
         self.evaluations += 1
         with np.errstate(invalid="ignore"):
             value = np.array([self.f(x[0])])
@@ -28,7 +28,7 @@ def flat_arc():
 
 def test_a_move_that_overshoots_is_halved_where_that_is_asked_for():
     # beyond 1.39 Newton's method on the arc tangent runs away
-    damped = newton(flat_arc(), np.array([3.0]), 1e-14, 60, Damping(2.0**-8))
+    damped = newton(flat_arc(), np.array([3.0]), 1e-14, 60, 2.0**-8)
     assert isinstance(damped, Solution)
     assert damped.x[0] == pytest.approx(0.0, abs=1e-14)
     assert isinstance(newton(flat_arc(), np.array([3.0]), 1e-14), NotConverged)
@@ -38,7 +38,7 @@ def test_a_move_that_leads_where_there_is_no_value_is_halved_or_told():
     def root():
         return Counted(lambda x: np.sqrt(x) - 0.1, lambda x: 0.5 / np.sqrt(x))
 
-    found = newton(root(), np.array([1.0]), 1e-12, 60, Damping(2.0**-8))
+    found = newton(root(), np.array([1.0]), 1e-12, 60, 2.0**-8)
     assert found.x[0] == pytest.approx(0.01, abs=1e-11)
     assert newton(root(), np.array([1.0]), 1e-12) == NotConverged(Outcome.FELL)
 
@@ -55,5 +55,5 @@ def test_a_singular_matrix_is_told():
 
 def test_it_evaluates_no_more_often_than_it_may():
     runaway = flat_arc()
-    newton(runaway, np.array([3.0]), 1e-14, 5, Damping(1e-3, 1e9))
+    newton(runaway, np.array([3.0]), 1e-14, 5, 1e-3, 1e9)
     assert runaway.evaluations == 5

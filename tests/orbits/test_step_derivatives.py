@@ -68,11 +68,11 @@ def test_rigid_step_maps_derivative_is_its_slope(name, offset):
     z = np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT[offset])
 
     def ends(z):
-        here = of_walker.at(z)
+        here = of_walker(z)
         assert here.outcome is Outcome.WALKED
         return here.data.z[0]
 
-    DP = of_walker.at(z).data.DP[0]
+    DP = of_walker(z).data.DP[0]
     np.testing.assert_allclose(DP, slope_of(ends, z, [1e-3] * 3), rtol=0.0, atol=AGREEMENT)
 
 

@@ -35,7 +35,7 @@ class GaitEquations:
         """Gaits of `period` steps; `scale` makes the parameter of magnitude one."""
         self.step_map, self.period, self.scale = step_map, period, scale
 
-    def at(self, x: Floats) -> Evaluated[IteratedMap]:
+    def __call__(self, x: Floats) -> Evaluated[IteratedMap]:
         """Residual and its derivative at x (d + 1,)."""
         z = x[:-1]
         cycle = walk_steps(self.step_map, z, self.value(x), self.period)

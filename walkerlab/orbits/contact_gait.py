@@ -20,7 +20,7 @@ from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_map import SectionStep, coordinates_of, step_from_section
 from walkerlab.orbits.continuation import Follower, Strides, Way
-from walkerlab.orbits.newton import Damping, Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import Evaluated, NotConverged, newton
 from walkerlab.orbits.step_map import multipliers_of
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
@@ -31,7 +31,7 @@ WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes 
 NEWTON_STEPS = 10  # steps walked in one search by Newton's method
 BUDGET_OF_A_STEP = 40_000  # right-hand sides
 GAIT_RESIDUAL = 1e-10
-DAMPING = Damping(1e-3, 2.0)
+DAMPING = 1e-3, 2.0  # see `newton`
 # nearly rigid ground, by which factor its laws differ from the wanted ones
 STIFFER, STICKIER = 100.0, 30.0
 FIRST_STRIDE, STRIDES = 0.25, Strides(1.0, 0.02, 2)  # of the way from nearly rigid to the wanted ground
@@ -53,21 +53,6 @@ class ContactGait:
         return bool(abs(self.multipliers[0]) < 1.0)
 
 
-class OnOwnPads:
-    """P(z) - z = 0 of a walker on compliant ground, whose pads are laid for the step that it has just taken."""
-
-    def __init__(self, walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, pitch_m: float) -> None:
-        """The first step is on pads of the pitch that is given."""
-        self.walker, self.ground, self.tolerances, self.pitch_m = walker, ground, tolerances, pitch_m
-
-    def at(self, z: Floats) -> Evaluated[SectionStep]:
-        """Residual and its derivative at section coordinates z."""
-        step = step_from_section(self.walker, self.ground, self.tolerances, z, self.pitch_m)
-        if step.outcome is Outcome.WALKED:
-            self.pitch_m = step.length_m
-        return Evaluated(step.outcome, step.z - z, step.DP - np.eye(z.size), step)
-
-
 def find_contact_gait(
     walker: ContactWalker,
     ground: JudgedGround,
@@ -83,7 +68,16 @@ def find_contact_gait(
     residual  of the gait
     most      how many steps may be walked in search of it
     """
-    found = newton(OnOwnPads(walker, ground, tolerances, pitch_m), z, residual, most, DAMPING, 1.0)
+
+    def on_own_pads(z: Floats) -> Evaluated[SectionStep]:
+        """P(z) - z, whose pads are laid for the step that was taken last."""
+        nonlocal pitch_m
+        step = step_from_section(walker, ground, tolerances, z, pitch_m)
+        if step.outcome is Outcome.WALKED:
+            pitch_m = step.length_m
+        return Evaluated(step.outcome, step.z - z, step.DP - np.eye(z.size), step)
+
+    found = newton(on_own_pads, z, residual, most, *DAMPING, 1.0)
     if isinstance(found, NotConverged):
         return found
     here = found.evaluated

@@ -107,26 +107,17 @@ class Solved(Generic[D]):
     corrections: int
 
 
-@dataclass(frozen=True)
-class OnPlane(Generic[D]):
-    """The equations of a curve, and that a point lies on the plane through `point` with a normal."""
-
-    equations: Equations[D]
-    point: Floats
-    normal: Floats
-
-    def at(self, x: Floats) -> Evaluated[D]:
-        """Value and derivative at x (m + 1,)."""
-        here = self.equations.at(x)
-        value = np.append(here.value, self.normal @ (x - self.point))
-        return here._replace(value=value, jacobian=np.vstack((here.jacobian, self.normal)))
-
-
 def corrected(
     equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_EVALUATIONS
 ) -> Solved[D] | NotConverged:
     """The point of a curve on the plane through `guess` with that normal, by Newton's method from there."""
-    found = newton(OnPlane(equations, guess, normal), guess, tolerance, most)
+
+    def on_plane(x: Floats) -> Evaluated[D]:
+        here = equations(x)
+        value = np.append(here.value, normal @ (x - guess))
+        return here._replace(value=value, jacobian=np.vstack((here.jacobian, normal)))
+
+    found = newton(on_plane, guess, tolerance, most)
     if isinstance(found, NotConverged):
         return found
     ahead = np.zeros(guess.size)

@@ -256,7 +256,7 @@ class BranchFollower:
             guess, normal, xi = onto_doubled(flip, form, 0.5**halving)
             found = corrected(self.equations(2 * period), guess, normal, self.control.tolerance)
             if isinstance(found, Solved) and np.linalg.norm(found.x - guess) < 0.5 * xi:
-                half = self.equations(period).at(found.x)
+                half = self.equations(period)(found.x)
                 parting = half.value @ (half.jacobian @ found.tangent)
                 return found if parting > 0.0 else replace(found, tangent=-found.tangent)
         return None

@@ -15,7 +15,7 @@ import numpy as np
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Damping, Floats, NotConverged, Solution, newton
+from walkerlab.orbits.newton import Floats, NotConverged, Solution, newton
 from walkerlab.orbits.shooting import EXACT, NEW, Shooting, StepEquations, Steps, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
@@ -27,7 +27,7 @@ RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
 SAME = 1e-5  # relative distance of states below which two searches found one gait
 LOOKING = Tolerances("dop853", 1e-7, 1e-10, 20_000)
-MAX_EVALUATIONS, DAMPING = 60, Damping(2.0**-8)  # of Newton's method
+MAX_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # of Newton's method
 # on the way from a vanishing slope
 STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # of the logarithm of the slope's cube root
 EVALUATIONS_ON_THE_WAY = 20
@@ -223,7 +223,7 @@ class SlopeBranch:
         """(y, T) near where it is expected; None if Newton's method finds no gait there."""
         s = math.exp(log_s)
         equations = StepEquations(self.shooting, section_of(on_slope(self.walker, s**3)))
-        solved = newton(equations, state_at(s, expected), LOOSE * s, EVALUATIONS_ON_THE_WAY, DAMPING)
+        solved = newton(equations, state_at(s, expected), LOOSE * s, EVALUATIONS_ON_THE_WAY, SHORTEST_MOVE)
         if isinstance(solved, NotConverged):
             return None
         found = scaled(s, solved.x, float(solved.evaluated.data.time[0]))
@@ -326,7 +326,7 @@ class Search:
     def solved(self, z: Floats) -> Solution[Steps] | NotConverged:
         """The fixed point near z, to rounding."""
         least, enough = self.settings.solved_residual, self.settings.residual
-        return newton(self.equations, z, least, MAX_EVALUATIONS, DAMPING, enough / least)
+        return newton(self.equations, z, least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
 
     def known(self, z: Floats, by: str) -> bool:
         """Whether z is one of the gaits found, which is then noted to be found again."""

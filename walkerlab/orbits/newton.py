@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +37,8 @@ class Evaluated(NamedTuple, Generic[D]):
         return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
 
 
-class Equations(Protocol[D]):
-    """m equations, in m unknowns for a point and in one more for a curve."""
-
-    def at(self, x: Floats) -> Evaluated[D]:
-        """Value and derivative at x."""
+Equations = Callable[[Floats], Evaluated[D]]
+"""m equations at x: value and derivative; in m unknowns for a point, in one more for a curve."""
 
 
 @dataclass(frozen=True)
@@ -64,27 +62,13 @@ class NotConverged:
     singular: bool = False
 
 
-@dataclass(frozen=True)
-class Damping:
-    """Which moves are halved, as shares of Newton's own.
-
-    shortest  that is not halved any more
-    growth    of the residual from which on a move is
-    """
-
-    shortest: float
-    growth: float = 1.0
-
-
-UNDAMPED = Damping(1.0)
-
-
 def newton(
     equations: Equations[D],
     guess: Floats,
     tolerance: float,
     most: int = MAX_EVALUATIONS,
-    damping: Damping = UNDAMPED,
+    shortest: float = 1.0,
+    growth: float = 1.0,
     rounding: float = ROUNDING,
 ) -> Solution[D] | NotConverged:
     """Solve m equations in m unknowns.
@@ -92,6 +76,8 @@ def newton(
     guess      (m,)
     tolerance  on the residual
     most       evaluations of the equations
+    shortest   share of a move that is not halved any more
+    growth     of the residual from which on a move is
     rounding   tolerances that a residual may be large which a move does not halve
 
     Returns the point, or with which outcome the equations could not be evaluated or did not converge.
@@ -99,7 +85,7 @@ def newton(
     # Imported here: what solves nothing does without. It takes a quarter of the time of numpy's.
     from scipy.linalg.lapack import dgesv
 
-    x, here, corrections, evaluations = guess, equations.at(guess), 0, 1
+    x, here, corrections, evaluations = guess, equations(guess), 0, 1
     residual = here.residual
     while tolerance < residual < np.inf:
         *_, move, singular = dgesv(here.jacobian, -here.value)
@@ -109,13 +95,13 @@ def newton(
         while True:
             if evaluations >= most:
                 return NotConverged(Outcome.WALKED)
-            ahead = equations.at(x + share * move)
+            ahead = equations(x + share * move)
             evaluations += 1
             left = ahead.residual
             if 0.5 * residual <= left < np.inf and min(residual, left) <= rounding * tolerance:
                 better = left < residual
                 return Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, here, corrections)
-            if left < damping.growth * residual or share <= damping.shortest:
+            if left < growth * residual or share <= shortest:
                 break
             share *= 0.5
         x, here, residual, corrections = x + share * move, ahead, left, corrections + 1

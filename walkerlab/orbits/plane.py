@@ -61,7 +61,7 @@ class CriticalGaits:
         cycle = walk_steps(step_map, x[:-2], float(x[-2]) * self.scales[0], self.period)
         return cycle if cycle.outcome is Outcome.WALKED else None
 
-    def at(self, x: Floats) -> Evaluated[IteratedMap | None]:
+    def __call__(self, x: Floats) -> Evaluated[IteratedMap | None]:
         """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
         d = x.size - 2
         here = self.cycle(x)

@@ -234,7 +234,7 @@ class StepEquations:
         """Steps of `shooting` from a walker's section."""
         self.shooting, self.section, self.unity = shooting, section, np.eye(len(section.basis))
 
-    def at(self, z: Floats) -> Evaluated[Steps]:
+    def __call__(self, z: Floats) -> Evaluated[Steps]:
         """Residual and its derivative at z (d,)."""
         step = self.shooting.walk(self.section, z)
         if step.outcome is not Outcome.WALKED:
