@@ -7,8 +7,9 @@ The paper raised both velocities by hand until its contact model walked. Here a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ MARGIN_STEP = 0.02  # how far apart factors are tried until one fails
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
 HALVINGS = 14
 ZOOMS, ZOOM_CELLS = 4, 4  # grids ever finer around the best start, each so many cells to either side
+OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
 class StartTrial(NamedTuple):
@@ -128,55 +130,37 @@ DIRECTIONS = (
 )
 
 
-class MarginSearch(NamedTuple):
-    """How margins are searched: how far apart factors are tried until one fails, and up to which factor."""
-
-    step: float = MARGIN_STEP
-    largest: float = LARGEST_FACTOR
-
-
-FINE = MarginSearch()
-
-
 def margins(
-    starts: ScaledStarts, around: tuple[float, float] = (1.0, 1.0), search: MarginSearch = FINE
+    starts: ScaledStarts,
+    around: tuple[float, float] = (1.0, 1.0),
+    step: float = MARGIN_STEP,
+    largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
-    """How far the velocities of a start that walks may be scaled before it fails, alone and together."""
-    return [margin(starts, around, name, (swing, stance), search) for name, swing, stance in DIRECTIONS]
+    """How far the velocities of a start that walks may be scaled before it fails, alone and together.
 
+    step     how far apart factors are tried until one fails; then the last interval is halved
+    largest  factor that is tried
+    """
+    found = []
+    for name, *way in DIRECTIONS:
 
-def margin(
-    starts: ScaledStarts, around: tuple[float, float], name: str, way: tuple[float, float], search: MarginSearch = FINE
-) -> Margin:
-    """Walk ever farther one way until it fails, then halve the last interval."""
+        def trial(change: float, way: Sequence[float] = way) -> StartTrial:
+            return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
 
-    def trial(change: float) -> StartTrial:
-        return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
-
-    up = max(way) > 0.0
-    limit = search.largest - 1.0 if up else 1.0 - SMALLEST_FACTOR
-    good, change = 0.0, 0.0
-    while good < limit:
-        change = min(good + search.step, limit)
-        failure = trial(change)
-        if not failure.walks:
-            return halved(trial, name, good, change, failure, 1.0 if up else -1.0)
-        good = change
-    return Margin(name, 1.0 + (good if up else -good), None)
-
-
-def halved(
-    trial: Callable[[float], StartTrial], name: str, good: float, bad: float, failure: StartTrial, sign: float
-) -> Margin:
-    """The edge between a change that walks and one that fails."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (good + bad)
-        result = trial(middle)
-        if result.walks:
-            good = middle
-        else:
-            bad, failure = middle, result
-    return Margin(name, 1.0 + sign * good, failure)
+        sign = 1.0 if max(way) > 0.0 else -1.0
+        limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
+        good, bad, failure = 0.0, limit, None
+        halvings = 0
+        while good < limit and halvings <= HALVINGS:
+            change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
+            tried = trial(change)
+            if tried.walks:
+                good = change
+            else:
+                bad, failure = change, tried
+            halvings += failure is not None
+        found.append(Margin(name, 1.0 + sign * good, failure))
+    return found
 
 
 @dataclass(frozen=True)
@@ -210,24 +194,16 @@ def smallest_change(
         best, spacing = (float(swing), float(stance)), np.array(cell)
         for _ in range(ZOOMS):
             spacing = spacing / ZOOM_CELLS
-            best = nearest_that_walks(starts, quick, best, spacing)
+            grid = np.array(best) + spacing * OFFSETS
+            distance = np.hypot(*(grid - 1.0).T)
+            nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
+            nearest_first = (
+                tuple(grid[index].tolist()) for index in nearer[np.argsort(distance[nearer], kind="stable")]
+            )
+            both = (point for point in nearest_first if quick.walk(*point).walks and starts.walk(*point).walks)
+            best = next(both, best)
         return Adjustment(*best, starts.walk(*best))
     return None
-
-
-def nearest_that_walks(
-    starts: ScaledStarts, quick: ScaledStarts, best: tuple[float, float], spacing: np.ndarray
-) -> tuple[float, float]:
-    """The point nearest to (1, 1) that walks, of a grid around the best so far."""
-    offsets = np.arange(-ZOOM_CELLS, ZOOM_CELLS + 1)
-    grid = np.array([np.array(best) + spacing * (i, j) for i in offsets for j in offsets])
-    distance = np.hypot(*(grid - 1.0).T)
-    nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
-    for index in nearer[np.argsort(distance[nearer], kind="stable")]:
-        point = (float(grid[index, 0]), float(grid[index, 1]))
-        if quick.walk(*point).walks and starts.walk(*point).walks:
-            return point
-    return best
 
 
 # ---- the map behind it: which scaled starts walk, on the ground and in the rigid model -------------------------------
@@ -264,18 +240,15 @@ def rigid_map(
     walker: Standing, state: State, swing: NDArray[np.float64], stance: NDArray[np.float64], steps: int
 ) -> StartMap:
     """The same starts in the rigid model, whose ground may also pull: then the outcome is `lifted-off`."""
-    rows = []
-    for factor_2 in stance:
-        row = []
-        for factor_1 in swing:
-            start = with_scaled_rates(walker, state, float(factor_1), float(factor_2))
-            walk = take_walk(walker, RIGID, start, steps)
-            row.append((int(walk.outcome), walk.steps, walk.steps == steps))
-        rows.append(np.array(row, np.int64))
-    return as_map(swing, stance, rows)
+
+    def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
+        walk = take_walk(walker, RIGID, with_scaled_rates(walker, state, factor_1, factor_2), steps)
+        return int(walk.outcome), walk.steps, walk.steps == steps
+
+    rows = [[cell(one, other) for one in swing.tolist()] for other in stance.tolist()]
+    return as_map(swing, stance, list(np.array(rows, np.int64)))
 
 
-def as_map(swing: NDArray[np.float64], stance: NDArray[np.float64], rows: list[Integers]) -> StartMap:
+def as_map(swing: NDArray[np.float64], stance: NDArray[np.float64], rows: Sequence[Integers]) -> StartMap:
     """The map of its rows (columns, 3)."""
-    outcome, steps, settled = np.moveaxis(np.stack(rows), 2, 0)
-    return StartMap(swing, stance, outcome, steps, settled)
+    return StartMap(swing, stance, *np.moveaxis(np.stack(rows), 2, 0))

@@ -25,7 +25,6 @@ from walkerlab.orbits.scaled_starts import (
     TOLERANCES,
     Adjustment,
     Margin,
-    MarginSearch,
     ScaledStarts,
     as_map,
     contact_row,
@@ -58,7 +57,7 @@ LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least,
 RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
-COMPASS_CELLS, CELLS, COARSE = 61, 21, MarginSearch(step=0.05, largest=2.0)
+COMPASS_CELLS, CELLS, COARSE = 61, 21, {"step": 0.05, "largest": 2.0}
 WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
 OF_WALK = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
 """What is printed of each of the procedure's walks."""
@@ -148,7 +147,7 @@ class TuneRun:
         self.adjustment = self.adjusted(quick)
         if self.adjustment is not None:
             factors = self.adjustment.swing, self.adjustment.stance
-            self.margins = margins(self.starts, factors, MarginSearch() if self.hinge else COARSE)
+            self.margins = margins(self.starts, factors, **({} if self.hinge else COARSE))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_the_papers(self.config.walker):
