@@ -157,13 +157,6 @@ def tell_methods(scene: str, results: Results) -> tuple[Any, ...]:
     return summary["conclusions"][scene], reference, itself, failures
 
 
-def methods_on(scene: str) -> Illustration:
-    """The figure of one scene."""
-    need = Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"it did not measure the scene {scene}")
-    plot, told = partial(plot_methods, scene), partial(tell_methods, scene)
-    return Illustration(f"accuracy-{scene}", (need,), plot, told, words="accuracy", scene=scene)
-
-
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
 OF_A_SERIES = ("step_s", "error", "wall_s", "period_s", "outcome")
 ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *OF_A_SERIES)
@@ -254,14 +247,6 @@ def tell_periods(scene: str, results: Results) -> tuple[Any, ...]:
     return results[ENGINES_STAGE].summary["conclusions"][scene][OWN_LAW], failed
 
 
-def engines_on(scene: str) -> Iterator[Illustration]:
-    """The figures of one scene."""
-    need = Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
-    for about, plot, told in (("errors", plot_errors, tell_errors), ("periods", plot_periods, tell_periods)):
-        made = partial(plot, scene), partial(told, scene)
-        yield Illustration(f"engines-{about}-{scene}", (need,), *made, words=f"engines-{about}", scene=scene)
-
-
 ALIGNED, NUMERICAL, WALL = "angle_error_rad", "numerical_time_s", "wall_s"
 LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
 ERRORS: Final = {
@@ -313,6 +298,22 @@ def tell_limit(results: Results) -> tuple[Any, ...]:
     return first[0], first[-1], point_feet[0][-1] if point_feet else None, claim
 
 
-ACCURACY = tuple(methods_on(scene) for scene in ("rigid", "contact", "contact-near-rigid"))
-ENGINES = (*engines_on("compass"), *engines_on("kneed"))
+SCENES = ("rigid", "contact", "contact-near-rigid")
+MEASURED = {
+    scene: Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"it did not measure the scene {scene}")
+    for scene in SCENES
+}
+WALKED = {
+    scene: Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
+    for scene in ("compass", "kneed")
+}
+FIGURES = tuple(
+    Illustration(f"{about}-{scene}", (need,), partial(plot, scene), partial(told, scene), words=about, scene=scene)
+    for about, needs, plot, told in (
+        ("accuracy", MEASURED, plot_methods, tell_methods),
+        ("engines-errors", WALKED, plot_errors, tell_errors),
+        ("engines-periods", WALKED, plot_periods, tell_periods),
+    )
+    for scene, need in needs.items()
+)
 FIGURE_12 = paper_figure(12, (LIMIT,), plot_limit, tell_limit)

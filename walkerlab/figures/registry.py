@@ -5,11 +5,10 @@ from __future__ import annotations
 from walkerlab.figures import costs, families, ground, maps, stick_diagram, walks
 from walkerlab.figures.illustration import Illustration
 
-NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, costs.FIGURE_12, *families.FIGURES)
+NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES)
 FIGURES: tuple[Illustration, ...] = (
-    *sorted(NUMBERED, key=lambda figure: figure.name),
+    *sorted((costs.FIGURE_12, *NUMBERED), key=lambda figure: figure.name),
     *ground.FIGURES,
-    *costs.ACCURACY,
-    *costs.ENGINES,
+    *costs.FIGURES,
     *maps.STABILITY,
 )

@@ -162,8 +162,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     draw_postures(axes, sticks, at_strikes, FULL)
     shown = slice(0, int(rows.max()) + 1)
     axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
-    name_landings(axes, sticks)
-    show_direction(axes, sticks, sticks.top[shown])
+    annotate(axes, sticks, sticks.top[shown])
     return figure, axes
 
 
@@ -178,35 +177,33 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     """Legs, soles and torso at some samples, the legs told apart by colour, line and foot."""
     hip = sticks.in_plane(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
-        for line in sticks.in_plane(sticks.leg(leg)[rows]):
-            axes.plot(
-                *line.T, color=look.colour, linestyle=look.style, linewidth=width, marker=look.marker,
-                markevery=[*range(1, len(line))], markersize=2.0 + width, zorder=look.order + width,
-            )  # fmt: skip
+        lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
+        dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
+        style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
+        axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
         if sticks.radius > SMALL_FOOT * sticks.leg_length:
-            for sole in sticks.in_plane(sticks.sole(leg)[rows]):
-                axes.plot(*sole.T, color=look.colour, linewidth=width, zorder=look.order + width)
+            axes.plot(*sticks.in_plane(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
     if sticks.head is not None:
-        for line in zip(hip, sticks.in_plane(sticks.head[rows]), strict=True):
-            axes.plot(*np.transpose(line), color=BLACK, linewidth=width, zorder=7)
+        axes.plot(
+            *np.stack((hip, sticks.in_plane(sticks.head[rows])), axis=1).T, color=BLACK, linewidth=width, zorder=7
+        )
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
 
-def name_landings(axes: Axes, sticks: Sticks) -> None:
-    """Where and when feet came down, under the ground."""
+def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
+    """Where and when feet came down, under the ground; the walking direction and the slope over the walker.
+
+    path  (samples, 2) of the walker's highest point
+    """
+    length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for along, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
-        x, y = sticks.in_plane(np.array([along, -0.03 * sticks.leg_length]))
+        x, y = sticks.in_plane(np.array([along, -0.03 * length]))
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
             f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
             arrowprops=arrow, ha="center", va="top", fontsize=matplotlib.rcParams["xtick.labelsize"],
         )  # fmt: skip
-
-
-def show_direction(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """An arrow along the slope over the path of the walker's highest point (samples, 2), and the slope in numbers."""
-    length = sticks.leg_length
     height = path[:, 1].max() + 0.09 * length
     middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
     tail, head = sticks.in_plane(np.array([[middle - half, height], [middle + half, height]]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
-from walkerlab.figures.style import BLUE, GREY, VERMILLION, WIDTH
+from walkerlab.figures.style import BLUE, GREY, VERMILLION
 from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
@@ -37,8 +37,12 @@ LABELS: Final = {RADIUS: "largest multiplier (1)"}
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
     """The numbers that say most by default: the well-known ones, then others that vary."""
-    numbers = [name for name in group.variables if is_number(group, name, dims) and name not in parameters]
-    varying = [name for name in numbers if varies(group[name])]
+    varying = []
+    for name in group.variables:
+        if is_number(group, name, dims) and name not in parameters:
+            values = group[name].astype(float)
+            if np.unique(values[np.isfinite(values)]).size > 1:
+                varying.append(name)
     known = [name for name in PREFERRED if name in varying]
     return (known or [name for name in varying if "." not in name] or varying)[:MOST_PANELS]
 
@@ -46,12 +50,6 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
 def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
     """Whether a variable is one number for each point."""
     return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
-
-
-def varies(values: NDArray[Any]) -> bool:
-    """Whether a variable has more than one value."""
-    there = values[np.isfinite(values)] if values.dtype.kind == "f" else values.ravel()
-    return there.size > 0 and bool(np.ptp(there.astype(float)) > 0.0)
 
 
 def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Drawing:
@@ -185,33 +183,28 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
     rows = -(-len(names) // columns)
     figure = blank(0.4 + MAP_HEIGHT * rows)
     axes = figure.subplots(rows, columns, squeeze=False)
+    across, up = (numbers(group, parameter) for parameter in parameters)
     for place, name in enumerate(names):
-        draw_map(figure, axes[place // columns][place % columns], group, parameters, name)
+        one = axes[place // columns][place % columns]
+        values = np.ma.masked_invalid(group[name].astype(float)).T
+        one.set_facecolor("#D9D9D9")
+        mesh = one.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
+        figure.colorbar(mesh, ax=one, label=label(group, name))
+        if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
+            one.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
+            outlined = [withStroke(linewidth=2.6, foreground=GREY)]
+            add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
+        for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
+            getattr(one, f"set_{axis}label")(label(group, parameter))
+            if is_logarithmic(scale):
+                getattr(one, f"set_{axis}scale")("log")
+            if scale.size > 1 and group[parameter].dtype.kind != "O":
+                getattr(one, f"set_{axis}ticks")(scale, minor=True)
+                getattr(one, f"set_{axis}lim")(scale.min(), scale.max())
+            name_ticks(one, group, parameter, axis)
     for place in range(len(names), rows * columns):
         axes[place // columns][place % columns].set_axis_off()
     return figure
-
-
-def draw_map(figure: Figure, axes: Axes, group: Group, parameters: Sequence[str], name: str) -> None:
-    """One number by colour over two parameters."""
-    across, up = (numbers(group, parameter) for parameter in parameters)
-    values = np.ma.masked_invalid(group[name].astype(float)).T
-    axes.set_facecolor("#D9D9D9")
-    mesh = axes.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
-    figure.colorbar(mesh, ax=axes, label=label(group, name))
-    if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
-        axes.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
-        outlined = [withStroke(linewidth=2.6, foreground=GREY)]
-        add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
-    for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
-        getattr(axes, f"set_{axis}label")(label(group, parameter))
-        if is_logarithmic(scale):
-            getattr(axes, f"set_{axis}scale")("log")
-        if scale.size > 1 and group[parameter].dtype.kind != "O":
-            getattr(axes, f"set_{axis}ticks")(scale, minor=True)
-            getattr(axes, f"set_{axis}lim")(scale.min(), scale.max())
-        name_ticks(axes, group, parameter, axis)
-    assert figure.get_figwidth() == WIDTH
 
 
 def numbers(group: Group, parameter: str) -> NDArray[Any]:
