@@ -33,10 +33,6 @@ class WalkerlabError(Exception):
         self.advice = advice
 
 
-class CacheWarning(RuntimeWarning):
-    """Compiled code is not kept where it was meant to be."""
-
-
 class ConfigError(WalkerlabError):
     """The config (file, `extends`, `--set`) is not usable; nothing was run."""
 

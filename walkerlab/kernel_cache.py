@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from walkerlab.errors import CacheWarning
 from walkerlab.sources import Sources, digest_of
 
 PACKAGE = Path(__file__).parent
@@ -28,6 +27,11 @@ KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
 UNUSED_S = 30 * 86_400.0  # an older generation that no process has begun to use for so long is nobody's
+
+
+class CacheWarning(RuntimeWarning):
+    """Compiled code is not kept where it was meant to be."""
+
 
 watchers: list[Callable[[str], None]] = []
 """Told the name of the kernel that this process compiles, or waits for, and '' once none is."""

@@ -12,7 +12,6 @@ from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
-from walkerlab.errors import CacheWarning
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
 
@@ -21,6 +20,9 @@ def main() -> None:
     as_python_has_it = warnings.formatwarning
 
     def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
+        # Imported here: help loads no compiler, and who warns has loaded it.
+        from walkerlab.kernel_cache import CacheWarning
+
         own = category is CacheWarning
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
-from walkerlab.errors import ConfigError
 from walkerlab.ground.smooth_step import smooth_step
 from walkerlab.kernels import by_type, by_type_or_default
 
@@ -180,13 +179,12 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 def law_named(word: str, contact: Any) -> FrictionLaw:
     """The law of that word with the parameters of a contact block, a `config.contact.ContactSI`.
 
-    ConfigError if the law's class is incomplete, saying what it lacks.
+    TypeError if the law's class is incomplete, saying what it lacks.
     """
     law = FRICTION_LAWS[word]
     missing = lacking(law)
     if missing:
-        text = f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}"
-        raise ConfigError(text, "docs/pipeline.md says how to add a law.")
+        raise TypeError(f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
     return law.of(contact)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkerlab.config.walkers import Kneed, PartsWalker
+from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import (
     STANCE_FOOT,
     KneeRules,
@@ -166,8 +167,14 @@ def normal_law(contact: Contact) -> NormalLaw:
 
 
 def friction_law(contact: Contact) -> FrictionLaw:
-    """The friction in SI; no friction is a law of its own, not a coefficient of zero."""
-    return law_named(contact.friction, contact.in_si())
+    """The friction in SI; no friction is a law of its own, not a coefficient of zero.
+
+    Raises ConfigError for a law that somebody has added and left incomplete.
+    """
+    try:
+        return law_named(contact.friction, contact.in_si())
+    except TypeError as error:
+        raise ConfigError(f"{error}.", "docs/pipeline.md says what a law has.") from error
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
