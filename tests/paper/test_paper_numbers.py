@@ -141,7 +141,8 @@ def rows(study):
             errors=errors,
             departures=departures,
         )
-        return {row.printed: row for row in paper_rows(measured, study)}
+        made = paper_rows(measured, study)
+        return {Printed(row.where, row.quantity, row.unit, row.printed): row for row in made}
 
     return judged
 
@@ -259,6 +260,6 @@ def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
 
 
 def test_no_step_is_not_called_a_step_of_no_length(rows):
-    row = next(row for printed, row in rows(models={}, step_length=None).items() if printed is STEP_LENGTH)
+    row = next(row for printed, row in rows(models={}, step_length=None).items() if printed == STEP_LENGTH)
     assert "no model has a step" in row.evidence
     assert "times the printed length" not in row.evidence

@@ -122,11 +122,8 @@ def first_below_zero(time: Array, values: Array) -> float | None:
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None
-    after = int(below[0])
-    if after == 0:
-        return float(time[0])
-    fraction = values[after - 1] / (values[after - 1] - values[after])
-    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))
+    around = [int(below[0]), max(int(below[0]) - 1, 0)]
+    return float(np.interp(0.0, values[around], time[around]))
 
 
 def forces_of(

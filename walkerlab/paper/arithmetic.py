@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from walkerlab.ground.resting import resting_foot
+from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1, StartRow
 
 MM: Final = 1000.0  # mm in a m
@@ -18,10 +18,6 @@ class PercentOf:
 
     of_matlab: float
     of_adams: float
-
-    def nearest(self, printed: float) -> float:
-        """The magnitude that comes nearer to the printed percentage."""
-        return min(abs(self.of_matlab), abs(self.of_adams), key=lambda found: abs(found - abs(printed)))
 
 
 def percent_of(row: StartRow) -> PercentOf:
@@ -41,14 +37,10 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     return 100.0 * abs(adams - matlab) / matlab
 
 
-def readings_of_fig_4b() -> str:
-    """How the paper's walker stands on its contact, in words, with either reading of the numbers without units."""
+def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
+    """How the paper's walker stands on its contact by its numbers without units: read in N, mm and s, and in SI."""
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass = hip + 2.0 * leg
     stiffness, damping = STIFFNESS.value, DAMPING.value
     in_adams = resting_foot(mass * gravity, mass, stiffness * MM**ADAMS_EXPONENT, ADAMS_EXPONENT, damping * MM)
-    in_si = resting_foot(mass * gravity, mass, stiffness, 1.0, damping)
-    return (
-        f"in N, mm, s the walker stands {in_adams.depth * MM:.3f} mm deep with damping ratio "
-        f"{in_adams.damping_ratio:.2f}; in SI (linear spring) {in_si.depth * MM:.2f} mm with {in_si.damping_ratio:.3f}"
-    )
+    return in_adams, resting_foot(mass * gravity, mass, stiffness, 1.0, damping)

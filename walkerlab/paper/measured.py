@@ -181,8 +181,3 @@ class Measured:
     contact: ContactModel
     errors: Errors
     departures: Departures
-
-    @property
-    def corrected(self) -> RigidModel | None:
-        """The model with the right sign, if it has a gait."""
-        return self.models.get("corrected")

@@ -16,6 +16,7 @@ from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
 AROUND = 2.0  # 'around 1e-4' is up to twice that
+SETS = ("as-printed", "corrected")
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
@@ -31,20 +32,15 @@ class NumberVerdict(StrEnum):
 class JudgedNumber:
     """A printed number beside the measured ones, in the unit it is printed in; None where a model has none."""
 
-    printed: Printed
+    where: str
+    quantity: str
+    unit: str
+    printed: str
     as_printed: float | None
     corrected: float | None
     contact: float | None
-    verdict: NumberVerdict
+    verdict: str
     evidence: str
-
-    @property
-    def summary(self) -> dict[str, str | float | None]:
-        """As commands print it."""
-        entry = self.printed
-        about = {"where": entry.where, "quantity": entry.quantity, "unit": entry.unit, "printed": entry.text}
-        models = {"as_printed": self.as_printed, "corrected": self.corrected, "contact": self.contact}
-        return {**about, **models, "verdict": self.verdict.value, "evidence": self.evidence}
 
 
 REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
@@ -115,7 +111,8 @@ class Judge:
             evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
         elif differs and not agrees:
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}). {evidence}"
-        return JudgedNumber(entry, rigid.get("as-printed"), rigid.get("corrected"), contact, verdict, evidence)
+        about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
+        return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
 
     @property
     def raised(self) -> list[float | None]:
@@ -128,7 +125,7 @@ class Judge:
 
     def input(self, entry: Printed, value: float, scene: Scene) -> JudgedNumber:
         """A parameter of both models, or of the contact model alone."""
-        rigid = dict.fromkeys(printed.SIGNS, value) if scene == "rigid" else {}
+        rigid = dict.fromkeys(SETS, value) if scene == "rigid" else {}
         agrees = math.isclose(value, entry.value, rel_tol=1e-12)
         return self.row(entry, rigid, value, agrees, EXPLAINED, scene, prose("evidence.input", value, entry.unit))
 
@@ -148,7 +145,7 @@ class Judge:
     def lost_balance(self) -> JudgedNumber:
         """The failure from MATLAB's initial conditions."""
         steps, outcome = self.measured.contact.from_x_p
-        right = None if self.measured.departures.rigid else self.measured.corrected
+        right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
         text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
         agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value

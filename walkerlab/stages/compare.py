@@ -105,7 +105,7 @@ def against_the_paper(
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
-    rows, found = [row.summary for row in paper_rows(measured, study)], errata(study)
+    rows, found = [vars(row) for row in paper_rows(measured, study)], errata(study)
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
     groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(found, labels_of(Erratum))}
