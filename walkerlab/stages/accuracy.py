@@ -17,6 +17,7 @@ from walkerlab.hybrid.recorded_walk import as_state, with_scaled_rates
 from walkerlab.labels import labels_of
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
@@ -149,20 +150,12 @@ def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
 
 def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
     """One sentence: which method is fastest at which error, and by how much over the best library's."""
-    parts = []
+    levels = []
     for level in LEVELS:
-        candidates = good_enough(rows, scene, level)
-        if not candidates:
-            parts.append(f"no method reaches {level:.0e}")
-            continue
-        first, family = candidates[0], candidates[0].method.split("-")[0]
-        library = [
-            row
-            for row in candidates
-            if row.method.startswith(("scipy", "cvode")) and row.method.split("-")[0] != family
-        ]
-        text = f"at {level:.0e}, {first.method} is fastest with {1e3 * first.wall_s:.3g} ms"
-        if library:
-            text += f", {library[0].wall_s / first.wall_s:.3g} times faster than {library[0].method}"
-        parts.append(text)
-    return f"{scene}: " + "; ".join(parts) + "."
+        runs = good_enough(rows, scene, level)
+        own = runs[0].method.split("-")[0] if runs else ""
+        libraries = (
+            one for one in runs if one.method.split("-")[0] != own and one.method.startswith(("scipy", "cvode"))
+        )
+        levels.append((level, runs[0] if runs else None, next(libraries, None)))
+    return words("accuracy.conclusion", scene, levels)

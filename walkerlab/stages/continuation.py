@@ -17,7 +17,6 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.mechanics.rigid import knee_of
-from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.attractors import (
     Attractor,
     AttractorBranch,
@@ -224,7 +223,15 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     asked = FamilyQuestion(config, parameter, ValueSpan(block.least, block.most), block.periods, block.points)
     found = []
     for model in models_of(asked):
-        followed = (follow_rigid if model == RIGID else follow_contact)(asked, progress)
+        if model == RIGID:
+            followed, follower = rigid_branches(asked, progress)
+            followed = beyond_flips(followed, follower, asked, RIGID_SAMPLES, progress)
+            followed = with_others(followed, asked, follower, progress)
+        else:
+            limited = replace(asked, periods=min(asked.periods, CONTACT_PERIODS))
+            followed, on_ground = contact_branches(limited, progress)
+            if on_ground is not None:
+                followed = beyond_flips(followed, on_ground, limited, CONTACT_SAMPLES, progress)
         found.append(over_plane(followed, asked, progress))
     said = summary(found, asked)
     content = Content(groups(found, said, asked), said)
@@ -313,12 +320,6 @@ def over_plane(followed: Followed, asked: FamilyQuestion, progress: Progress) ->
     return replace(followed, curves=tuple(curve for curve in found if curve is not None), regions=regions)
 
 
-def follow_rigid(asked: FamilyQuestion, progress: Progress) -> Followed:
-    """All of the rigid model: branches, cascades, attractor, exponents, and gaits of other numbers of steps."""
-    followed, follower = rigid_branches(asked, progress)
-    return with_others(beyond_flips(followed, follower, asked, RIGID_SAMPLES, progress), asked, follower, progress)
-
-
 def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed, BranchFollower]:
     """Every branch of the rigid model's gaits of one step, and the cascades beyond their flips."""
     config, parameter, span = asked.config, asked.parameter, asked.span
@@ -327,26 +328,16 @@ def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed,
     step_map = map_of(config)
     progress.start("continuation: branches of the rigid model")
     follower = BranchFollower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
-    seeds = [seed for value in asked.looked_at() for seed in gaits_at(walker_at(value), value, config.seed)]
+    seeds = []
+    for value in asked.looked_at():
+        walker = walker_at(value)
+        if walker is not None:
+            section, (_, units) = list(walker.picked), unit_walker(walker)
+            in_units = [1.0] + [units.time] * (len(section) - 1)
+            gaits = find_gaits(walker, config.seed).gaits
+            seeds += [Seed(np.array(gait.state)[section] * in_units, value) for gait in gaits]
     branches = follower.family(seeds, asked.periods)
     return Followed(RIGID, step_map, branches, map_of), follower
-
-
-def gaits_at(walker: Standing | None, value: float, seed: int) -> list[Seed]:
-    """The rigid gaits of one step at a value of the parameter, as the section has them."""
-    if walker is None:
-        return []
-    _, units = unit_walker(walker)
-    in_units = [1.0] + [units.time] * (len(walker.picked) - 1)
-    sections = (np.array([gait.state[i] for i in walker.picked]) for gait in find_gaits(walker, seed).gaits)
-    return [Seed(section * in_units, value) for section in sections]
-
-
-def follow_contact(asked: FamilyQuestion, progress: Progress) -> Followed:
-    """All of the contact model: its branch, its cascade, its attractor and exponents."""
-    asked = replace(asked, periods=min(asked.periods, CONTACT_PERIODS))
-    followed, follower = contact_branches(asked, progress)
-    return followed if follower is None else beyond_flips(followed, follower, asked, CONTACT_SAMPLES, progress)
 
 
 def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed, BranchFollower | None]:

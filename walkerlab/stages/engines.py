@@ -35,6 +35,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
 from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
@@ -165,13 +166,7 @@ def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
         },
         "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
         "ratios": {name: ratios(rows, name) for name in truths},
-        "conclusions": {
-            name: {
-                SAME_LAW: same_law_in_words(rows, name, truth),
-                OWN_LAW: own_law_in_words(rows, name, truth),
-            }
-            for name, truth in truths.items()
-        },
+        "conclusions": {name: conclusions(rows, name, truth) for name, truth in truths.items()},
         "environment": environment(),
         "left_out": found.left_out,
     }
@@ -262,83 +257,19 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
     return found
 
 
-def same_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str:
-    """What the integrators cost."""
-    sentences = []
-    shares, series = ratios(rows, scene), series_of(rows, scene, SAME_LAW)
-    names = list(dict.fromkeys(runs[0].engine for runs in series.values()))
-    for level in LEVELS:
-        label = plain_power(level)
-        reached = shares.get(label, {})
-        if reached:
-            told = ", ".join(
-                f"{name} {plainly(ratio)}" for name, ratio in sorted(reached.items(), key=lambda one: one[1])
-            )
-            sentences.append(f"An error of {label} takes, as a multiple of walkerlab's time: {told}.")
-        missed = [name for name in names if name not in reached]
-        if missed:
-            sentences.append(f"No run of {' or '.join(missed)} reaches {label}.")
-    told = steps_in_words(three_digits(rows, scene, truth)[SAME_LAW])
-    if told:
-        sentences.append(f"Three correct digits of the step period take steps of at most: {told}.")
-    fixed = [name for name, mine in series.items() if mine[-1].tolerance is None]
-    falling = {name: by for name, by in convergence(rows, scene)[SAME_LAW].items() if name in fixed}
-    if falling:
-        told = ", ".join(f"{name} {by:.2g}" for name, by in falling.items())
-        sentences.append(
-            f"Fixed steps end where a run would take more of them than it is given; the last halving divides the error "
-            f"by: {told}. Adapted ones end at an error below {plain_power(EXACT_ENOUGH)}."
-        )
-    return " ".join(sentences)
-
-
-def plainly(number: float) -> str:
-    """Three digits without a power of ten."""
-    return f"{float(f'{number:.3g}'):g}"
-
-
-def steps_in_words(steps: Mapping[str, float]) -> str:
-    """Step sizes by name, the largest first."""
-    return ", ".join(
-        f"{name} {plainly(1e6 * step)} µs" for name, step in sorted(steps.items(), key=lambda one: -one[1])
+def conclusions(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, str]:
+    """What was found, a paragraph for each experiment."""
+    same, own = (series_of(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
+    sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
+    reached = {label: shares.get(label, {}) for label in map(plain_power, LEVELS)}
+    engines = list(dict.fromkeys(runs[0].engine for runs in same.values()))
+    falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
+    finest, settled = (
+        [runs[-1] for runs in own.values()],
+        [name for name in changes[OWN_LAW] if has_settled(*own[name][-2:])],
     )
-
-
-def own_law_in_words(rows: Sequence[EngineRow], scene: str, truth: Truth) -> str:
-    """Which contact comes closest to ADAMS's, what became of the others, and how far this hangs on the step."""
-    best = closest(rows, scene)
-    period = float(truth.walk.periods_s[-1])
-    sentences = []
-    if best is None:
-        sentences.append("No engine's own contact walks to the end.")
-    others, series = [], series_of(rows, scene, OWN_LAW)
-    for row in (contact[-1] for contact in series.values()):
-        if best is not None and (row.engine, row.integrator) == (best["engine"], best["contact"]):
-            sentences.append(
-                f"Closest to ADAMS's law comes {row.engine}'s contact {row.integrator!r}: its step period is "
-                f"{1e3 * abs(row.error or 0.0):.3g} ms off {period:.4f} s, in {row.wall_s:.2g} s of run time at steps "
-                f"of {1e6 * row.step_s:.3g} µs."
-            )
-        elif row.error is not None:
-            others.append(f"{row.engine} {row.integrator} {1e3 * row.error:.3g} ms off")
-        else:
-            steps = "one step" if row.steps == 1 else f"{row.steps} steps"
-            others.append(f"{row.engine} {row.integrator} {row.outcome} after {steps}")
-    if others:
-        sentences.append(f"The others: {'; '.join(others)}.")
-    changes = convergence(rows, scene)[OWN_LAW]
-    settled = {name for name in changes if has_settled(*series[name][-2:])}
-    for said, names in (
-        ("Where the last refinement hardly changes the period, the difference is the model's", settled),
-        (
-            "At the finest steps that a run is given, the last halving still changes the period",
-            changes.keys() - settled,
-        ),
-    ):
-        told = ", ".join(f"{name} by {1e3 * change:.2g} ms" for name, change in changes.items() if name in names)
-        if told:
-            sentences.append(f"{said}: {told}.")
-    told = steps_in_words(three_digits(rows, scene, truth)[OWN_LAW])
-    if told:
-        sentences.append(f"Three digits of their own period take steps of at most: {told}.")
-    return " ".join(sentences)
+    best, period = closest(rows, scene), float(truth.walk.periods_s[-1])
+    return {
+        SAME_LAW: words("engines.same_law", reached, engines, sizes[SAME_LAW], falling, plain_power(EXACT_ENOUGH)),
+        OWN_LAW: words("engines.own_law", best, finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
+    }

@@ -144,10 +144,16 @@ class Planner:
         return tuple(left_out(name, self._why_absent(name)) for name in missing)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
-        why = self._why_left_out(stage)
+        why = why_unsuited(stage, self.config)
+        for name in () if stage.draws else stage.inputs(self.config):
+            if why is None and name in self.left_out:
+                why = f"it needs {name}: {self.left_out[name]}"
         if why is not None:
             return Step(stage, "leave out", why)
-        identity = self._identities.of(stage, self.config, self._input_keys(stage))
+        keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
+        # what a drawing says about results left out depends on why they are
+        keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
+        identity = self._identities.of(stage, self.config, keys)
         verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
         reason = "--force" if force else self._why_run(stage, identity, verdict)
         if reason is None and verdict.artifact is not None:
@@ -175,22 +181,6 @@ class Planner:
 
     def _command_of(self, name: str) -> str:
         return f"`walkerlab {self.graph[name].command}`"
-
-    def _why_left_out(self, stage: Stage) -> str | None:
-        unsuited = why_unsuited(stage, self.config)
-        if unsuited is not None:
-            return unsuited
-        if stage.draws:
-            return None
-        for name in stage.inputs(self.config):
-            if name in self.left_out:
-                return f"it needs {name}: {self.left_out[name]}"
-        return None
-
-    def _input_keys(self, stage: Stage) -> dict[str, str]:
-        """The keys of a stage's inputs; what a drawing says about those left out depends on why they are."""
-        given = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
-        return given | {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
 
     def _why_run(self, stage: Stage, identity: Identity, verdict: Verdict) -> str | None:
         found = verdict.artifact

@@ -43,19 +43,17 @@ def run(
             drawn.append(draw(figure, inputs, folder))
             progress.advance()
         else:
-            remove(figure, folder)
-            if not waits_to_be_asked_for(figure, inputs):
+            for path in paths_of(figure).values():  # drawn by an earlier run, of results that are not there any more
+                with storing(folder / path):
+                    (folder / path).unlink(missing_ok=True)
+            # what only its own command computes, and nobody has asked for, is not left out
+            if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
                 missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # captions of measured run times are among them
     return Content(
         {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
     )
-
-
-def waits_to_be_asked_for(figure: Illustration, results: Mapping[str, Stored]) -> bool:
-    """Whether a figure shows what only its own command computes, and nobody has: that is not left out."""
-    return any(PIPELINE[name].on_demand and name not in results for name in figure.stages)
 
 
 def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
@@ -83,13 +81,6 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
         if anew or not all((folder / path).is_file() for path in paths_of(figure).values()):
             draw(figure, results, folder)
     return [folder / paths_of(figure)["svg"] for figure in figures]
-
-
-def remove(figure: Illustration, folder: Path) -> None:
-    """Take away what an earlier run drew, of results that are not there any more."""
-    for path in paths_of(figure).values():
-        with storing(folder / path):
-            (folder / path).unlink(missing_ok=True)
 
 
 def paths_of(figure: Illustration) -> dict[str, str]:

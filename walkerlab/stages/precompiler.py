@@ -18,16 +18,11 @@ from walkerlab.stages.task import nothing_compiled_yet
 from walkerlab.workers import WorkerPool
 
 
-def compile_kernels(module: str, config: Config) -> None:
-    """Compile the kernels of a stage."""
-    importlib.import_module(module).compile_kernels(config)
-
-
-def compile_first_kernels(module: str, config: Config) -> None:
-    """Compile the kernels of a stage if nothing is compiled yet."""
-    importlib.import_module(module)
-    if nothing_compiled_yet():
-        compile_kernels(module, config)
+def compile_kernels(module: str, config: Config, only_first: bool) -> None:
+    """Compile the kernels of a stage; if they are to be the first, only where nothing is compiled yet."""
+    stage = importlib.import_module(module)
+    if not only_first or nothing_compiled_yet():
+        stage.compile_kernels(config)
 
 
 class Precompiler:
@@ -47,13 +42,16 @@ class Precompiler:
         """Compile for the first of the later stages that takes long to compile."""
         slow = [stage for stage in later if stage.compiles_long]
         if slow:
-            self._begun[slow[0].name] = self._pool.start(partial(compile_kernels, slow[0].module, self._config))
+            self._start(slow[0], only_first=False)
 
     def begin_if_first(self, stage: Stage) -> Future[None] | None:
         """Compile for a stage that takes long to, once, if nothing is compiled yet."""
         if not stage.compiles_long or stage.name in self._begun:
             return None
-        work = partial(compile_first_kernels, stage.module, self._config)
+        return self._start(stage, only_first=True)
+
+    def _start(self, stage: Stage, only_first: bool) -> Future[None]:
+        work = partial(compile_kernels, stage.module, self._config, only_first)
         future = self._begun[stage.name] = self._pool.start(work)
         return future
 

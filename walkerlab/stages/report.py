@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.config.schema import Config
-from walkerlab.report.blocks import MAIN, Section
+from walkerlab.report.blocks import MAIN
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
 from walkerlab.report.registry import pages_of
@@ -42,14 +42,14 @@ def run(
     pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
     written, results = write_pages(config, inputs, folder, left_out, pending)
     progress.advance()
-    tables = [block for page in written for block in blocks_of(page.sections) if isinstance(block, Table)]
+    blocks = (block for page in written for section in page.sections for block in section.blocks)
     return Content(
         {index.GROUP: index.index(folder, [folder / page.file for page in written])},
         {
             "html": MAIN,
             "pages": [page.file for page in written],
             "figures": [picture.title for picture in results.pictures],
-            "tables": [block.caption for block in tables],
+            "tables": [block.caption for block in blocks if isinstance(block, Table)],
         },
     )
 
@@ -85,13 +85,6 @@ def write_pages(
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
     """Whether a stage without a result was tried itself, and not given up for want of another: it has no answer."""
-    stage = next((stage for stage in PIPELINE.stages if stage.name == name), None)
-    if stage is None or name not in PIPELINE["report"].inputs(config):
+    if name not in PIPELINE["report"].inputs(config) or why_unsuited(PIPELINE[name], config) is not None:
         return False
-    left_alone = why_unsuited(stage, config) is not None
-    return not left_alone and left_out.isdisjoint(stage.inputs(config))
-
-
-def blocks_of(sections: Sequence[Section]) -> list[object]:
-    """All blocks of the page."""
-    return [block for section in sections for block in section.blocks]
+    return left_out.isdisjoint(PIPELINE[name].inputs(config))

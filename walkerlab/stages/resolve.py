@@ -45,12 +45,13 @@ def resolve(
 
     Raises ConfigError if nothing has that name, and for a config that is not usable.
     """
-    run = None if text is None or is_config(text) else artifact_at(Path(text)) or run_at(text, runs)
+    path, run = None if text is None else Path(text), None
+    if path is not None and text not in builtin_names() and not (path.is_file() and path.suffix != SUFFIX):
+        run = artifact_at(path) or run_at(str(text), runs)
     if run is not None:
         folder, earlier = run
         read, runs, source = load(earlier, sets, strides, name), folder.runs_dir, folder.source
     else:
-        path = None if text is None else Path(text)
         read, source = load(path, sets, strides, name), source_of(path, runs)
     refuse_what_makes_no_walker(read)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
@@ -71,11 +72,6 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
         level_walker(config.walker, config.gravity_m_s2)
     except ConfigError as error:
         raise refusal([Problem(read.tree.entries["walker"].position, error.message)], error.advice) from None
-
-
-def is_config(text: str) -> bool:
-    """Whether a text names a config file or a built-in config."""
-    return text in builtin_names() or (Path(text).is_file() and Path(text).suffix != SUFFIX)
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
