@@ -40,7 +40,7 @@ from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.fixed_point import Gait, Search, SearchSettings, SlopeBranch, find_gaits
-from walkerlab.orbits.newton import Solution
+from walkerlab.orbits.newton import Solution, newton
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.scene.contact import contact_scene, start_state
@@ -227,9 +227,9 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     seed = seeds(search.walker)[0]
 
     def solve() -> None:
-        reached = SlopeBranch(search.looking, search.walker, seed).follow(search.walker.slope)
-        assert reached.z is not None, "the gait can be followed"
-        assert isinstance(search.solved(reached.z), Solution), "and solved"
+        _, z = SlopeBranch(search.looking, search.walker, seed).follow(search.walker.slope)
+        assert z is not None, "the gait can be followed"
+        assert isinstance(newton(search.equations, z, 1e-14, rounding=1e3), Solution), "and solved"
 
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 

@@ -143,7 +143,7 @@ def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
     settings = SearchSettings()
     walker = Search(assembled(PAPER), settings).walker
     counted = Counted(walker, settings.looking)
-    assert SlopeBranch(counted, walker, seeds(walker)[0]).follow(walker.slope).z is not None
+    assert SlopeBranch(counted, walker, seeds(walker)[0]).follow(walker.slope)[1] is not None
     # one step of walking takes about 200 right-hand sides
     assert counted.steps <= 30
     assert counted.evaluations < 30 * 200

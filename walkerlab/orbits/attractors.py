@@ -118,25 +118,18 @@ def swept(
             here = led(step_map, found[-1], float(value), transient, kept)
         advance()
         if isinstance(here, Outcome):
-            return lost_after(step_map, found, float(value), here, transient, kept)
+            lost = float(value)
+            for _ in range(LOSS_HALVINGS if found else 0):
+                middle = 0.5 * (found[-1].value + lost)
+                there = settled(step_map, found[-1].last, middle, transient, kept)
+                if isinstance(there, Outcome):
+                    lost, here = middle, there
+                else:
+                    found.append(there)
+            return AttractorBranch(tuple(found), lost, here.label)
         found.append(here)
         z = here.last
     return AttractorBranch(tuple(found), None, "")
-
-
-def lost_after(
-    step_map: StepMap, found: list[Attractor], value: float, outcome: Outcome, transient: int, kept: int
-) -> AttractorBranch:
-    """An attractor up to where it is lost, between the last value at which it was found and one at which it was not."""
-    kept_on = list(found)
-    for _ in range(LOSS_HALVINGS if found else 0):
-        middle = 0.5 * (kept_on[-1].value + value)
-        here = settled(step_map, kept_on[-1].last, middle, transient, kept)
-        if isinstance(here, Outcome):
-            value, outcome = middle, here
-        else:
-            kept_on.append(here)
-    return AttractorBranch(tuple(kept_on), value, outcome.label)
 
 
 def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) -> Attractor | Outcome:

@@ -198,7 +198,9 @@ def settled_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[l
     tight = (FOUND_RTOL, FOUND_ATOL)
     rough = arrivals(walker, known, starts, SETTLING)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == NONE))
-    distinct = distinct_points(rough.last[elsewhere])[:WATCHED]
+    points = rough.last[elsewhere]
+    _, first = np.unique(np.round(points / (10.0 * REPEATS)), axis=0, return_index=True)
+    distinct = points[np.sort(first)][:WATCHED]
     settled = arrivals(walker, Attractors(), distinct, SETTLING_AGAIN, tolerances=tight)
     cycles: list[Floats] = []
     aperiodic = False
@@ -214,12 +216,6 @@ def settled_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[l
 def in_order(cycles: Sequence[Floats]) -> list[Floats]:
     """Short ones first."""
     return sorted(cycles, key=lambda points: (len(points), *points[0]))
-
-
-def distinct_points(points: Floats) -> Floats:
-    """Points that differ by more than REPEATS, in order; of equal ones the first."""
-    _, first = np.unique(np.round(points / (10.0 * REPEATS)), axis=0, return_index=True)
-    return np.asarray(points[np.sort(first)])
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:

@@ -8,15 +8,14 @@ starts reach a heel strike at all. All of it happens with the similar walker of 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Floats, NotConverged, Solution, newton
-from walkerlab.orbits.shooting import EXACT, NEW, Shooting, StepEquations, Steps, on_section, section_of
+from walkerlab.orbits.newton import Floats, NotConverged, newton
+from walkerlab.orbits.shooting import EXACT, NEW, Shooting, StepEquations, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.orbits.step_map import multipliers_of
@@ -173,13 +172,6 @@ NO_DESCENT = (
 NONE_TO_FOLLOW = "the theory of small slopes has no gait of this walker to follow"
 
 
-class Reached(NamedTuple):
-    """How far a gait could be followed."""
-
-    slope: float  # rad
-    z: Floats | None  # (3,) at the slope asked for; None if the gait was lost before
-
-
 class SlopeBranch:
     """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
 
@@ -190,16 +182,16 @@ class SlopeBranch:
         """Start from a seed of `walker`, on whatever slope."""
         self.shooting, self.walker, self.seed = shooting, walker, seed
 
-    def follow(self, slope: float) -> Reached:
-        """The gait at `slope` > 0 (rad)."""
+    def follow(self, slope: float) -> tuple[float, Floats | None]:
+        """How far the gait can be followed (rad), and z (3,) at `slope` > 0 (rad); None if it is lost before."""
         s = float(np.cbrt(slope))
         follower = self.from_seed if s > np.cbrt(self.seed.slope) else self.begun(s)
         if follower is None:
-            return Reached(0.0, None)
+            return 0.0, None
         way = follower.to(math.log(s))
         if way.at < math.log(s):
-            return Reached(math.exp(3.0 * way.at), None)
-        return Reached(slope, state_at(s, way.points[-1][1]))
+            return math.exp(3.0 * way.at), None
+        return slope, state_at(s, way.points[-1][1])
 
     @cached_property
     def from_seed(self) -> Follower | None:
@@ -215,7 +207,7 @@ class SlopeBranch:
             found = self.gait_at(math.log(s), interpolated(rough, s * s))
             if found is not None:
                 first = Way(math.log(s), STRIDES.widest, (limit, (s * s, found)))
-                return Follower(self.gait_at, first, STRIDES, square)
+                return Follower(self.gait_at, first, STRIDES, lambda log_s: math.exp(2.0 * log_s))
             s *= 0.5
         return None
 
@@ -240,11 +232,6 @@ def state_at(s: float, y: Floats) -> Floats:
 def scaled(s: float, z: Floats, period: float) -> Floats:
     """(y, T) of a gait at s."""
     return np.array([(z[0] + s**3) / s, z[1] / s, z[2] / s, period])
-
-
-def square(log_s: float) -> float:
-    """The square of s."""
-    return math.exp(2.0 * log_s)
 
 
 @lru_cache(maxsize=16)
@@ -282,10 +269,10 @@ class Search:
         if self.walker.slope <= 0.0:
             return
         for branch in branches(on_slope(self.walker, 0.0), self.settings):
-            reached, name = branch.follow(self.walker.slope), branch.seed.name
-            if reached.z is None:
-                self.lost.append(f"the gait from the {name} is lost at a slope of {reached.slope:.3g} rad")
-            elif not self.keep(reached.z, name):
+            (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
+            if z is None:
+                self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
+            elif not self.keep(z, name):
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def draw(self, generator: np.random.Generator, count: int) -> None:
@@ -309,7 +296,9 @@ class Search:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
         if self.known(z, by):
             return True
-        settings, solved = self.settings, self.solved(z)
+        settings = self.settings
+        least, enough = settings.solved_residual, settings.residual
+        solved = newton(self.equations, z, least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
         if isinstance(solved, NotConverged):
             return False
         z, DP = solved.x, solved.evaluated.data.DP[0]
@@ -318,15 +307,10 @@ class Search:
         if self.known(z, by):
             return True
         gait = measured(self.walker, self.units, settings.solving, z, DP)
-        if gait is None or gait.residual > settings.residual:
+        if gait is None or gait.residual > enough:
             return False
         self.found.append(FoundGait(z, DP, gait, [by]))
         return True
-
-    def solved(self, z: Floats) -> Solution[Steps] | NotConverged:
-        """The fixed point near z, to rounding."""
-        least, enough = self.settings.solved_residual, self.settings.residual
-        return newton(self.equations, z, least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
 
     def known(self, z: Floats, by: str) -> bool:
         """Whether z is one of the gaits found, which is then noted to be found again."""
@@ -344,15 +328,11 @@ class Search:
         chosen, reason = choice(gaits)
         if not gaits:
             followed = f"followed from a vanishing slope, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW
-            reason = f"none found: {followed}; {self.drawn_in_vain()}"
+            reason = (
+                f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MOST_START[0]:g} "
+                f"rad apart, rates up to {MOST_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
+            )
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost))
-
-    def drawn_in_vain(self) -> str:
-        """How many starting values led to no gait, and from which range they were drawn."""
-        return (
-            f"none of {self.drawn} random starting values (legs up to {MOST_START[0]:g} rad apart, rates up to "
-            f"{MOST_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
-        )
 
 
 def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:

@@ -12,7 +12,7 @@ Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -197,7 +197,9 @@ def regions_of(
     advance: Callable[[], None],
 ) -> Regions:
     """The regions of the plane around branches that were followed at the value `own` of the second parameter."""
-    first, second = (middles(span, cells) for span, cells in zip(spans, CELLS, strict=True))
+    first, second = (
+        span.least + span.size * (np.arange(cells) + 0.5) / cells for span, cells in zip(spans, CELLS, strict=True)
+    )
     period = np.full(CELLS, NOTHING, np.int64)
     begin = int(np.argmin(np.abs(second - own)))
     known = known_gaits(branches, first)
@@ -211,11 +213,6 @@ def regions_of(
                 period[:, row], points = settled_row(step_map, first, gaits, points)
             advance()
     return Regions(first, second, period)
-
-
-def middles(span: ValueSpan, cells: int) -> Floats:
-    """Middles of equal cells of a span."""
-    return span.least + span.size * (np.arange(cells) + 0.5) / cells
 
 
 def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Row:
@@ -238,20 +235,17 @@ def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Row:
 def corrected_row(follower: BranchFollower, values: Floats, before: Row) -> Row:
     """The gaits at the cells of a row, from those of the row before and from neighbours in the row itself."""
     row: Row = [None] * len(values)
-    forwards, backwards = range(len(values)), range(len(values) - 1, -1, -1)
-    for order, step in ((forwards, -1), (backwards, 1)):
+    places = list(range(len(values)))
+    for order, step in ((places, -1), (places[::-1], 1)):
         for place in order:
-            present = row[place]
-            if present is not None and present.stable:
-                continue
             beside = row[place + step] if 0 <= place + step < len(values) else None
-            guesses = (before[place], beside) if step < 0 else (beside,)
-            for guess in guesses:
-                found = None if guess is None else gait_near(follower, guess.z, float(values[place]))
+            for guess in (before[place], beside) if step < 0 else (beside,):
+                present = row[place]
+                if guess is None or (present is not None and present.stable):
+                    continue
+                found = gait_near(follower, guess.z, float(values[place]))
                 if found is not None and (present is None or found.stable):
-                    row[place] = present = found
-                if present is not None and present.stable:
-                    break
+                    row[place] = found
     return row
 
 
@@ -277,16 +271,12 @@ def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -
             points.append(gait.z)
             continue
         point = None
-        for start in starts_at(place, gait, points, before):
+        # on the attractors of its neighbours, and beside its unstable gait
+        starts = (points[place - 1] if place else None, before[place], None if gait is None else gait.away)
+        for start in (one for one in starts if one is not None):
             here = settled(step_map, start, float(values[place]), TRANSIENT, KEPT)
             if not isinstance(here, Outcome):
                 periods[place], point = here.period, here.last
                 break
         points.append(point)
     return periods, points
-
-
-def starts_at(place: int, gait: CellGait | None, points: Points, before: Points) -> Iterator[Floats]:
-    """Where walks begin at a cell: on the attractors of its neighbours, and beside its unstable gait."""
-    candidates = (points[place - 1] if place else None, before[place], None if gait is None else gait.away)
-    yield from (start for start in candidates if start is not None)

@@ -69,11 +69,11 @@ class Modes(NamedTuple):
 
 def linear_modes(walker: Standing) -> Modes | None:
     """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
-    legs = leg_columns(walker)
-    D = legs.T @ upright_mass(walker) @ legs
-    stiffness = walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
+    legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
+    M, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
+    equations(level, level.blank, s, c, F, U, M, r)
     try:
-        rates, V = eigh(stiffness, D)
+        rates, V = eigh(walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs, legs.T @ M @ legs)
     except np.linalg.LinAlgError:
         return None
     if rates[0] >= 0.0 or rates[1] <= 0.0:
@@ -81,27 +81,17 @@ def linear_modes(walker: Standing) -> Modes | None:
     return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
 
 
-def upright_mass(walker: Standing) -> Vector:
-    """Mass matrix (n, n) with all angles zero, kg m^2."""
-    n, level = len(walker.arm_x), on_slope(walker, 0.0)
-    M, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
-    equations(level, level.blank, s, c, F, U, M, r)
-    return M
-
-
 def leg_columns(walker: Standing) -> Vector:
     """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
     return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
-def has_small_gaits(walker: Standing) -> bool:
-    """Whether upright legs balance, so that gaits shrink with the slope."""
-    return not walker.kneed and walker.lean == 0.0 and not walker.arm_x.any()
-
-
 def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
-    """The small-slope gaits that `walker` has; its own slope plays no part."""
-    modes = linear_modes(walker) if has_small_gaits(walker) else None
+    """The small-slope gaits that `walker` has; its own slope plays no part.
+
+    Gaits shrink with the slope if upright legs balance.
+    """
+    modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
         long = None if modes is None else long_period_seed(walker, modes)
         if modes is None or long is None:
@@ -185,12 +175,15 @@ def symmetric_half_period(modes: Modes) -> float | None:
 def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSlopeSeed | None:
     """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
     try:
-        step = LinearStep(walker, modes)
-        period = first_root(step.mismatch, longest)
-        z = None if period is None else step.periodic_state(period)
+        conditions = step_conditions(walker, modes)
+        period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
+        if period is None:
+            return None
+        rows = conditions(np.array(period))[:3]
+        z = np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
     except np.linalg.LinAlgError:  # masses that all sit in one place leave a heel strike undetermined
         return None
-    if period is None or z is None or z[0] <= -1.0:
+    if z[0] <= -1.0:
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
     per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
@@ -199,58 +192,43 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSl
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
-class LinearStep:
-    """One step of the linearised walker on a slope of one radian, for many durations at once."""
+def step_conditions(walker: Standing, modes: Modes) -> Callable[[Vector], Vector]:
+    """One step of the linearised walker on a slope of one radian, for many durations at once.
 
-    def __init__(self, walker: Standing, modes: Modes) -> None:
-        """Prepare the heel strike's map at vanishing angles, with the change of roles."""
-        self.modes = modes
-        self.inverse = np.linalg.inv(modes.V)
-        flat, n = on_slope(walker, 0.0), len(walker.arm_x)
-        self.strike = np.zeros((3, 4))
-        self.strike[0, 0] = 1.0
-        for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
-            self.strike[1:, 2 + leg] = after_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
-        # a foot that rolls on a slope of one radian is in balance with its leg off the vertical
-        legs = leg_columns(flat)
-        pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
-        rest = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
-        self.rest = np.zeros((4, 4))
-        self.rest[:2, 3] = rest
+    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows say that t later z is
+    back, one that both feet are down. Their determinant vanishes where they have a solution.
+    """
+    flat, n = on_slope(walker, 0.0), len(walker.arm_x)
+    swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
+    strike = np.zeros((3, 4))  # the heel strike's map at vanishing angles, with the change of roles
+    strike[0, 0] = 1.0
+    for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        strike[1:, 2 + leg] = after_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
+    # a foot that rolls on a slope of one radian is in balance with its leg off the vertical
+    legs = leg_columns(flat)
+    pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
+    rest = np.zeros((4, 4))
+    rest[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
 
-    def flows(self, t: Vector) -> Vector:
-        """Matrices (..., 4, 4) that take a state to the one t (s) later."""
-        swing, fall = self.modes.swing, self.modes.fall
+    def of_modes(oscillating: Vector, growing: Vector) -> Vector:
+        weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
+        return np.asarray(modes.V * weights @ inverse, np.float64)
+
+    def conditions(t: Vector) -> Vector:
         sine, cosine = np.sin(swing * t), np.cos(swing * t)
         growing, grown = np.sinh(fall * t), np.cosh(fall * t)
-        flow = np.empty((*t.shape, 4, 4))
-        flow[..., :2, :2] = flow[..., 2:, 2:] = self._of_modes(cosine, grown)
-        flow[..., :2, 2:] = self._of_modes(sine / swing, growing / fall)
-        flow[..., 2:, :2] = self._of_modes(-swing * sine, fall * growing)
-        return flow
-
-    def _of_modes(self, oscillating: Vector, growing: Vector) -> Vector:
-        weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
-        return np.asarray(self.modes.V * weights @ self.inverse, np.float64)
-
-    def conditions(self, t: Vector) -> Vector:
-        """Matrices (..., 4, 4) on (z, 1): three rows say that t (s) later z is back, one that both feet are down."""
-        flow = self.flows(t)
+        flow = np.empty((*t.shape, 4, 4))  # takes a state to the one t later
+        flow[..., :2, :2] = flow[..., 2:, 2:] = of_modes(cosine, grown)
+        flow[..., :2, 2:] = of_modes(sine / swing, growing / fall)
+        flow[..., 2:, :2] = of_modes(-swing * sine, fall * growing)
+        end = flow @ (STATE_OF - rest) + rest
         bordered = np.empty_like(flow)
-        end = flow @ (STATE_OF - self.rest) + self.rest
-        bordered[..., :3, :] = COORDINATES - self.strike @ end
+        bordered[..., :3, :] = COORDINATES - strike @ end
         bordered[..., 3, :] = FEET_DOWN @ end
         bordered[..., 3, 3] += 2.0
         return bordered
 
-    def mismatch(self, t: Vector) -> Vector:
-        """Determinant of the conditions, over t: zero where they have a solution."""
-        return np.asarray(np.linalg.det(self.conditions(t)) / t)
-
-    def periodic_state(self, t: float) -> Vector:
-        """The z (3,) that a step of t (s) brings back."""
-        rows = self.conditions(np.array(t))[:3]
-        return np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
+    return conditions
 
 
 def first_root(f: Callable[[Vector], Vector], longest: float) -> float | None:
