@@ -27,10 +27,9 @@ from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, has
 from walkerlab.ground.walker import ContactWalker, feet_motion, folded, on_ground
 from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
-from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor, no_step
+from walkerlab.orbits.step_map import REMEMBERED, MappedStep, Monitor, StepMap, no_step
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -100,25 +99,19 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
     rates = np.zeros(n)
     rates[list(turning)] = z[3 + len(angled) :]
     state[4 + n :] = with_followers(walker, stance, rates, turning)
-    angles = np.zeros(n)
+    angles, upper = np.zeros(n), turning[0]
     angles[list(angled)] = z[1 : 1 + len(angled)]
-    angles[turning[0]] = angles[walker.legs[stance][0]]
-    state[ANGLES : ANGLES + n] = feet_abreast(walker, stance, angles)
-    return tuple(float(x) for x in state)
-
-
-def feet_abreast(walker: ContactWalker, stance: int, angles: Floats) -> Floats:
-    """The angles (n) with the swing leg's uppermost body turned until the feet pass each other."""
-    angled, upper = angled_bodies(walker, stance), turning_bodies(walker, stance)[0]
-    turned = with_followers(walker, stance, np.eye(angles.size)[upper], (upper, *angled))
-    for _ in range(NEWTON_STEPS):
+    angles[upper] = angles[walker.legs[stance][0]]
+    turned = with_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):  # the swing leg's uppermost body is turned until the feet pass each other
         angles = with_followers(walker, stance, angles, (upper, *angled))
         apart, gradient = feet_apart(walker, angles)
         move = -apart / float(gradient @ turned)
         angles[upper] += move
         if abs(move) < 1e-15:
             break
-    return with_followers(walker, stance, angles, (upper, *angled))
+    state[ANGLES : ANGLES + n] = with_followers(walker, stance, angles, (upper, *angled))
+    return tuple(float(x) for x in state)
 
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
@@ -147,16 +140,6 @@ def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
     return along
 
 
-def pads_for(ground: JudgedGround, walker: ContactWalker, state: State, stance: int, pitch_m: float) -> JudgedGround:
-    """The ground with its pads laid for steps of `pitch_m`, the standing foot in the middle of one."""
-    if not ground.terrain.has_pads:
-        return ground
-    foothold = feet_motion(walker.whole, state)[stance].along
-    ahead = foothold + pitch_m
-    lanes = (ahead, foothold) if stance == 1 else (foothold, ahead)
-    return JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
-
-
 def step_from_section(
     walker: ContactWalker,
     ground: JudgedGround,
@@ -171,23 +154,35 @@ def step_from_section(
     pitch_m  what the pads are laid for
     derived  whether the derivative is wanted
     """
-    stance = STANCE_FOOT
+    stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
-    laid = pads_for(ground, walker, start, stance, pitch_m)
+    if ground.terrain.has_pads:  # the standing foot in the middle of one
+        foothold = feet_motion(walker.whole, start)[stance].along
+        laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
     walk_state = new_walk_state(walker, laid.terrain, stance, 2, start)
     stand_on_section(walk_state, walker, laid, start, stance)
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
         observer.tangent.Phi[:, :] = directions(walker, start, stance)
     stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
-    end = np.array(stopped.state)
-    slipped, rolled = since_touch(walker, walk_state, stopped.state, 1 - stance)
-    DP = section_derivative(walker, walk_state, observer, end, 1 - stance) if derived else np.zeros((z.size, 0))
+    end, landed = np.array(stopped.state), 1 - stance
+    along = feet_motion(walker.whole, stopped.state)[landed].along
+    slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
+    rolled = along - float(walk_state.foothold[landed]) - slipped
+    DP = np.zeros((z.size, 0))
+    if derived:  # the flow's, less how it shifts the moment at which the feet pass
+        system = on_ground(walker, walk_state.has_ground, walk_state.knee)
+        rate = rate_of(system, folded(system.form, end), end.size)
+        gradient, n = np.zeros(end.size), int(walker.whole.bodies)
+        gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
+        Phi = observer.tangent.Phi
+        on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
+        DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
     lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
     return SectionStep(
         stopped.outcome,
-        coordinates_of(walker, end, 1 - stance),
+        coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
         float(end[ALONG] - start[ALONG]),
@@ -199,13 +194,6 @@ def step_from_section(
         float(walk_state.touch_time[0]),
         float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
     )
-
-
-def since_touch(walker: ContactWalker, walk_state: WalkState, y: State, foot: int) -> tuple[float, float]:
-    """How far a foot has slipped and rolled since its touch (m)."""
-    along = feet_motion(walker.whole, y)[foot].along
-    slipped = material_along(walker.whole, foot, along, y) - float(walk_state.touched[foot])
-    return slipped, along - float(walk_state.foothold[foot]) - slipped
 
 
 def stand_on_section(
@@ -225,19 +213,6 @@ def stand_on_section(
     walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
 
 
-def section_derivative(
-    walker: ContactWalker, walk_state: WalkState, observer: ContactObserver, end: Floats, stance: int
-) -> Floats:
-    """Derivative of the step: the flow's, less how it shifts the moment at which the feet pass."""
-    system = on_ground(walker, walk_state.has_ground, walk_state.knee)
-    rate = rate_of(system, folded(system.form, end), end.size)
-    gradient, n = np.zeros(end.size), int(walker.whole.bodies)
-    gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
-    Phi = observer.tangent.Phi
-    on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
-    return np.column_stack([coordinates_of(walker, column, stance) for column in on_section.T])
-
-
 @dataclass(frozen=True)
 class WalkerOnGround:
     """A walker at one value of the parameter, and the ground it walks on."""
@@ -246,7 +221,7 @@ class WalkerOnGround:
     ground: JudgedGround
 
 
-class ContactMap:
+class ContactMap(StepMap):
     """A walker on compliant ground, its coordinates where the feet pass, in units of leg length and pendulum time.
 
     Pads let the swing foot of straight legs through, so that a family is followed where it touches only ahead of the
@@ -326,43 +301,8 @@ class ContactMap:
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
-    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
-        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise."""
+    def at(self, tolerances: Tolerances) -> ContactMap:
+        """The same map, its steps integrated otherwise."""
         other = copy(self)
         other.tolerances = tolerances
-        outcome, taken, _ = other._walked(z, p, steps)
-        if outcome is not Outcome.WALKED:
-            return None
-        waits = [step.period_s - step.strike_s for step in taken]
-        periods = [before + step.strike_s for before, step in zip((waits[-1], *waits), taken, strict=False)]
-        return np.array(periods), np.array([step.length_m for step in taken])
-
-    def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
-        """A walk from section to section, step by step."""
-        outcome, taken, lengths = self._walked(z, p, steps, tangent)
-        waits = [0.0, *(step.period_s - step.strike_s for step in taken)]
-        return Iterates(
-            outcome,
-            np.array([step.z for step in taken]).reshape(-1, z.size),
-            np.array(lengths),
-            np.array([wait + step.strike_s for wait, step in zip(waits, taken, strict=False)]),
-            np.array([step.angle for step in taken]),
-        )
-
-    def _walked(
-        self, z: Floats, p: float, steps: int, tangent: Floats | None = None
-    ) -> tuple[Outcome, list[MappedStep], list[float]]:
-        """The last step's outcome, the steps that were taken, and by how much a tangent grew in each."""
-        taken: list[MappedStep] = []
-        lengths: list[float] = []
-        while len(taken) < steps:
-            step = self.step(z, p, tangent is not None)
-            if step.outcome is not Outcome.WALKED:
-                return step.outcome, taken, lengths
-            z = step.z
-            taken.append(step)
-            if tangent is not None:
-                image = step.DP @ tangent
-                lengths.append(float(np.linalg.norm(image)))
-                tangent = image / lengths[-1]
-        return Outcome.WALKED, taken, lengths
+        return other

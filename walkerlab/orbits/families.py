@@ -28,7 +28,7 @@ from walkerlab.orbits.bifurcations import (
 )
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
 from walkerlab.orbits.newton import Floats, NotConverged
-from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, multipliers_of
+from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, multipliers_of, strike_to_strike
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
@@ -331,18 +331,12 @@ class BranchFollower:
             value,
             z,
             multipliers_of(cycle.DP),
-            strike_to_strike(cycle),
+            strike_to_strike(cycle.steps),
             np.array([step.length_m for step in cycle.steps]),
             np.array([step.angle for step in cycle.steps]),
             self.step_map.watch(z, value, period),
             solved,
         )
-
-
-def strike_to_strike(cycle: IteratedMap) -> Floats:
-    """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
-    waits = [step.period_s - step.strike_s for step in cycle.steps]
-    return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(cycle.steps)])
 
 
 def steps_word(n: int) -> str:

@@ -8,6 +8,7 @@ leg, stance leg, and a shank whose knee was free during the impact. A compass ha
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, swing_foot
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.similarity import Units, unit_walker
-from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor, no_step
+from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
@@ -244,7 +245,7 @@ class StepEquations:
         return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - self.unity, step)
 
 
-class RigidMap:
+class RigidMap(StepMap):
     """The rigid model: its coordinates just after the heel strike, of the similar walker of unit size."""
 
     monitors = (
@@ -265,7 +266,7 @@ class RigidMap:
         self._unit_at = lru_cache(REMEMBERED)(lambda p: similar_of(walker_at(p)))
         self.scale = scale
         self.names = SECTION_NAMES[: int(like.coordinates)]
-        self._exact, self._quick = Shooting(like, EXACT), Shooting(like, QUICK)
+        self._like, self._exact, self._quick = like, Shooting(like, EXACT), Shooting(like, QUICK)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """One step, with its exact derivative along the section."""
@@ -290,12 +291,11 @@ class RigidMap:
         extremes = (taken.min_normal_force, taken.max_friction_ratio, taken.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
 
-    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
-        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise."""
-        unit = self._unit_at(p)
-        assert unit is not None, "a gait was walked"
-        taken = take_walk(unit.walker, tolerances, on_section(unit.walker, z), steps)
-        return None if taken.steps < steps else (taken.periods_s * unit.units.time, taken.lengths_m * unit.units.length)
+    def at(self, tolerances: Tolerances) -> RigidMap:
+        """The same map, its steps integrated otherwise."""
+        other = copy(self)
+        other.tolerances, other._exact = tolerances, Shooting(self._like, tolerances)
+        return other
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """A walk of ordinary accuracy, since errors grow on a chaotic attractor whatever they are."""

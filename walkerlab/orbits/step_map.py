@@ -74,19 +74,18 @@ class Iterates:
 
 
 class StepMap(Protocol):
-    """A walker's step from section to section, over one parameter."""
+    """A walker's step from section to section, over one parameter.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The section's coordinates, all of magnitude one."""
+    names       the section's coordinates, all of magnitude one
+    monitors    what `watch` measures
+    scale       magnitude of changes of the parameter that matter
+    tolerances  of its steps
+    """
 
-    @property
-    def monitors(self) -> tuple[Monitor, ...]:
-        """What `watch` measures."""
-
-    @property
-    def scale(self) -> float:
-        """Magnitude of changes of the parameter that matter."""
+    names: tuple[str, ...]
+    monitors: tuple[Monitor, ...]
+    scale: float
+    tolerances: Tolerances
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """One step from z (d,) at the parameter's value p, with its derivative; REJECTED where p makes no walker."""
@@ -94,15 +93,49 @@ class StepMap(Protocol):
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """(monitors,) the worst of each over some steps."""
 
-    @property
-    def tolerances(self) -> Tolerances:
-        """Of its steps."""
-
-    def timed(self, z: Floats, p: float, steps: int, tolerances: Tolerances) -> tuple[Floats, Floats] | None:
-        """Durations (steps,) in s and lengths (steps,) in m of a gait's steps, integrated otherwise; None: it fell."""
+    def at(self, tolerances: Tolerances) -> StepMap:
+        """The same map, its steps integrated otherwise."""
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
+        taken, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
+        for _ in range(steps):
+            step = self.step(z, p, tangent is not None)
+            outcome = step.outcome
+            if outcome is not Outcome.WALKED:
+                break
+            z = step.z
+            taken.append(step)
+            if tangent is not None:
+                image = step.DP @ tangent
+                lengths.append(float(np.linalg.norm(image)))
+                tangent = image / lengths[-1]
+        waits = [0.0, *(step.period_s - step.strike_s for step in taken)]
+        return Iterates(
+            outcome,
+            np.array([step.z for step in taken]).reshape(-1, z.size),
+            np.array(lengths),
+            np.array([wait + step.strike_s for wait, step in zip(waits, taken, strict=False)]),
+            np.array([step.angle for step in taken]),
+        )
+
+
+def cycle_of(step_map: StepMap, z: Floats, p: float, n: int) -> tuple[MappedStep, ...] | None:
+    """n steps in a row from z (d,) at p, without derivatives; None if the walk ends."""
+    steps: list[MappedStep] = []
+    for _ in range(n):
+        step = step_map.step(z, p, derived=False)
+        if step.outcome is not Outcome.WALKED:
+            return None
+        z = step.z
+        steps.append(step)
+    return tuple(steps)
+
+
+def strike_to_strike(steps: Sequence[MappedStep]) -> Floats:
+    """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
+    waits = [step.period_s - step.strike_s for step in steps]
+    return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(steps)])
 
 
 def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome, Floats]:

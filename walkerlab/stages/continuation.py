@@ -41,7 +41,6 @@ from walkerlab.orbits.families import (
     ValueSpan,
     ends_at,
     steps_word,
-    strike_to_strike,
 )
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Floats
@@ -49,7 +48,7 @@ from walkerlab.orbits.plane import CONTROL as CURVE_CONTROL
 from walkerlab.orbits.plane import BifurcationCurve, Regions, curve_through, regions_of
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap
+from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, cycle_of, strike_to_strike
 from walkerlab.scene.endings import WHAT, causes, without_pads
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
@@ -550,14 +549,18 @@ def sample_again(followed: Followed) -> dict[str, Any] | None:
     if step_map is None or not every:
         return None
     tighter, by = tightened(step_map.tolerances)
+    otherwise = step_map.at(tighter)
     again = [
-        (point, step_map.timed(point.z, point.value, branch.period, tighter))
+        (point, cycle_of(otherwise, point.z, point.value, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [
-        (np.max(np.abs(found[0] - point.periods_s)), np.max(np.abs(found[1] - point.lengths_m)))
-        for point, found in again
-        if found is not None
+        (
+            np.max(np.abs(strike_to_strike(steps) - point.periods_s)),
+            np.max(np.abs([step.length_m for step in steps] - point.lengths_m)),
+        )
+        for point, steps in again
+        if steps is not None
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
     largest = dict(zip(OF_EACH_STEP, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
@@ -735,7 +738,7 @@ class Mark(NamedTuple):
     @property
     def periods(self) -> Floats:
         """Durations of the steps there (s)."""
-        return strike_to_strike(self.cycle)
+        return strike_to_strike(self.cycle.steps)
 
     @property
     def angles(self) -> list[float]:
