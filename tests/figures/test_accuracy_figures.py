@@ -17,7 +17,7 @@ AGREEMENT = 9e-16
 
 def drawn_lines(figure=RIGID):
     with styled():
-        left, right = figure.plot(measured_methods()).axes
+        left, right = figure.draw(measured_methods())[0].axes
     return left.lines, right.lines
 
 

@@ -22,7 +22,7 @@ FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
 
 def plotted(figure):
     with styled():
-        return figure.plot(families())
+        return figure.draw(families())[0]
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=[figure.name for figure in FIGURES])

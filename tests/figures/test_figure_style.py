@@ -39,7 +39,7 @@ VISIBLE = 0.1
 def drawn(request):
     results, figure = request.param
     with styled():
-        made = figure.plot(results)
+        made = figure.draw(results)[0]
         settle(made)
         made.draw_without_rendering()
     return made

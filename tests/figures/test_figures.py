@@ -41,7 +41,7 @@ def drawable(results):
 
 def plotted(figure, results):
     with styled():
-        return figure.plot(results)
+        return figure.draw(results)[0]
 
 
 def lines_of(axes, look):
@@ -111,7 +111,7 @@ def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
 
 
 def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
-    assert Illustration("run-time", (), str, tuple).called == "figure run-time"
+    assert Illustration("run-time", (), dict.popitem).called == "figure run-time"
 
 
 def test_every_figure_has_its_words_and_every_word_a_figure():

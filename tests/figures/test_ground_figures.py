@@ -14,7 +14,7 @@ FORCES, LOST = FIGURES
 
 def plotted(figure, results):
     with styled():
-        return figure.plot(results)
+        return figure.draw(results)[0]
 
 
 def test_friction_stands_within_the_cone_of_its_coefficients():

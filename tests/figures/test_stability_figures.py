@@ -12,7 +12,7 @@ STICTION, STEP = STABILITY
 
 def meshes(figure):
     with styled():
-        left, right, _ = figure.plot(stability_maps()).axes
+        left, right, _ = figure.draw(stability_maps())[0].axes
     return [[mesh for mesh in axes.collections if mesh.get_array() is not None] for axes in (left, right)]
 
 

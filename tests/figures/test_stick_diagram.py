@@ -70,7 +70,7 @@ def test_the_slope_is_told_above_the_torso_which_has_a_name():
 
 def drawn(figure, results):
     with styled():
-        return figure.plot(results).axes[0]
+        return figure.draw(results)[0].axes[0]
 
 
 def test_lengths_are_drawn_to_scale():

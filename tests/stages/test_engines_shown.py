@@ -36,7 +36,7 @@ def lines_of(axes):
 
 def test_every_error_there_is_stands_against_its_run_time(results):
     with styled():
-        left, right = ERRORS.plot(results).axes
+        left, right = ERRORS.draw(results)[0].axes
     for axes, experiment in ((left, "same-law"), (right, "own-law")):
         drawn = sorted((x, y) for line in lines_of(axes) for x, y in zip(*line.get_data(), strict=True))
         there = [(row.wall_s, row.error) for row in ROWS if row.experiment == experiment and row.error is not None]
@@ -45,7 +45,7 @@ def test_every_error_there_is_stands_against_its_run_time(results):
 
 def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
     with styled():
-        (axes,) = PERIODS.plot(results).axes
+        (axes,) = PERIODS.draw(results)[0].axes
     levels = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "None"]
     assert levels == pytest.approx([PERIOD, 0.7036])
     drawn = sorted(y for line in lines_of(axes) for y in line.get_ydata())
@@ -61,7 +61,7 @@ def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
 
 def test_each_panel_has_its_own_legend_since_its_lines_may_look_like_those_of_the_other(results):
     with styled():
-        drawn = ERRORS.plot(results)
+        drawn = ERRORS.draw(results)[0]
     for axes, legend in zip(drawn.axes, drawn.legends, strict=True):
         assert legend.get_title().get_text() == axes.get_title(loc="left")
         looks = {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in legend.get_lines()}
@@ -73,7 +73,7 @@ def test_a_panel_without_a_finished_walk_says_so():
     unfinished = {"engines": content([row for row in ROWS if row.experiment == "same-law" or row.engine == "exudyn"])}
     with styled():
         for figure, place in ((ERRORS, 1), (PERIODS, 0)):
-            drawn = figure.plot(unfinished)
+            drawn = figure.draw(unfinished)[0]
             assert [text.get_text() for text in drawn.axes[place].texts] == ["no walk came to its end"]
             assert as_file(drawn, "svg", figure.name, "")
 

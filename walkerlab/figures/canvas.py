@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,11 +105,7 @@ class Drawing:
     caption: str
 
 
-def files_of(
-    plot: Callable[[], Figure], name: str, title: str, kinds: Sequence[str] = ("svg", "png"), width: float = WIDTH
-) -> list[bytes]:
-    """A figure plotted within the style, of a width in in, and laid out, as a file of each kind."""
-    with styled(width):
-        figure = plot()
-        settle(figure)
-        return [as_file(figure, kind, name, title) for kind in kinds]
+def files_of(figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png")) -> list[bytes]:
+    """A figure, plotted within the style, laid out, as a file of each kind."""
+    settle(figure)
+    return [as_file(figure, kind, name, title) for kind in kinds]

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
 from walkerlab.figures.canvas import add_legend, blank, entry, is_narrow
-from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
 from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
 from walkerlab.paper.printed import ANGLE_ERROR
-from walkerlab.store.content import Group
 
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
@@ -107,11 +105,15 @@ def series_of(scene: str, results: Results) -> Iterator[Series]:
         yield Series(look, {one: rows[one][methods == name] for one in METHOD_VARIABLES}, look.style == "-")
 
 
-def plot_methods(scene: str, results: Results) -> Figure:
-    """Run time on the left, right-hand sides on the right, a line for each method, crosses where it gave up."""
-    every = list(series_of(scene, results))
+def draw_methods(scene: str, results: Results) -> Drawn:
+    """Run time on the left, right-hand sides on the right, a line for each method, crosses where it gave up.
+
+    Told: the conclusion, the reference, whether it is measured too, and what did not reach the end.
+    """
+    every, summary = list(series_of(scene, results)), results["accuracy"].summary
+    reference = summary["reference"][scene]
     # how far the reference is from a second one: errors below mean nothing
-    floor = max(float(results["accuracy"].summary["reference"][scene]["agreement"]), SMALLEST)
+    floor = max(float(reference["agreement"]), SMALLEST)
     errors = [float(np.max(one.runs["error"], where=one.runs["reached"] != 0, initial=floor)) for one in every]
     failed = FAILED * max(errors)
     figure = blank(3.9)
@@ -130,7 +132,13 @@ def plot_methods(scene: str, results: Results) -> Figure:
     left.set(ylabel="error of the end state (SI)", title="(a) against run time")
     right.set_title("(b) against right-hand sides")
     add_legend(figure, entries(every, floor))
-    return figure
+    failures = [
+        (one.look.label, one.runs["tolerance"][row], one.runs["outcome"][row])
+        for one in every
+        for row in np.flatnonzero(one.runs["reached"] == 0)
+    ]
+    itself = any(one.look.label == reference["method"] for one in every)
+    return figure, (summary["conclusions"][scene], reference, itself, failures)
 
 
 def entries(every: Sequence[Series], floor: float) -> list[Line2D]:
@@ -139,22 +147,6 @@ def entries(every: Sequence[Series], floor: float) -> list[Line2D]:
     if not all(one.runs["reached"].all() for one in every):
         found.append(entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0))
     return [*found, entry(f"reference unsure, {floor:.0e}", color=PALE, linewidth=6.0)]
-
-
-def tell_methods(scene: str, results: Results) -> tuple[Any, ...]:
-    """The conclusion, the reference, whether it is measured too, and what did not reach the end."""
-    summary, every = results["accuracy"].summary, list(series_of(scene, results))
-    reference = summary["reference"][scene]
-    failures = [
-        (one.look.label, tolerance, outcome)
-        for one in every
-        for tolerance, outcome, reached in zip(
-            one.runs["tolerance"], one.runs["outcome"], one.runs["reached"], strict=True
-        )
-        if not reached
-    ]
-    itself = any(one.look.label == reference["method"] for one in every)
-    return summary["conclusions"][scene], reference, itself, failures
 
 
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
@@ -181,8 +173,11 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series
         yield Series(look, {variable: rows[variable][mine] for variable in OF_A_SERIES}, place == 0, engine)
 
 
-def plot_errors(scene: str, results: Results) -> Figure:
-    """Same law on the left, own law on the right, each with its legend: the same look means something else there."""
+def draw_errors(scene: str, results: Results) -> Drawn:
+    """Same law on the left, own law on the right, each with its legend: the same look means something else there.
+
+    Told: the reference, and the conclusion on the same law.
+    """
     figure = blank(4.6)
     panels = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
@@ -198,7 +193,8 @@ def plot_errors(scene: str, results: Results) -> Figure:
         found = [one.key for one in every if np.isfinite(one.runs["error"]).any()]
         if found:
             add_legend(figure, found, title, edge)
-    return figure
+    summary = results[ENGINES_STAGE].summary
+    return figure, (summary["reference"][scene], summary["conclusions"][scene][SAME_LAW])
 
 
 def costs(axes: Axes) -> None:
@@ -216,35 +212,26 @@ def draw_engine(axes: Axes, one: Series, cost: str, values: Array) -> None:
     axes.plot(one.runs[cost][there], values[there], **one.line)
 
 
-def plot_periods(scene: str, results: Results) -> Figure:
-    """Period of the last step over step size, own contact, with ADAMS's law and the rigid gait as levels."""
+def draw_periods(scene: str, results: Results) -> Drawn:
+    """Period of the last step over step size, own contact, with ADAMS's law and the rigid gait as levels.
+
+    Told: the conclusion, and the steps of what did not walk to the end.
+    """
     figure = blank(4.2)
     axes = figure.subplots()
-    every = [one for one in engines_of(scene, OWN_LAW, results) if one.engine != OURS]
-    for one in every:
+    every, summary = list(engines_of(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
+    engines, reference = [one for one in every if one.engine != OURS], summary["reference"][scene]
+    for one in engines:
         draw_engine(axes, one, "step_s", np.where(one.walked, one.runs["period_s"], np.nan))
-    reference = results[ENGINES_STAGE].summary["reference"][scene]
     levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
         level = reference["rigid_period_s"]
         levels.append(axes.axhline(level, color=GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
     costs(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
-    add_legend(figure, [*levels, *(one.key for one in every if one.walked.any())])
-    return figure
-
-
-def tell_errors(scene: str, results: Results) -> tuple[Any, ...]:
-    """The reference, and the conclusion on the same law."""
-    summary = results[ENGINES_STAGE].summary
-    return summary["reference"][scene], summary["conclusions"][scene][SAME_LAW]
-
-
-def tell_periods(scene: str, results: Results) -> tuple[Any, ...]:
-    """The conclusion on own contacts, and the steps of what did not walk to the end."""
-    every = engines_of(scene, OWN_LAW, results)
+    add_legend(figure, [*levels, *(one.key for one in engines if one.walked.any())])
     failed = [(one.look.label, one.runs["step_s"][~one.walked]) for one in every if not one.walked.all()]
-    return results[ENGINES_STAGE].summary["conclusions"][scene][OWN_LAW], failed
+    return figure, (summary["conclusions"][scene][OWN_LAW], failed)
 
 
 ALIGNED, NUMERICAL, WALL = "angle_error_rad", "numerical_time_s", "wall_s"
@@ -262,10 +249,15 @@ LEAST = 1e-14
 """Shown in place of a numerical error of nothing, which has no place on a logarithmic axis."""
 
 
-def plot_limit(results: Results) -> Figure:
-    """Errors over run time, one setting a point, from the config's contact to the most rigid one."""
-    figure = blank(3.6)
-    found = limits(results)
+def draw_limit(results: Results) -> Drawn:
+    """Errors over run time, one setting a point, from the config's contact to the most rigid one.
+
+    Told: what both amount to, with point feet besides, and the paper's claim.
+    """
+    figure, of_the_paper = blank(3.6), redoes_the_paper(results)
+    # feet that roll in both models too are not made points as well
+    stored = results[TUNE_STAGE].groups
+    found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
     both = figure.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0]
     for axes, (rows, title) in zip(both, found, strict=True):
         for name, look in ERRORS.items():
@@ -273,29 +265,17 @@ def plot_limit(results: Results) -> Figure:
             axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
             if name != NUMERICAL:
                 axes.plot(rows[WALL][:1], values[:1], **CONFIGS)
-        axes.set(xscale="log", yscale="log", title=title, xlabel="run time of the walk (s)")
-        if redoes_the_paper(results):
+        axes.set(xscale="log", yscale="log", title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
+        if of_the_paper:
             axes.axhline(ANGLE_ERROR.value, **CLAIM)
     both[0].set_ylabel("error")
     key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERRORS.values()]
-    if redoes_the_paper(results):
+    if of_the_paper:
         key.append(entry("the paper's claim", **CLAIM))
     add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
-    return figure
-
-
-def limits(results: Results) -> list[tuple[Group, str]]:
-    """The series there are, with their titles: feet that roll in both models too are not made points as well."""
-    stored = results[TUNE_STAGE].groups
-    found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
-    return found if len(found) > 1 else [(found[0][0], "")]
-
-
-def tell_limit(results: Results) -> tuple[Any, ...]:
-    """What the config's contact and the most rigid one amount to, with point feet besides, and the paper's claim."""
-    first, *point_feet = [rows[ALIGNED] for rows, _ in limits(results)]
-    claim = ANGLE_ERROR.text if redoes_the_paper(results) else ""
-    return first[0], first[-1], point_feet[0][-1] if point_feet else None, claim
+    first, *point_feet = [rows[ALIGNED] for rows, _ in found]
+    claim = ANGLE_ERROR.text if of_the_paper else ""
+    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim)
 
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
@@ -308,12 +288,12 @@ WALKED = {
     for scene in ("compass", "kneed")
 }
 FIGURES = tuple(
-    Illustration(f"{about}-{scene}", (need,), partial(plot, scene), partial(told, scene), words=about, scene=scene)
-    for about, needs, plot, told in (
-        ("accuracy", MEASURED, plot_methods, tell_methods),
-        ("engines-errors", WALKED, plot_errors, tell_errors),
-        ("engines-periods", WALKED, plot_periods, tell_periods),
+    Illustration(f"{about}-{scene}", (need,), partial(draw, scene), words=about, scene=scene)
+    for about, needs, draw in (
+        ("accuracy", MEASURED, draw_methods),
+        ("engines-errors", WALKED, draw_errors),
+        ("engines-periods", WALKED, draw_periods),
     )
     for scene, need in needs.items()
 )
-FIGURE_12 = paper_figure(12, (LIMIT,), plot_limit, tell_limit)
+FIGURE_12 = paper_figure(12, (LIMIT,), draw_limit)

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry
-from walkerlab.figures.illustration import Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
 from walkerlab.labels import with_unit
@@ -154,9 +153,12 @@ ROOM: Final = 0.06
 """Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
 
 
-def plot_branches(results: Results) -> Figure:
-    """Both quantities over the whole span on the left, over the part with bifurcations on the right."""
-    figure = blank(5.6)
+def draw_branches(results: Results) -> Drawn:
+    """Both quantities over the whole span on the left, over the part with bifurcations on the right.
+
+    Told: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
+    """
+    figure, summary = blank(5.6), results[STAGE].summary
     panels = figure.subplots(2, 2)
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     kinds: set[str] = set()
@@ -184,7 +186,8 @@ def plot_branches(results: Results) -> Figure:
     for kind, (marker, colour) in marks.items():
         key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
     add_legend(figure, key)
-    return figure
+    cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
+    return figure, (summary["first_doubling"], cascades, "" if summary["unit"] == "1" else summary["unit"])
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
@@ -214,20 +217,16 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     return float(values.min()) - room, float(values.max()) + room
 
 
-def tell_branches(results: Results) -> tuple[Any, ...]:
-    """Where the model's gaits of one step change, where cascades accumulate, and the unit of both."""
-    summary = results[STAGE].summary
-    cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
-    return summary["first_doubling"], cascades, "" if summary["unit"] == "1" else summary["unit"]
-
-
 FARTHEST: Final = 1.6
 """Of the complex plane that is shown; an unstable gait's multipliers may be far outside."""
 
 
-def plot_multipliers(results: Results) -> Figure:
-    """The complex plane on the left, magnitudes over the parameter on the right."""
-    figure = blank(3.6)
+def draw_multipliers(results: Results) -> Drawn:
+    """The complex plane on the left, magnitudes over the parameter on the right.
+
+    Told: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
+    """
+    figure, largest = blank(3.6), 0.0
     left, right = figure.subplots(1, 2)
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
     for branch in drawn:
@@ -238,6 +237,7 @@ def plot_multipliers(results: Results) -> Figure:
         left.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
         # stored largest first, so that each magnitude is a line
         right.plot(value, np.hypot(real, imag), linewidth=1.0, **dots)
+        largest = max(largest, float(np.max(np.hypot(real, imag))))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
     left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
@@ -245,19 +245,12 @@ def plot_multipliers(results: Results) -> Figure:
     right.set(xlabel=label_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter")
     end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*model_entries(drawn, marker="o", markersize=3), end])
-    return figure
-
-
-def tell_multipliers(results: Results) -> tuple[Any, ...]:
-    """Where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes."""
     found: dict[tuple[str, str], list[float]] = {}
     for one in results[STAGE].summary["bifurcations"]:
         if one["period"] == 1:
             found.setdefault((one["model"], one["kind"]), []).append(one["value"])
-    drawn = [branch.group for branch in branches_of(results) if branch.period == 1]
-    magnitudes = (float(np.max(np.hypot(one["multiplier_real"], one["multiplier_imag"]))) for one in drawn)
-    largest = max(magnitudes, default=0.0)
-    return {which: sorted(values) for which, values in found.items()}, largest if largest > FARTHEST else None
+    bifurcations = {which: sorted(values) for which, values in found.items()}
+    return figure, (bifurcations, largest if largest > FARTHEST else None)
 
 
 CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
@@ -269,25 +262,32 @@ DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#
 OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
-def plot_plane(results: Results) -> Figure:
-    """Regions by what walks settle on, and every curve over them, by model, kind and period."""
+def draw_plane(results: Results) -> Drawn:
+    """Regions by what walks settle on, and every curve over them, by model, kind and period.
+
+    Told: what the curves divide, and how much of the plane settles on what.
+    """
     figure = blank(4.4)
     axes = figure.subplots()
     regions = results[STAGE].groups.get("rigid/regions")
     key: list[Artist] = []
+    shares = []
     if regions is not None:
         mesh = partial(axes.pcolormesh, regions["value"], regions["second"], shading="nearest", rasterized=True)
-        key = draw_kinds(lambda numbers, **look: mesh(numbers.T, **look), region_kinds(regions))
+        found = region_kinds(regions)
+        key = draw_kinds(lambda numbers, **look: mesh(numbers.T, **look), found)
+        shares = [(name, where.mean()) for _, name, where in found]
     looks: dict[tuple[str, str], dict[str, Any]] = {}
     for curve in branches_of(results, "curve"):
         kind = str(curve.group.attrs["kind"])
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
         axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
         axes.set_ylabel(curve.group.variables["second"].long_name)
+    axes.set_xlabel(label_of(results))
     order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
     add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
-    axes.set_xlabel(label_of(results))
-    return figure
+    kinds = sorted({kind for _, kind in looks}, key=list(MARKS).index)
+    return figure, (kinds, [model for model in CURVE_COLOURS if any(model == one for one, _ in looks)], shares)
 
 
 def region_kinds(regions: Group) -> list[Kind]:
@@ -303,17 +303,7 @@ def region_kinds(regions: Group) -> list[Kind]:
     return [kind for kind in kinds if kind[2].any()]
 
 
-def tell_plane(results: Results) -> tuple[Any, ...]:
-    """What the curves divide, and how much of the plane walks."""
-    drawn = list(branches_of(results, "curve"))
-    kinds = sorted({str(curve.group.attrs["kind"]) for curve in drawn}, key=list(MARKS).index)
-    models = [model for model in CURVE_COLOURS if any(model == curve.model for curve in drawn)]
-    regions = results[STAGE].groups.get("rigid/regions")
-    shares = [] if regions is None else [(name, where.mean()) for _, name, where in region_kinds(regions)]
-    return kinds, models, shares
-
-
-FIGURE_13 = paper_figure(13, (NEED,), plot_branches, tell_branches)
-FIGURE_14 = paper_figure(14, (NEED,), plot_multipliers, tell_multipliers)
-FIGURE_16 = paper_figure(16, (CURVES_NEED,), plot_plane, tell_plane)
+FIGURE_13 = paper_figure(13, (NEED,), draw_branches)
+FIGURE_14 = paper_figure(14, (NEED,), draw_multipliers)
+FIGURE_16 = paper_figure(16, (CURVES_NEED,), draw_plane)
 FIGURES = (FIGURE_13, FIGURE_14, FIGURE_16)

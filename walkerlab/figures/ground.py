@@ -6,12 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from walkerlab.figures.canvas import add_legend, blank, entry
-from walkerlab.figures.illustration import Illustration, Need, Results
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, LEGS, ORANGE, PURPLE
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
@@ -42,10 +41,14 @@ NOTHING: Final = 1e-3
 """Part of what is lost that is not drawn."""
 
 
-def plot_forces(results: Results) -> Figure:
-    """Both forces in time on the left, one against the other on the right."""
+def draw_forces(results: Results) -> Drawn:
+    """Both forces in time on the left, one against the other on the right.
+
+    Told: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
+    """
     result = results[CONTACT_STAGE]
-    walk = walk_of(result, CONTACT).first(STRIDES)
+    whole = walk_of(result, CONTACT)
+    walk, every = whole.first(STRIDES), whole[NORMAL]
     loads, pulls = walk[NORMAL], walk[FRICTION]
     # the normal force (N) up to which it is shown
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
@@ -81,16 +84,9 @@ def plot_forces(results: Results) -> Figure:
     cone.set(xlabel=of_normal, ylabel=of_friction, title="(c) against the friction cone")
     cone.set(xlim=(0.0, top), ylim=(-wide, wide))
     add_legend(figure, key)
-    return figure
-
-
-def tell_forces(results: Results) -> tuple[Any, ...]:
-    """How many strides are shown if not all, how steep the force gets, and how large an impact's is."""
-    walk = walk_of(results[CONTACT_STAGE], CONTACT)
-    shown, load = walk.first(STRIDES), walk[NORMAL]
-    borne = load > 0.1 * float(np.median(load.max(axis=1)))
-    ratio = float((np.abs(walk[FRICTION][borne]) / load[borne]).max()) if borne.any() else 0.0
-    return 0 if shown is walk else STRIDES, ratio, load.max()
+    borne = every > 0.1 * float(np.median(every.max(axis=1)))
+    ratio = float((np.abs(whole[FRICTION][borne]) / every[borne]).max()) if borne.any() else 0.0
+    return figure, (0 if walk is whole else STRIDES, ratio, every.max())
 
 
 def losses(walk: Walk) -> dict[tuple[str, str], Array]:
@@ -103,8 +99,8 @@ def losses(walk: Walk) -> dict[tuple[str, str], Array]:
     return {cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NOTHING * np.abs(total).max()}
 
 
-def plot_losses(results: Results) -> Figure:
-    """A bar for each step, its causes on one another."""
+def draw_losses(results: Results) -> Drawn:
+    """A bar for each step, its causes on one another; told: how much a step loses (J), and to what."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure = blank(2.9)
     axes = figure.subplots()
@@ -116,17 +112,11 @@ def plot_losses(results: Results) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set(xlabel="step number (1)", ylabel="energy lost (J)")
     add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
-    return figure
-
-
-def tell_losses(results: Results) -> tuple[Any, ...]:
-    """How much a step loses (J), and to what."""
-    found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
-    return later, sum(later.values())
+    return figure, (later, sum(later.values()))
 
 
 FIGURES = (
-    Illustration("ground-forces", (FORCES,), plot_forces, tell_forces),
-    Illustration("energy-lost", (ENERGY, STEPS_TAKEN_CONTACT), plot_losses, tell_losses),
+    Illustration("ground-forces", (FORCES,), draw_forces),
+    Illustration("energy-lost", (ENERGY, STEPS_TAKEN_CONTACT), draw_losses),
 )

@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import Drawing, files_of
+from walkerlab.figures.canvas import Drawing, files_of, styled
 from walkerlab.figures.style import POINT
 from walkerlab.prose import Prose, f, percent
 from walkerlab.store.artifact import Stored
@@ -18,6 +18,9 @@ WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
 
 Results = Mapping[str, Stored]
 """Results by the name of their stage."""
+Drawn = tuple[Figure, tuple[Any, ...]]
+"""A figure, and what the template of its caption takes."""
+Draw = Callable[[Results], Drawn]
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,7 @@ class Illustration:
 
     name    of its files, without suffix
     needs   what it cannot be drawn without; what else is there is drawn too
-    plot    the figure; called within the common style
-    told    what the caption's template takes of the results
+    draw    the figure, and what the caption's template takes of the results; called within the common style
     number  the paper's; None if the paper has no such figure
     words   file in `words/` with its title, its caption and what one sees; the figure's name if empty
     scene   what those words are about, if a file serves several figures
@@ -63,8 +65,7 @@ class Illustration:
 
     name: str
     needs: tuple[Need, ...]
-    plot: Callable[[Results], Figure]
-    told: Callable[[Results], tuple[Any, ...]]
+    draw: Draw
     number: int | None = None
     words: str = ""
     scene: str = ""
@@ -85,7 +86,8 @@ class Illustration:
 
     def caption(self, results: Results) -> str:
         """One or two sentences with numbers of the results."""
-        return self.say("caption", *self.told(results))
+        with styled():
+            return self.say("caption", *self.draw(results)[1])
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -112,16 +114,17 @@ class Illustration:
 
     def drawn(self, results: Results) -> Drawing:
         """Its files and words; the same results give the same bytes."""
-        svg, png = files_of(lambda: self.plot(results), self.name, self.heading)
-        return Drawing(svg, png, self.title, self.caption(results))
+        with styled():
+            figure, told = self.draw(results)
+            svg, png = files_of(figure, self.name, self.heading)
+        return Drawing(svg, png, self.title, self.say("caption", *told))
 
     def as_file(self, results: Results, kind: str, width: float) -> bytes:
         """The figure as PDF, SVG or PNG, of a width in pt."""
-        return files_of(lambda: self.plot(results), self.name, self.heading, [kind], POINT * width)[0]
+        with styled(POINT * width):
+            return files_of(self.draw(results)[0], self.name, self.heading, [kind])[0]
 
 
-def paper_figure(
-    number: int, needs: tuple[Need, ...], plot: Callable[[Results], Figure], told: Callable[[Results], tuple[Any, ...]]
-) -> Illustration:
+def paper_figure(number: int, needs: tuple[Need, ...], draw: Draw) -> Illustration:
     """A figure of the paper, drawn anew."""
-    return Illustration(f"figure-{number:02d}", needs, plot, told, number)
+    return Illustration(f"figure-{number:02d}", needs, draw, number)

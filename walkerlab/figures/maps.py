@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
 from walkerlab.figures.canvas import add_legend, blank, entry
-from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
 from walkerlab.hybrid.outcome import Outcome
@@ -94,9 +94,12 @@ MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
-def plot_starts(results: Results) -> Figure:
-    """Both models' maps on the same axes, outcome as colour, lines where more steps are walked."""
-    cells = results[TUNE_STAGE]["map"]
+def draw_starts(results: Results) -> Drawn:
+    """Both models' maps on the same axes, outcome as colour, lines where more steps are walked.
+
+    Told: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
+    """
+    cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
     across, up = cells[SWING], cells[STANCE]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
     for name, marker, size, face in (("adjusted", "D", 9, "none"), ("gait", "X", 6, WHITE)):
@@ -125,16 +128,9 @@ def plot_starts(results: Results) -> Figure:
         key.append(entry(label, **mark, markerfacecolor=face))
     both[0].set(xlim=across[[0, -1]], ylim=up[[0, -1]])
     add_legend(figure, key)
-    return figure
-
-
-def tell_starts(results: Results) -> tuple[Any, ...]:
-    """How many starts walk, and the factors at which the paper's own would lie; none of these for another scene."""
-    result = results[TUNE_STAGE]
-    coordinates = ("dtheta_1", "dtheta_2") if redoes_the_paper(results) else ()
-    rows = [result.summary["table2"][name] for name in coordinates]
+    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if redoes_the_paper(results) else []
     paper = [abs(row["paper_adams"] / row["ours_rigid"]) for row in rows]
-    return result.summary["map"], result["map"].attrs["steps_wanted"], paper
+    return figure, (summary["map"], cells.attrs["steps_wanted"], paper)
 
 
 BASIN: Final = "basin"
@@ -145,8 +141,11 @@ OTHER_FAILURE: Final = "#C8C8C8"
 NO_ATTRACTOR: Final = -1
 
 
-def plot_basins(results: Results) -> Figure:
-    """Attractors and failures by colour on the left, steps to settle by brightness on the right."""
+def draw_basins(results: Results) -> Drawn:
+    """Attractors and failures by colour on the left, steps to settle by brightness on the right.
+
+    Told: what is walked, how much of the window walks, and to which attractors.
+    """
     summary, cells = results[BASIN].summary, results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
@@ -180,7 +179,9 @@ def plot_basins(results: Results) -> Figure:
         axes.set(xlim=xlim, ylim=ylim, xlabel=axis_of(cells, plane[0]))
     left.set_ylabel(axis_of(cells, plane[1]))
     add_legend(figure, [*key, entry("rigid gait of one step", linestyle="", **gait)])
-    return figure
+    rows = enumerate(summary["attractors"])
+    reached = [(attractor_name(number, summary["attractors"]), row) for number, row in rows if row["cells"]]
+    return figure, (summary, reached)
 
 
 def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
@@ -209,14 +210,6 @@ def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
     same = [other for other, row in enumerate(attractors) if row["period"] == period]
     letter = f" ({'abcdefghijklmnopqrstuvwxyz'[same.index(number) % 26]})" if len(same) > 1 else ""
     return f"gait of {period} step{'' if period == 1 else 's'}{letter}"
-
-
-def tell_basins(results: Results) -> tuple[Any, ...]:
-    """What is walked, how much of the window walks, and to which attractors."""
-    summary = results[BASIN].summary
-    attractors = summary["attractors"]
-    reached = [(attractor_name(number, attractors), row) for number, row in enumerate(attractors) if row["cells"]]
-    return summary, reached
 
 
 MAPS: Final = "stability-maps"
@@ -274,8 +267,8 @@ class OverStiffness:
                 self.draw(self.right, alone, cmap=ListedColormap([colour]))
 
 
-def plot_stiction(results: Results) -> Figure:
-    """Outcome on the left, error on the right."""
+def draw_stiction(results: Results) -> Drawn:
+    """Outcome on the left, error on the right; told: what is walked, and how many cells come out how."""
     cells = results[MAPS]["stiction"]
     made = OverStiffness.of(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
@@ -290,11 +283,11 @@ def plot_stiction(results: Results) -> Figure:
         axes.plot(*PAPER, **mark, markersize=5.0)
     patches = [Patch(facecolor=colour, label=label) for colour, label in seen]
     add_legend(made.figure, [*patches, entry("paper", linestyle="none", **mark)])
-    return made.figure
+    return made.figure, (results[MAPS].summary, cells.attrs)
 
 
-def plot_step(results: Results) -> Figure:
-    """Verdict on the left, error on the right."""
+def draw_step(results: Results) -> Drawn:
+    """Verdict on the left, error on the right; told: what is walked, and how many cells come out how."""
     cells = results[MAPS]["step"]
     names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
     made = OverStiffness.of(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
@@ -309,20 +302,15 @@ def plot_step(results: Results) -> Figure:
     seen = [names[int(number)] for number in np.unique(cells["verdict"])]
     patches = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
     add_legend(made.figure, [*patches, entry("the paper's stiffness", **line)])
-    return made.figure
-
-
-def tell_maps(which: str, results: Results) -> tuple[Any, ...]:
-    """What is walked, and how many cells come out how."""
-    return results[MAPS].summary, results[MAPS][which].attrs
+    return made.figure, (results[MAPS].summary, cells.attrs)
 
 
 NEVER = "it has no such map"
 STICTION_NEED = Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER)
 STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER)
 STABILITY = (
-    Illustration("stability-stiction", (STICTION_NEED,), plot_stiction, partial(tell_maps, "stiction")),
-    Illustration("stability-step", (STEP_NEED,), plot_step, partial(tell_maps, "step")),
+    Illustration("stability-stiction", (STICTION_NEED,), draw_stiction),
+    Illustration("stability-step", (STEP_NEED,), draw_step),
 )
-FIGURE_15 = paper_figure(15, (CELLS,), plot_basins, tell_basins)
-FIGURES = (paper_figure(11, (MAP,), plot_starts, tell_starts), FIGURE_15)
+FIGURE_15 = paper_figure(15, (CELLS,), draw_basins)
+FIGURES = (paper_figure(11, (MAP,), draw_starts), FIGURE_15)

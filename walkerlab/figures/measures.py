@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
-from walkerlab.figures.canvas import blank, files_of
+from walkerlab.figures.canvas import blank, files_of, styled
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -116,11 +116,10 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
-
-    def plot() -> Figure:
-        return of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
-
-    return files_of(plot, name, f"The measures of a walker of type {walker.type}", [kind])[0]
+    title = f"The measures of a walker of type {walker.type}"
+    with styled():
+        figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
+        return files_of(figure, name, title, [kind])[0]
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:

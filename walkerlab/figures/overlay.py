@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure
 
-from walkerlab.figures.canvas import add_legend, blank, entry, files_of
+from walkerlab.figures.canvas import add_legend, blank, entry, files_of, styled
 from walkerlab.figures.style import BLUE, ORANGE
 from walkerlab.figures.walks import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.store.content import Content, Group
@@ -29,7 +29,10 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
         for stage in (RIGID_STAGE, CONTACT_STAGE)
         if all(stage in run and run[stage].groups.get("trajectory") for run in (first, second))
     ]
-    return files_of(lambda: drawn(both, names), "diff", f"{names[0]} and {names[1]}") if both else None
+    if not both:
+        return None
+    with styled():
+        return files_of(drawn(both, names), "diff", f"{names[0]} and {names[1]}")
 
 
 def drawn(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:

@@ -19,7 +19,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry, styled
-from walkerlab.figures.illustration import Illustration, Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
@@ -251,39 +251,33 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
     return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
 
 
-def plot_cycle(stage: str, results: Results) -> Figure:
-    """A model's walker on its pads, or on its plane."""
-    sticks, pads = sticks_of(results[stage]), results[stage].groups.get("terrain")
+def draw_cycle(stage: str, results: Results) -> Drawn:
+    """A model's walker on its pads, or on its plane.
+
+    Told: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of the
+    contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
+    """
+    result = results[stage]
+    sticks, pads = sticks_of(result), result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
     ground = [] if pads is None else draw_pads(axes, sticks, pads)
     if pads is None:
         draw_slope(axes, sticks)
     add_legend(figure, [*entries(sticks), *ground])
-    return figure
-
-
-def tell_cycle(stage: str, results: Results) -> tuple[Any, ...]:
-    """How long the steps of the cycle take and how far they go, whether it was completed, and what is drawn.
-
-    Of the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
-    """
-    result = results[stage]
-    sticks = sticks_of(result)
     strikes = sticks.strikes[:CYCLE]
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
     told = list(steps), strikes.size == CYCLE, sticks.head is not None
     if stage == RIGID_STAGE:
-        return told
-    pitch = result.summary["pitch_m"] if "terrain" in result.groups else None
-    return *told, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch
+        return figure, told
+    pitch = None if pads is None else result.summary["pitch_m"]
+    return figure, (*told, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
 
 
 FIGURE_2, FIGURE_6 = (
     paper_figure(
         number,
         (Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), steps_taken),
-        partial(plot_cycle, stage),
-        partial(tell_cycle, stage),
+        partial(draw_cycle, stage),
     )
     for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
 )

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of
+from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, styled
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
 from walkerlab.store.content import Group
@@ -60,13 +60,12 @@ def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, .
     names       what to draw, at least one
     """
     title = f"{stage} over {', '.join(parameters)}"
-
-    def plot() -> Figure:
+    with styled():
         if len(dims) != 2:
-            return panels(group, parameters, dims, names)
-        return (lines if in_lines(group, dims) else maps)(group, parameters, names)
-
-    svg, png = files_of(plot, f"sweep-{stage}", title)
+            figure = panels(group, parameters, dims, names)
+        else:
+            figure = (lines if in_lines(group, dims) else maps)(group, parameters, names)
+        svg, png = files_of(figure, f"sweep-{stage}", title)
     return Drawing(svg, png, title, caption(group, dims, parameters, names))
 
 

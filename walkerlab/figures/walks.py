@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from operator import is_
 from typing import Any, Final
 
@@ -16,7 +15,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry
-from walkerlab.figures.illustration import Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, CONTACT, GREY, PALE, RIGID, VERMILLION, Look
 from walkerlab.labels import with_unit
 from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
@@ -185,35 +184,29 @@ ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start of those
 FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid model took no step")
 
 
-def adjusted_walks(results: Results) -> tuple[list[Walk], str]:
-    """The first strides of the rigid model from its start and of the contact model from the adjusted one."""
-    result = results[TUNE_STAGE]
-    outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
-    both = (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome))
-    times = [touch_times(result[group]) for group, *_ in both]
-    walks = [Walk(look, end, at.size, at, result[group]) for at, (group, look, end) in zip(times, both, strict=True)]
-    return shown(walks)
-
-
 def redoes_the_procedure(results: Results) -> bool:
     """Whether the walker is the paper's compass, whose legs are links there."""
     return "paper_start" in results[TUNE_STAGE].summary
 
 
-def plot_adjusted(results: Results) -> Figure:
-    """A row for each link: called as in the paper if the walker is its compass, else by what it does first."""
-    walks, _ = adjusted_walks(results)
-    own = ("the leg that swings first", "the leg that stands first")
-    links = ("link 1", "link 2") if redoes_the_procedure(results) else own
+def draw_adjusted(results: Results) -> Drawn:
+    """The rigid model from its start, the contact model from the adjusted one, a row for each link.
+
+    It is called as in the paper if the walker is its compass, else by what it does first. Told: what the start was, how
+    much is shown, and whether there are links.
+    """
+    result, named = results[TUNE_STAGE], redoes_the_procedure(results)
+    outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
+    whole = []
+    for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
+        times = touch_times(result[group])
+        whole.append(Walk(look, end, times.size, times, result[group]))
+    walks, extent = shown(whole)
+    links = ("link 1", "link 2") if named else ("the leg that swings first", "the leg that stands first")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
     figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
     legend(figure, walks)
-    return figure
-
-
-def tell_adjusted(results: Results) -> tuple[Any, ...]:
-    """What the start was, and how the walk went."""
-    return results[TUNE_STAGE].summary["adjustment"], adjusted_walks(results)[1], redoes_the_procedure(results)
+    return figure, (result.summary["adjustment"], extent, named)
 
 
 STATES_IN_TIME = (
@@ -224,9 +217,12 @@ STATES_IN_TIME = (
 )
 
 
-def plot_states(results: Results) -> Figure:
-    """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker."""
-    walks, _ = shown(walks_with(results, RIGID_STATES, CONTACT_STATES))
+def draw_states(results: Results) -> Drawn:
+    """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker.
+
+    Told: how much is shown, and how the walks went.
+    """
+    walks, extent = shown(walks_with(results, RIGID_STATES, CONTACT_STATES))
     first = walks[0]
     figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
     for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
@@ -235,13 +231,7 @@ def plot_states(results: Results) -> Figure:
             one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
     stance = f"stance of the leg, {first.look.label.split()[0]}"
     legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
-    return figure
-
-
-def tell_walks(strides: int, results: Results) -> tuple[Any, ...]:
-    """How much is shown, and how the walks went."""
-    walks = walks_with(results, RIGID_STATES, CONTACT_STATES)
-    return shown(walks, strides)[1], sentence(walks)
+    return figure, (extent, sentence(walks))
 
 
 AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
@@ -265,8 +255,11 @@ ALIGNED_ERRORS = Need(
 )
 
 
-def plot_differences(results: Results) -> Figure:
-    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps."""
+def draw_differences(results: Results) -> Drawn:
+    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
+
+    Told: the largest errors of all that was compared, in both ways, and the paper's.
+    """
     (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     of_the_paper, early = redoes_the_paper(results), raw["time"] <= rigid.time[-1]
@@ -288,17 +281,11 @@ def plot_differences(results: Results) -> Figure:
         one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
-    return figure
-
-
-def tell_differences(results: Results) -> tuple[Any, ...]:
-    """The largest errors of all that was compared, in both ways, and the paper's."""
-    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
-    largest = []
+    told = []
     for _, words, name, _ in QUANTITIES:
         at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
-        largest.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
-    return largest, ANGLE_ERROR.text if redoes_the_paper(results) else ""
+        told.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
+    return figure, (told, ANGLE_ERROR.text if of_the_paper else "")
 
 
 CYCLES = 20
@@ -310,14 +297,14 @@ ARROW_LENGTH = 0.06
 """Of an arrow on the cycle, in parts of a step's samples."""
 
 
-def plot_cycles(results: Results) -> Figure:
-    """A phase plane for each leg, both on the same scales."""
-    walks, _ = shown(walks_with(results, RIGID_STATES, CONTACT_STATES), CYCLES)
+def draw_cycles(results: Results) -> Drawn:
+    """A phase plane for each leg, both on the same scales; told: how much is shown, and how the walks went."""
+    walks, extent = shown(walks_with(results, RIGID_STATES, CONTACT_STATES), CYCLES)
     figure = blank(4.2)
     axes = list(figure.subplots(1, 2, sharex=True, sharey=True))
     for leg, one in enumerate(axes):
         for walk in walks:
-            draw_cycles(one, walk, leg)
+            draw_cycles_of(one, walk, leg)
         show_direction(one, walks[0], leg)
         one.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
     axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
@@ -328,10 +315,10 @@ def plot_cycles(results: Results) -> Figure:
         dot: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": GREY, "markerfacecolor": face}
         key.append(entry(f"heel strike of {whose}", linestyle="none", **dot))
     add_legend(figure, key)
-    return figure
+    return figure, (extent, sentence(walks))
 
 
-def draw_cycles(axes: Axes, walk: Walk, leg: int) -> None:
+def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
     """The last stride as the model's look has it, those before as thin lines under it.
 
     Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
@@ -375,9 +362,13 @@ FEW = 0.005
 """Part of the samples that lie within impacts, and so do not set the scale."""
 
 
-def plot_energies(results: Results) -> Figure:
-    """A row for each energy."""
-    walks, _ = shown(walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES))
+def draw_energies(results: Results) -> Drawn:
+    """A row for each energy.
+
+    Told: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are impacts,
+    and how the walks went.
+    """
+    walks, extent = shown(walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
     bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
@@ -385,25 +376,19 @@ def plot_energies(results: Results) -> Figure:
     room = 0.5 * lacking + MARGIN * (top - bottom)
     axes[-1].set_ylim(bottom - room, top + room)
     legend(figure, walks)
-    return figure
-
-
-def tell_energies(results: Results) -> tuple[Any, ...]:
-    """How much is shown, the means of the mechanical energy, and how the walks went."""
-    walks = walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES)
-    cut, extent = shown(walks)
     means = []
-    for walk in cut:
+    for walk in walks:
         energy, durations = walk["mechanical_J"], np.diff(walk.time)
         integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
         means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
-    return extent, means, redoes_the_paper(results), any(walk.look is CONTACT for walk in walks), sentence(walks)
+    impacts = any(walk.look is CONTACT for walk in walks)
+    return figure, (extent, means, redoes_the_paper(results), impacts, sentence(walks))
 
 
 FIGURES = (
-    paper_figure(5, (ADJUSTED, FROM_RIGID), plot_adjusted, tell_adjusted),
-    paper_figure(7, (RIGID_STATES,), plot_states, partial(tell_walks, PAPER_STRIDES)),
-    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), plot_differences, tell_differences),
-    paper_figure(9, (RIGID_STATES,), plot_cycles, partial(tell_walks, CYCLES)),
-    paper_figure(10, (RIGID_ENERGIES,), plot_energies, tell_energies),
+    paper_figure(5, (ADJUSTED, FROM_RIGID), draw_adjusted),
+    paper_figure(7, (RIGID_STATES,), draw_states),
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), draw_differences),
+    paper_figure(9, (RIGID_STATES,), draw_cycles),
+    paper_figure(10, (RIGID_ENERGIES,), draw_energies),
 )
