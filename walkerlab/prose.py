@@ -69,3 +69,7 @@ class Prose:
     def parts(self, name: str, *values: Any) -> list[str]:
         """The paragraphs, or words, that a macro sets apart by |."""
         return parts(self(name, *values))
+
+    def terms(self, name: str, *values: Any) -> dict[str, str]:
+        """Words and what they mean, which a macro has as parts of the form 'word: meaning'."""
+        return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

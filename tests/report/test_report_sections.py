@@ -31,10 +31,10 @@ from walkerlab.report.registry import SECTIONS, lead, sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
 from walkerlab.report.sections.gaits import SETS, coordinate, every_gait
-from walkerlab.report.sections.verdict import HEADLINES
 from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
+from walkerlab.report.words import words
 from walkerlab.scene.left_out import LeftOut
 
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
@@ -213,7 +213,7 @@ def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
 
 def test_every_headline_is_of_an_erratum_that_is_looked_for():
     errata = Path(find_spec("walkerlab.paper.prose").submodule_search_locations[0]) / "errata.j2"
-    assert [start for start in HEADLINES if f"where: {start}" not in errata.read_text()] == []
+    assert [start for start in words.terms("verdict.headlines") if f"where: {start}" not in errata.read_text()] == []
 
 
 def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_on_a_page_of_its_own():

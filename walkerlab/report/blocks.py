@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Protocol
 
@@ -110,7 +111,7 @@ class Terms:
     """Words and what they mean."""
 
     template: ClassVar[str] = "terms"
-    items: tuple[tuple[str, str], ...]
+    meanings: Mapping[str, str]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import islice
+from itertools import chain
 from typing import Final
 
 HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
@@ -47,12 +47,9 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
     """
     there = list(dict.fromkeys(names))
     if stage not in HEADLINES:
-        found = (name for name in there if "." not in name)
-    else:
-        found = (
-            name
-            for wanted in HEADLINES[stage]
-            for name in there
-            if name == wanted or (wanted.endswith(".") and name.startswith(wanted))
-        )
-    return list(islice(found, MOST))
+        return [name for name in there if "." not in name][:MOST]
+    meant = (
+        [name for name in there if name == wanted or (wanted.endswith(".") and name.startswith(wanted))]
+        for wanted in HEADLINES[stage]
+    )
+    return list(chain(*meant))[:MOST]

@@ -34,11 +34,6 @@ class Cell:
     tone: Tone | None = None
     value: Any = None
 
-    @property
-    def empty(self) -> bool:
-        """Whether there is nothing to say."""
-        return self.text in ("", NONE)
-
 
 def plainly(value: Any) -> str:
     """A text as it is, a truth value as yes or no, a dash for None."""

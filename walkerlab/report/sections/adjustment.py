@@ -179,11 +179,7 @@ WALK_COLUMNS = (
 
 def walks_table(results: Results, summary: Summary) -> Table:
     """The procedure, walk by walk."""
-    names = {
-        "hinged": "first step with a revolute joint, from the rigid state",
-        "released": f"{'without the joint, ' if 'hinged' in summary['procedure'] else ''}from the rigid state",
-        "adjusted": "from the adjusted start",
-    }
+    names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
     walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
     if results.of_the_paper:
         walks.append({"walk": "from the paper's ADAMS start", **summary["paper_start"]})

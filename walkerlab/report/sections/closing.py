@@ -32,9 +32,8 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
 
 def glossary(results: Results) -> Section:
     """What the words mean."""
-    told = words.parts("closing.glossary", results.config.contact is not None)
-    terms = Terms(tuple((word, meaning) for word, _, meaning in (one.partition(": ") for one in told)))
-    return Section("glossary", "Glossary", (terms,), "The words of this report, in a line each.")
+    told = words.terms("closing.glossary", results.config.contact is not None)
+    return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
 
 
 def left_out(results: Results) -> Section:

@@ -98,8 +98,8 @@ def pads(results: Results) -> tuple[Pad, ...]:
     terrain = results.group(CONTACT, "terrain")
     if terrain is None or "left_m" not in terrain.variables:
         return ()
-    columns = (terrain["left_m"].tolist(), terrain["right_m"].tolist(), terrain["leg"].tolist())
-    return tuple((round(left, 4), round(right, 4), int(leg)) for left, right, leg in zip(*columns, strict=True))
+    left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
+    return tuple((round(one[0], 4), round(one[1], 4), int(one[2])) for one in zip(left, right, leg, strict=True))
 
 
 def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:

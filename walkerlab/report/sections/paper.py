@@ -24,20 +24,13 @@ BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "cont
 """What a number of the paper is compared with."""
 
 
-MEANINGS = {
-    "reproduced": "They come out to the printed digits; parameters that are used as printed are among them.",
-    "explained": "They do not come out, or not by themselves, and what was measured says why.",
-    "refuted": "They contradict what was measured, or the paper’s own numbers.",
-}
-"""What a verdict says."""
-
-
 def numbers(results: Results) -> Section | None:
     """All the paper's numbers with their verdicts."""
     rows = paper_numbers(results)
     if not rows:
         return None
-    told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in MEANINGS.items())
+    meanings = words.terms("paper.verdicts").items()
+    told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
     blocks: tuple[PageBlock, ...] = (Statements(told, "lines"), numbers_table(rows))
     if results.departures:
         blocks = (Paragraph(words("paper.departs", results.departures), "fair"), *blocks)
@@ -79,19 +72,6 @@ def unit_of(row: Row) -> str:
     return f" ({unit})" if unit not in ("", "1") else ""
 
 
-CAPTIONS = {
-    "table1": "Table 1: parameters of the walker, in the paper and as used here",
-    "table2": "Table 2: initial values, in the paper and here",
-    "table3": "Table 3: characteristics of the walk, in the paper and here",
-}
-"""The tables in the summary of `compare`."""
-
-NOTES = {
-    "table3": "Ours are of the last completed stride, whose first step is the left one; the energy is the time mean "
-    "over the rigid gaits' ten steps and over the contact model's last five."
-}
-"""What to know when reading them: whose periods these are, and over which time a mean is."""
-
 HEADS = {
     "paper": "paper",
     "paper_matlab": "paper, MATLAB",
@@ -104,21 +84,14 @@ HEADS = {
 }
 """Heads of columns; one that is not among them is called by its name."""
 
-NAMES = {
-    "t_left": "left step period",
-    "t_right": "right step period",
-    "t_cycle": "one cycle period",
-    "v_com": "average velocity",
-    "E_avg": "average mechanical energy",
-}
-"""What the rows are called in words, where their symbol does not say it."""
-
 
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
-    summary = results.summary("compare")
+    summary, notes = results.summary("compare"), words.terms("paper.notes")
     shown: list[PageBlock] = [
-        paper_table(caption, summary[key], NOTES.get(key, "")) for key, caption in CAPTIONS.items() if summary.get(key)
+        paper_table(caption, summary[key], notes.get(key, ""))
+        for key, caption in words.terms("paper.tables").items()
+        if summary.get(key)
     ]
     return Section("tables", "The paper’s tables", tuple(shown), page=PAPER) if shown else None
 
@@ -131,9 +104,12 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
         written = in_signs if texts else partial(number, digits=3 if "percent" in key else 6)
         columns.append(Column(HEADS.get(key, key.replace("_", " ")), key, written, numeric=not texts))
     shown = [column for column in columns if column.of != "unit"]
-    names = {symbol: f"{NAMES[symbol]}, {symbol}" if symbol in NAMES else symbol for symbol in rows}
+    names = {symbol: f"{said}, {symbol}" for symbol, said in words.terms("paper.quantities").items()}
     return table(
-        caption, shown, [{"row": named(names[one], row.get("unit")), **row} for one, row in rows.items()], note=note
+        caption,
+        shown,
+        [{"row": named(names.get(one, one), row.get("unit")), **row} for one, row in rows.items()],
+        note=note,
     )
 
 

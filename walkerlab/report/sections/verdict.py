@@ -17,17 +17,6 @@ from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Tone
 from walkerlab.report.words import words
 
-HEADLINES = {
-    "A.5 row 2": "The equations of motion have a sign error",
-    "eq. 11": "The paper’s gait is that of the misprinted equations",
-    "Table 3, step periods": "The two steps of a cycle are equal",
-    "Table 3, velocity": "The walker is much faster than printed",
-    "Table 2, ADAMS start": "The raised velocities do not start a gait",
-    "Fig. 8": "The models do not agree to 10⁻⁴",
-    "section 4, Fig. 4b": "The contact’s numbers are meant in N, mm and s",
-}
-"""The errata that matter most, by how their place begins, and what they come to in a few words."""
-
 
 def section(results: Results) -> Section:
     """What a reader should know who reads no further."""
@@ -100,7 +89,8 @@ def of_the_paper(results: Results, rows: Sequence[Mapping[str, Any]]) -> Iterato
         if here
     )
     yield Statements(tuple(told), "lines")
-    gravest = [(said, one) for place, said in HEADLINES.items() for one in found if one["where"].startswith(place)]
+    headlines = words.terms("verdict.headlines").items()
+    gravest = [(said, one) for place, said in headlines for one in found if one["where"].startswith(place)]
     if gravest:
         yield Paragraph(words("verdict.reasons"))
         told = (

@@ -7,18 +7,7 @@ from itertools import zip_longest
 from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
-from walkerlab.report.numbers import (
-    NONE,
-    count,
-    decimals_left,
-    fixed,
-    length,
-    number,
-    power_of_ten,
-    quantity,
-    span,
-    whole,
-)
+from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CHANNELS, CONTACT, MODELS, RIGID, tone
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
@@ -41,34 +30,23 @@ def contact(results: Results) -> Section | None:
 
 def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
     """The numbers of the contact walk that there are: name, value and meaning of each."""
-    get = summary.get
-    ratio, slips, accepted = get("damping_ratio"), get("slips_m"), get("accepted_steps")
-    bounce = "under-damped: a foot bounces" if ratio is None or ratio < 1 else "over-damped: a foot does not bounce"
-    steps = f"; {count(accepted or 0, 'solver step')} accepted, {get('rejected_steps')} rejected"
-    rows: list[tuple[str, str | Cell, str]] = [
-        ("outcome", Cell(summary["outcome"], tone(summary["outcome"])), "how the walk ended"),
-        ("largest penetration", length(get("max_penetration_m")), "of either foot"),
-        ("static penetration", length(get("static_penetration_m")), "the whole weight on one foot"),
-        ("damping ratio", number(ratio, 3), f"about that rest, of the whole mass; {bounce}"),
-        ("slip a step", length(get("slip_per_step_m")), "net, downhill positive, mean over the steps"),
-        (
-            "slip, step by step",
-            span([1e3 * slip for slip in slips or ()], "mm", 3),
-            "of the stance foot's material, from its touch to its lift",
-        ),
-        ("rolling a step", length(get("rolling_per_step_m") or None), "of the round foot: rolling, not slip"),
-        (
-            "energy balance residual",
-            joules(summary["energy_balance_residual_J"]),
-            "largest, of mechanical and dissipated energy",
-        ),
-        *(
-            (f"energy lost {CHANNELS.get(key, key)}", joules(value), "over the whole walk")
-            for key, value in (get("dissipated_J") or {}).items()
-        ),
-        ("work", whole(get("rhs_evaluations")), f"right-hand sides{steps if accepted is not None else ''}"),
+    get, lost = summary.get, summary.get("dissipated_J") or {}
+    values: dict[str, str | Cell] = {
+        "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
+        "largest penetration": length(get("max_penetration_m")),
+        "static penetration": length(get("static_penetration_m")),
+        "damping ratio": number(get("damping_ratio"), 3),
+        "slip a step": length(get("slip_per_step_m")),
+        "slip, step by step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
+        "rolling a step": length(get("rolling_per_step_m") or None),
+        "energy balance residual": joules(summary["energy_balance_residual_J"]),
+        **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
+        "work": whole(get("rhs_evaluations")),
+    }
+    meanings = words.terms("walks.meanings", summary)
+    return [
+        (name, value, meanings.get(name, meanings["energy lost"])) for name, value in values.items() if value != NONE
     ]
-    return [(name, value, meaning) for name, value, meaning in rows if value != NONE]
 
 
 def joules(value: float, digits: int = 4) -> str:
@@ -79,25 +57,6 @@ def joules(value: float, digits: int = 4) -> str:
 HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
 ROUNDING = 1e-6
 """Relative drift of an energy that counts as constant, and depth, in leg lengths, that is no scuffing."""
-ASSUMPTIONS = {
-    "min_normal_force_N": (
-        "The ground reaction stays upward",
-        "smallest normal force of the ground on the stance foot",
-    ),
-    "max_friction_ratio": (
-        "The stance foot does not slip",
-        "largest ratio of tangential to normal force: the friction coefficient it takes not to slip",
-    ),
-    "max_scuff_depth_m": (
-        "Scuffing is not considered",
-        "deepest that the swing foot passes below the ground in mid-swing",
-    ),
-    "energy_drift_J": (
-        "Energy is conserved while a leg swings",
-        "largest change of the mechanical energy within a swing, from its start",
-    ),
-}
-"""What the rigid model assumes and what is measured of it, by the key of that number."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
     Column("measured", "measured", wide=True),
@@ -110,9 +69,9 @@ def assumptions(results: Results) -> Section | None:
     """What the rigid model assumes, and how far its own walk bears that out."""
     summary = results.summary(RIGID)
     judged = []
-    for key, (assumption, measured) in ASSUMPTIONS.items():
+    for key, said in words.terms("walks.assumed").items():
         if summary.get(key) is not None:
-            value, verdict = judgement(key, summary, results)
+            (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
             judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
     if not judged:
         return None
