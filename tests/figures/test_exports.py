@@ -12,8 +12,7 @@ from synthetic_walks import both_models
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, export_from
-from walkerlab.cli.films import Film, write_film
-from walkerlab.cli.resolve import walk_in
+from walkerlab.cli.films import Film, walk_in, write_film
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.figures.style import PNG_DPI

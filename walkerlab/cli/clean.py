@@ -14,23 +14,27 @@ from walkerlab.store.clean import CHUNKS, FIGURES, files_of, remove, remove_if_e
 from walkerlab.store.runfolder import RunFolder
 
 
-def every_run(request: Request) -> list[RunFolder]:
-    """The runs in the folder of all runs."""
-    there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
-    return [RunFolder(request.runs, name) for name in there]
-
-
-def clean_folders(request: Request, folders: Sequence[RunFolder], stages: Sequence[str], yes: bool) -> None:
+def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
     """Remove the files of these stages from run folders, once the user agrees, and folders with nothing else in them.
+
+    every  all runs in the folder of all runs, instead of the one that is meant
 
     Raises typer.BadParameter if nobody can be asked, LockedError (only with `--no-wait`) and StorageError.
     """
+    if every:
+        there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
+        folders = [RunFolder(request.runs, name) for name in there]
+    else:
+        folders = [request.folder]
     found = {folder: files_of(folder, stages) for folder in folders}
     files = [path for paths in found.values() for path in paths]
     sizes = {path: path.lstat().st_size for path in files}
     where = folders[0].path if len(folders) == 1 else request.runs
-    if files and not (yes or request.dry_run) and not agreed(where, files):
-        found, files = {}, []
+    if files and not (yes or request.dry_run):
+        if not sys.stdin.isatty():
+            raise typer.BadParameter("there is no terminal to ask on; say --yes", param_hint="--yes")
+        if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
+            found, files = {}, []
     if not request.dry_run:
         for folder, paths in found.items():
             if paths:
@@ -54,10 +58,3 @@ def listed(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
         line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
         for line, paths in lines.items()
     ]
-
-
-def agreed(folder: Path, files: Sequence[Path]) -> bool:
-    """Ask; typer.BadParameter if there is no terminal to ask on."""
-    if not sys.stdin.isatty():
-        raise typer.BadParameter("there is no terminal to ask on; say --yes", param_hint="--yes")
-    return typer.confirm(f"Remove {len(files)} files from {folder}?", err=True)

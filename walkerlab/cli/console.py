@@ -48,7 +48,9 @@ class Console:
                 self._show_bars()
             else:
                 self.note(f"{stage}: starts ({place})" if place else f"{stage}: starts")
-                self._keep_talking()
+                if self._pulse is None:
+                    self._pulse = threading.Event()
+                    threading.Thread(target=self._talk, args=(self._pulse,), daemon=True).start()
         return line
 
     def ended(self, line: StageLine, said: str) -> None:
@@ -57,7 +59,11 @@ class Console:
             if line in self.running:
                 self.running.remove(line)
             if not self.running:
-                self._take_bars_away()
+                if self._live is not None:
+                    self._live.stop()
+                if self._pulse is not None:
+                    self._pulse.set()
+                self._live = self._pulse = None
         if said:
             self.note(said)
 
@@ -70,9 +76,17 @@ class Console:
         path = (folder / str(page)).resolve()
         self.note(f"page: {path} (partial; updated as results come in)")
         if self.open_page:
-            from walkerlab.cli.browser import open_file
+            self.shown = self.show(path)
 
-            self.shown = open_file(path, self)
+    def show(self, page: Path) -> bool:
+        """Open a page in the user's browser; whether there is one that took it, and a note if there is none."""
+        # Imported here: few pages are shown.
+        import webbrowser
+
+        opened = webbrowser.open(page.resolve().as_uri())
+        if not opened:
+            self.note(f"no browser was found; the page is {page.resolve()}")
+        return opened
 
     def refresh(self) -> None:
         """Draw the bars anew, where there are any."""
@@ -101,13 +115,8 @@ class Console:
             else:
                 print(text, file=sys.stderr, flush=True)
 
-    def _keep_talking(self) -> None:
-        """Say from now on how far the running stages are whenever nothing was said for a while."""
-        if self._pulse is None:
-            self._pulse = threading.Event()
-            threading.Thread(target=self._talk, args=(self._pulse,), daemon=True).start()
-
     def _talk(self, end: threading.Event) -> None:
+        """Say how far the running stages are whenever nothing was said for a while."""
         while not end.wait(0.5):
             if time.monotonic() - self._said_at >= SILENCE_S:
                 self._say("; ".join(line.said() for line in self._lines()))
@@ -125,14 +134,6 @@ class Console:
 
         self._live = Live(get_renderable=self._bars, console=Terminal(stderr=True), transient=True)
         self._live.start()
-
-    def _take_bars_away(self) -> None:
-        if self._live is not None:
-            self._live.stop()
-            self._live = None
-        if self._pulse is not None:
-            self._pulse.set()
-            self._pulse = None
 
     def _bars(self) -> Table:
         from rich.progress_bar import ProgressBar

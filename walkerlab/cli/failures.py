@@ -32,18 +32,24 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
     raise_on(signal.SIGTERM, KeyboardInterrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
         raise_on(signal.SIGINT, KeyboardInterrupt)
+
+    def print_failed(error: WalkerlabError) -> None:
+        """With `--json`, the object of a command that came to nothing: the keys there always are, and the error."""
+        if request.as_json:
+            run_dir = None if request.run_dir is None else str(request.run_dir)
+            nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
+            print_json({"stage": name, "run_dir": run_dir, **nothing, "error": described(error)})
+
     try:
         yield request
         sys.stdout.flush()
     except WalkerlabError as error:
-        if request.as_json:
-            print_json(failed(name, request, error))
+        print_failed(error)
         say(error, request.typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "What is finished is kept; the same command does the rest.")
-        if request.as_json:
-            print_json(failed(name, request, stopped))
+        print_failed(stopped)
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
     except BrokenPipeError:
@@ -69,19 +75,6 @@ def say(error: WalkerlabError, typed: str = "") -> None:
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
         print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
-
-
-def failed(name: str, request: Request, error: WalkerlabError) -> dict[str, Any]:
-    """The JSON object of a command that came to nothing: the keys there always are, and the error."""
-    return {
-        "stage": name,
-        "run_dir": None if request.run_dir is None else str(request.run_dir),
-        "artifact": None,
-        "reused": False,
-        "wall_s": 0.0,
-        "left_out": [],
-        "error": described(error),
-    }
 
 
 def described(error: WalkerlabError) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import STORED_WITH, Target, put
 from walkerlab.errors import ConfigError, StaleError, StorageError
+from walkerlab.report.outcomes import MODELS
 from walkerlab.stages.runs import result_in
 from walkerlab.store.runfolder import RunFolder
 
@@ -35,6 +36,18 @@ class Film:
     slower: float
 
 
+def walk_in(folder: RunFolder, model: str | None = None) -> str:
+    """The stage whose walk is meant: if none is named the contact model's before the rigid model's.
+
+    Raises ConfigError if the one that is named does not walk.
+    """
+    if model is not None and model not in MODELS:
+        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
+    rigid, contact = MODELS
+    alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
+    return model or (rigid if alone else contact)
+
+
 def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
     """Draw a run's walk, picture by picture, and write the film.
 
@@ -55,17 +68,15 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     at = film_times(sticks, film.steps, film.rate, film.slower)
     line = console.begin("animate", f"{at.size} pictures")
     line.start("drawing", int(at.size))
-    drawn = told(pictures(sticks, at), line)
-    data = gif(drawn, film.rate) if kind == "gif" else mp4(drawn, film.rate, str(ffmpeg))
+
+    def told() -> Iterator[Any]:
+        for picture in pictures(sticks, at):
+            yield picture
+            line.advance()
+
+    data = gif(told(), film.rate) if kind == "gif" else mp4(told(), film.rate, str(ffmpeg))
     line.end("")
     return put(path, data, console)
-
-
-def told(drawn: Iterable[Any], line: Any) -> Iterable[Any]:
-    """The pictures, each counted."""
-    for picture in drawn:
-        yield picture
-        line.advance()
 
 
 def gif(drawn: Iterable[Any], rate: int) -> bytes:

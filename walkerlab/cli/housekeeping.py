@@ -22,12 +22,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Show whether each stage's result is up to date, and if not, why; and list all runs."""
         with exit_on_failure("status", request):
-            from walkerlab.cli.status import print_status, print_status_of_run
+            from walkerlab.cli.status import print_status
 
-            if run is None:
-                print_status(request, graph, check)
-            else:
-                print_status_of_run(request, graph, check, run)
+            print_status(request, graph, check, run)
 
     @command(app, *OF_A_RUN, *OF_TALK)
     def show(
@@ -76,6 +73,6 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Remove the results of a run and what killed runs left behind; other files stay."""
         with exit_on_failure("clean", request):
-            from walkerlab.cli.clean import clean_folders, every_run
+            from walkerlab.cli.clean import clean_folders
 
-            clean_folders(request, every_run(request) if all_runs else [request.folder], names, yes)
+            clean_folders(request, all_runs, names, yes)

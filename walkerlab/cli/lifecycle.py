@@ -51,11 +51,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def open_run(request: Request, run: RunArgument = "paper") -> None:
         """Show a run's page in the browser."""
         with exit_on_failure("open", request):
-            from walkerlab.cli.browser import open_file
-            from walkerlab.cli.resolve import page_of
+            from walkerlab.errors import StaleError
+            from walkerlab.stages.runs import run_named
 
-            page = page_of(run, request.runs)
-            open_file(page, request.console)
+            folder = run_named(run, request.runs)
+            page = (folder.path / "report.html").resolve()
+            if not page.is_file():
+                advice = f"`walkerlab report -c {folder.typed}` writes it."
+                raise StaleError(f"{folder.path} has no page yet.", advice)
+            request.console.show(page)
             print(page)
 
     @command(app, *OF_TALK)
@@ -85,7 +89,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
         with exit_on_failure("export", request):
             from walkerlab.cli.exports import COLUMNS, Target, export_from
-            from walkerlab.cli.resolve import walk_in
+            from walkerlab.cli.films import walk_in
             from walkerlab.stages.runs import run_named
 
             folder, points = run_named(run, request.runs), width or COLUMNS[columns]
@@ -121,8 +125,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Animate a run's walk."""
         with exit_on_failure("animate", request):
             from walkerlab.cli.exports import Target
-            from walkerlab.cli.films import Film, write_film
-            from walkerlab.cli.resolve import walk_in
+            from walkerlab.cli.films import Film, walk_in, write_film
             from walkerlab.stages.runs import run_named
 
             folder = run_named(run, request.runs)

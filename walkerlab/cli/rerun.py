@@ -12,7 +12,7 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.runner import execute
-from walkerlab.store.artifact import Damaged, Stored, read
+from walkerlab.store.artifact import Damaged, read
 from walkerlab.store.runfolder import RunFolder
 
 SHORT = 12
@@ -23,7 +23,13 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
 
     Raises ConfigError if there is no such artifact, StaleError if it cannot be read or is not the same.
     """
-    stored = artifact_at(path)
+    try:
+        stored = read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
+    except Damaged as error:
+        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).typed}` recomputes it."
+        raise StaleError(f"{path} is damaged: {error}.", advice) from None
     stage = stored.identity.stage
     name = path.resolve().parent.name
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
@@ -51,14 +57,3 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         )
     if not request.as_json:
         print(f"{path} is reproduced to the last bit: content {before[:SHORT]}.")
-
-
-def artifact_at(path: Path) -> Stored:
-    """The artifact that is to come out again; ConfigError if there is none, StaleError if it cannot be read."""
-    try:
-        return read(path)
-    except (FileNotFoundError, NotADirectoryError):
-        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
-    except Damaged as error:
-        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).typed}` recomputes it."
-        raise StaleError(f"{path} is damaged: {error}.", advice) from None

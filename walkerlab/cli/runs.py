@@ -13,7 +13,7 @@ from walkerlab.cli.request import Request, command
 from walkerlab.stages.graph import Graph
 
 if TYPE_CHECKING:
-    from walkerlab.stages.runs import Pair, RunDifference, RunSummary
+    from walkerlab.stages.runs import Pair, RunDifference
     from walkerlab.store.runfolder import RunFolder
 
 SAME = 1e-12
@@ -81,12 +81,7 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
         "stage": "diff",
         "runs": [str(folder.path) for folder in folders],
         "config": [{"key": key, "first": first, "second": second} for key, first, second in found.config],
-        "numbers": {
-            stage: [
-                {"name": pair.name, "first": pair.first, "second": pair.second, "change": pair.change} for pair in pairs
-            ]
-            for stage, pairs in found.numbers.items()
-        },
+        "numbers": {stage: [vars(pair) for pair in pairs] for stage, pairs in found.numbers.items()},
         "only_first": list(found.only_first),
         "only_second": list(found.only_second),
         "figures": [str(path) for path in figures],
@@ -99,7 +94,11 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
     every  all numbers that differ instead
     """
     from walkerlab.cli.text import in_words
+    from walkerlab.report.numbers import number
     from walkerlab.report.tables import aligned
+
+    def told(value: Any) -> str:
+        return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
 
     names = told_apart(folders)
     result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
@@ -110,7 +109,6 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
         differing = [pair for pair in pairs if differs(pair)]
         shown = differing if every else list(found.headlines[stage]) if differing else []
         left += 0 if every else len(differing) - sum(pair in differing for pair in shown)
-        told = in_words if every else in_short
         rows = [[pair.name, told(pair.first), told(pair.second), percent(pair)] for pair in shown]
         if rows or not differing:
             result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
@@ -128,42 +126,8 @@ def differs(pair: Pair) -> bool:
     return bool(pair.first != pair.second)
 
 
-def in_short(value: Any) -> str:
-    """A value on one line, a number to the digits that are read."""
-    from walkerlab.cli.text import in_words
-    from walkerlab.report.numbers import number
-
-    return number(value, DIGITS) if isinstance(value, float) else in_words(value)
-
-
 def percent(pair: Pair) -> str:
     """A relative change in per cent; nothing for what is an error itself, or is at rounding in both runs."""
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"
-
-
-def rows_of_runs(found: list[RunSummary]) -> list[list[str]]:
-    """All runs as a table's rows."""
-    head = ["run", "results", "up to date", "sweeps", "size", "last written"]
-    return [head, *(row_of(run) for run in found)]
-
-
-def row_of(run: RunSummary) -> list[str]:
-    """One run as a row."""
-    unknown = "unknown config" if run.stages else "0"
-    current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
-    return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed]
-
-
-def run_object(run: RunSummary) -> dict[str, Any]:
-    """One run as JSON."""
-    return {
-        "name": run.name,
-        "run_dir": str(run.run_dir),
-        "stages": list(run.stages),
-        "current": None if run.current is None else [name for name in run.stages if name in run.current],
-        "sweeps": list(run.sweeps),
-        "bytes": run.bytes,
-        "changed_utc": run.changed,
-    }

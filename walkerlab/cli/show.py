@@ -41,6 +41,13 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
 
 def as_json(stored: Stored) -> dict[str, Any]:
     """All but the arrays' values."""
+
+    def labels(variable: Variable) -> dict[str, Any]:
+        shape = list(variable.values.shape)
+        return {
+            "dims": list(variable.dims), "shape": shape, "units": variable.units, "long_name": variable.long_name
+        }  # fmt: skip
+
     return {
         "complete": stored.complete,
         "summary": stored.summary,
@@ -53,16 +60,6 @@ def as_json(stored: Stored) -> dict[str, Any]:
         "code_digest": stored.identity.code_digest,
         "content_digest": stored.digest(),
         "provenance": asdict(stored.provenance),
-    }
-
-
-def labels(variable: Variable) -> dict[str, Any]:
-    """A variable without its values."""
-    return {
-        "dims": list(variable.dims),
-        "shape": list(variable.values.shape),
-        "units": variable.units,
-        "long_name": variable.long_name,
     }
 
 

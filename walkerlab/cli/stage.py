@@ -9,7 +9,6 @@ from typing import Any
 import typer
 
 from walkerlab.cli.answers import answer, verdict
-from walkerlab.cli.browser import open_file
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.report.tables import aligned
@@ -30,7 +29,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     report = execute(config, stage.name, folder, options, request.console, graph)
     show(request, as_json(report), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:
-        open_file(report.run_dir / str(report.summary["html"]), request.console)
+        request.console.show(report.run_dir / str(report.summary["html"]))
     if report.no_answer is not None:
         say(report.no_answer, request.typed)
         raise typer.Exit(report.no_answer.exit_code)
@@ -67,29 +66,21 @@ def printed(request: Request, report: StageReport) -> str:
     told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in told_apart}
     if "html" in own:
-        lines = [*verdict(report.results), *answer(report.stage, own), *pages(request, report)]
+        page = (report.run_dir / str(own["html"])).resolve()
+        shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
+        others = f"`walkerlab show STAGE{request.typed}` has every number"
+        where = ["", f"page: {page}", f"next: {shows}; {others}."]
+        lines = [*verdict(report.results), *answer(report.stage, own), *where]
     else:
         found = answer(report.stage, own)
-        lines = [*found, *([""] if found else []), f"stored in {report.artifact}", *figures_of(report)]
+        lines = [*found, *([""] if found else []), f"stored in {report.artifact}"]
+    if report.stage in DRAWN_AT_ONCE:
+        # Imported here: most stages draw nothing.
+        from walkerlab.stages.plot import draw_at_once
+
+        drawn = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
+        lines += [f"figure: {path}" for path in drawn]
     return "\n".join([*lines, *left_out_lines(request, report)])
-
-
-def figures_of(report: StageReport) -> list[str]:
-    """Where the figures are of what only this stage's command computes; they are drawn at once."""
-    if report.artifact is None or report.stage not in DRAWN_AT_ONCE:
-        return []
-    # Imported here: most stages draw nothing.
-    from walkerlab.stages.plot import draw_at_once
-
-    return [f"figure: {path}" for path in draw_at_once(report.stage, report.run_dir, anew=not report.reused)]
-
-
-def pages(request: Request, report: StageReport) -> list[str]:
-    """Where the page is, and what to do next."""
-    page = (report.run_dir / str(report.summary["html"])).resolve()
-    next_steps = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
-    others = f"`walkerlab show STAGE{request.typed}` has every number"
-    return ["", f"page: {page}", f"next: {next_steps}; {others}."]
 
 
 def planned(report: StageReport) -> str:

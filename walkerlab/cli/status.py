@@ -9,50 +9,30 @@ import typer
 
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
-from walkerlab.cli.runs import rows_of_runs, run_object
-from walkerlab.config.schema import Config
 from walkerlab.errors import StaleError
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import Graph
 from walkerlab.stages.plan import UP_TO_DATE, Step, survey
 from walkerlab.stages.runs import RunSummary, config_of, run_named, runs_in
 from walkerlab.store.artifact import NOT_THERE
-from walkerlab.store.runfolder import RunFolder
 
 NOT_CURRENT = ("stale", "missing", "damaged")
 
 
-def print_status(request: Request, graph: Graph, check: bool) -> None:
-    """Print the state of each stage, and all runs unless one config was asked about.
+def print_status(request: Request, graph: Graph, check: bool, run: str | None) -> None:
+    """Print the state of each stage, and all runs unless one was asked about.
 
-    With `check`, typer.Exit(5) if a stage's result is stale, missing or damaged.
+    run  name or folder of a run, told under the config that its results are of; None is the one that is meant
+
+    With `check`, typer.Exit(5) if a stage's result is stale, missing or damaged. Raises ConfigError if there is no such
+    run, StaleError if nothing tells its config.
     """
-    asked = request.config is not None or request.sets or request.strides is not None
-    listed = None if asked else list(runs_in(request.runs, graph))
-    show(request, request.resolved, request.folder, graph, check, listed)
-
-
-def print_status_of_run(request: Request, graph: Graph, check: bool, name: str) -> None:
-    """The same of a run folder, under the config that its results are of.
-
-    Raises ConfigError if there is no such run, StaleError if nothing tells its config.
-    """
-    folder = run_named(name, request.runs)
-    config = config_of(folder)
+    folder = request.folder if run is None else run_named(run, request.runs)
+    config = request.resolved if run is None else config_of(folder)
     if config is None:
         raise StaleError(f"{folder.path} has no result that tells its config.", "`walkerlab status` lists all runs.")
-    show(request, config, folder, graph, check, None)
-
-
-def show(
-    request: Request,
-    config: Config,
-    folder: RunFolder,
-    graph: Graph,
-    check: bool,
-    listed: list[RunSummary] | None,
-) -> None:
-    """Print the state of each stage and the runs that are listed."""
+    asked = run is not None or request.config is not None or request.sets or request.strides is not None
+    listed = None if asked else list(runs_in(request.runs, graph))
     steps = survey(config, folder, graph)
     error = failing(steps, graph.stages[-1].name)
     if request.as_json:
@@ -67,16 +47,24 @@ def show(
         ]
         status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
         if listed is not None:
-            status["runs"] = [run_object(run) for run in listed]
+            status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
         print_json(status | ({"error": described(error)} if check and error is not None else {}))
     else:
         print(f"{folder.path}:")
         print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])))
         if listed:
-            print("\n".join([f"\nall runs in {request.runs}:", *aligned(rows_of_runs(listed))]))
+            head = ["run", "results", "up to date", "sweeps", "size", "last written"]
+            print("\n".join([f"\nall runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]))
     if check and error is not None:
         say(error, request.typed)
         raise typer.Exit(error.exit_code)
+
+
+def row_of(run: RunSummary) -> list[str]:
+    """One run as a table's row."""
+    unknown = "unknown config" if run.stages else "0"
+    current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
+    return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed_utc]
 
 
 def state_of(step: Step) -> str:

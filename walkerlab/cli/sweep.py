@@ -81,6 +81,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.sweeps.question import axis_of_text
             from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
+            options = dict(text.split("=", 1) for text in engine_option or () if "=" in text)
+            if bad := [text for text in engine_option or () if "=" not in text]:
+                raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
             chosen, address = engine_named(engine)
             loaded = request.loaded
             texts = [axis_of_text(text) for text in over or ()]
@@ -90,7 +93,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 address=address,
                 modules=modules_of(question.stage, loaded.config, graph),
                 folder=request.folder.path,
-                options=options_of(engine_option or ()),
+                options=options,
             )
             if request.dry_run:
                 asked = SweepRun(question, loaded, request.folder, graph)
@@ -98,15 +101,11 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 return
             with chosen.begun(order) as begun:
                 asked = SweepRun(question, loaded, request.folder, graph)
-                load_meanwhile("walkerlab.sweeps.drawing")
+                # What is needed at the end is loaded while others compute.
+                threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
                 work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph))
                 swept = asked.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
-
-
-def load_meanwhile(module: str) -> None:
-    """Import what is needed at the end while others compute."""
-    threading.Thread(target=importlib.import_module, args=(module,)).start()
 
 
 def question_of(
@@ -130,17 +129,6 @@ def question_of(
         sample if sample is not None else "" if over else given.sample,
         given.seed if seed is None else seed,
     )
-
-
-def options_of(texts: tuple[str, ...] | list[str]) -> dict[str, str]:
-    """An engine's own options; typer.BadParameter for one that is not NAME=VALUE."""
-    options = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--engine-option")
-        options[name] = value
-    return options
 
 
 def where(graph: Graph) -> str:

@@ -25,7 +25,7 @@ def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: b
         if isinstance(value, Mapping) and value:
             yield f"{indent}{key}"
             yield from described_summary(value, indent + INDENT, short)
-        elif is_rows(value):
+        elif isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
             yield f"{indent}{key}"
             yield from (f"{indent}{INDENT}{line}" for line in table(value))
         else:
@@ -38,11 +38,6 @@ def cut(value: Any) -> Any:
         return value
     ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]
     return [*ends[:ENDS], "…", *ends[ENDS:], f"({len(value)} of them; `walkerlab show` has all)"]
-
-
-def is_rows(value: Any) -> bool:
-    """Whether a value is a list of objects."""
-    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -36,7 +36,7 @@ class RunSummary:
     current   of these, the ones that are up to date; None if the run's config is not known any more
     sweeps    files of sweeps
     bytes     size of all its files
-    changed   when the last of them was written, UTC, ISO 8601
+    changed_utc  when the last of them was written, UTC, ISO 8601
     """
 
     name: str
@@ -45,7 +45,7 @@ class RunSummary:
     current: tuple[str, ...] | None
     sweeps: tuple[str, ...]
     bytes: int
-    changed: str
+    changed_utc: str
 
 
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
