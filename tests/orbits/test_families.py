@@ -20,7 +20,7 @@ from walkerlab.orbits.attractors import (
 )
 from walkerlab.orbits.bifurcations import on_pairs
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import BranchFollower, Limits, Seed, ValueSpan, apart
+from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan, apart
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.plane import curve_through
@@ -261,7 +261,7 @@ def between_the_first_flip_and_the_branch_beyond_it():
     one = next(branch for branch in compass_family() if branch.period == 1 and branch.stable_ranges)
     two = next(branch for branch in compass_family() if branch.period == 2)
     slope = 0.5 * (two.ends[0].value + two.points[0].value)
-    follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), limits=Limits(points=12))
+    follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), most=12)
     walked = settled(follower.step_map, one.points[-1].z, slope, 400, 2)
     return follower, Seed(walked.last, slope, 2)
 
@@ -348,7 +348,7 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
 
 def test_a_branch_that_uses_up_its_points_says_so():
-    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), limits=Limits(points=5))
+    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), most=5)
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "5 points are used up" for end in branch.ends)
 
@@ -365,7 +365,7 @@ def test_continuation_goes_round_a_circle_and_finds_where_it_folds():
     point = corrected(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
     folds, gone, length = [], 0.0, control.first
     while gone < 2.0 * np.pi:
-        following, _, length = stepped(Circle(), point, length, control)
+        following, length = stepped(Circle(), point, length, control)
         gone += np.arccos(np.clip(point.x @ following.x, -1.0, 1.0))
         if point.x[1] * following.x[1] < 0.0:
             folds.append(root_along(Segment(Circle(), point, following, 1e-14), lambda solved: solved.x[1]).x)

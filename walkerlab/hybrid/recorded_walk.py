@@ -121,48 +121,39 @@ class Recorder:
         self.extremes = first.extremes
         self.energy_integral, self.duration = 0.0, 0.0
         self.counts = np.zeros_like(method.counts)
-        self.strikes: list[Array] = []
-        self.before: list[Array] = []
-        self.after: list[Array] = []
-        self.knees: list[Array] = []
+        no_states = np.zeros((0, self.numbers))
+        self.strikes, self.before, self.after, self.knees = [np.zeros(0)], [no_states], [no_states], [np.zeros(0)]
         self.pieces: list[Samples] = []
 
     def walk_on(self, steps: int) -> Outcome:
         """Take up to `steps` more steps."""
-        seen = new_heel_strikes(steps, self.numbers)
-        observer = new_observer(self._grid(steps), self.numbers)
+        seen, times = new_heel_strikes(steps, self.numbers), np.zeros(0)
+        if self.sampled:  # as many as the steps may reach, from the start of the first of them
+            most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
+        observer = new_observer(times, self.numbers)
         clear_counts(self.method)
-        self.method.counts[BUDGET] = self._left_for(steps)
+        self.method.counts[BUDGET] = min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
         status, taken = self.walk(
             np.asarray(self.walker), self.method, self.finder, observer, np.array(self.state), seen
         )
         self.counts += self.method.counts
-        self._keep(observer)
-        begun = self.time
-        strikes, before, after = seen.time[:taken] + begun, seen.before[:taken], seen.after[:taken]
-        knees = seen.knee_time + begun
+        worst = self.extremes
+        worst[MIN_NORMAL_FORCE] = min(worst[MIN_NORMAL_FORCE], observer.extremes[MIN_NORMAL_FORCE])
+        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT):
+            worst[index] = max(worst[index], observer.extremes[index])
+        self.energy_integral += float(observer.energy[INTEGRAL])
+        self.duration += float(observer.energy[DURATION])
+        strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
+        knees = seen.knee_time + self.time
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        self.strikes.append(strikes)
-        self.before.append(before)
-        self.after.append(after)
-        if self.kneed:
-            self.knees.append(knees[:taken])
+        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after), (self.knees, knees)):
+            kept.append(new[:taken])
         self.steps += taken
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
         return Outcome(status)
-
-    def _left_for(self, steps: int) -> int:
-        """Right-hand sides that the next steps may evaluate."""
-        return min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
-
-    def _grid(self, steps: int) -> Array:
-        """Times of the samples that the next steps may reach, from the start of the first of them."""
-        if not self.sampled:
-            return np.zeros(0)
-        most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
-        return self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
@@ -181,27 +172,21 @@ class Recorder:
         order = np.argsort(time)
         return Samples(time[order], state[order], step[order], bent[order])
 
-    def _keep(self, observer: Observer) -> None:
-        seen, worst = observer.extremes, self.extremes
-        worst[MIN_NORMAL_FORCE] = min(worst[MIN_NORMAL_FORCE], seen[MIN_NORMAL_FORCE])
-        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT):
-            worst[index] = max(worst[index], seen[index])
-        self.energy_integral += float(observer.energy[INTEGRAL])
-        self.duration += float(observer.energy[DURATION])
-
     def finished(self, outcome: Outcome) -> RigidWalkResult:
         """All that was seen."""
         end_time = self.time if outcome == Outcome.WALKED else self.duration
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
             outcome = Outcome.LIFTED_OFF
-        no_states = np.zeros((0, self.numbers))
-        strikes = np.concatenate((np.zeros(0), *self.strikes))
-        before, after = np.concatenate((no_states, *self.before)), np.concatenate((no_states, *self.after))
+        strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
+        lengths, begun = np.zeros(self.steps), self.start
+        for k, row in enumerate(before.tolist()):  # between the points of contact, and what the stance foot rolled
+            lengths[k] = swing_foot(self.walker, row)[1] + rolled_distance(self.walker, begun, row)
+            begun = after[k]
         return RigidWalkResult(
             outcome=outcome,
             touch_time_s=strikes,
-            touch_along_m=np.cumsum(step_lengths(self.walker, self.start, before, after)),
-            knee_strike_time_s=np.concatenate((np.zeros(0), *self.knees)) if self.kneed else None,
+            touch_along_m=np.cumsum(lengths),
+            knee_strike_time_s=np.concatenate(self.knees) if self.kneed else None,
             end_time_s=end_time,
             work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
             start=self.start,
@@ -214,16 +199,6 @@ class Recorder:
             mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
             samples=joined(self.pieces) if self.pieces else None,
         )
-
-
-def step_lengths(walker: Standing, start: State, before: Array, after: Array) -> Array:
-    """Distance (steps,) in m from touch to touch: between the points of contact, and what the stance foot rolled."""
-    lengths, begun = np.zeros(len(before)), start
-    for k, row in enumerate(before):
-        end = as_state(row)
-        lengths[k] = swing_foot(walker, end)[1] + rolled_distance(walker, begun, end)
-        begun = as_state(after[k])
-    return lengths
 
 
 def with_scaled_rates(walker: Standing, state: State, swing: float, stance: float) -> State:

@@ -152,14 +152,16 @@ def stepped(
     control: StepControl,
     acceptable: Callable[[Solved[D]], bool] = lambda _: True,
     before: Solved[D] | None = None,
-) -> tuple[Solved[D], float, float] | NotConverged:
-    """The next point of a curve after `last`, how far it was sought, and how far to look for the one after it.
+) -> tuple[Solved[D], float] | NotConverged:
+    """The next point of a curve after `last`, and how far to look for the one after it.
 
     acceptable  a caller's own wish for smaller steps
     before      the point before the last, if there is one: it tells how the curve bends
     """
     lost = NotConverged(Outcome.WALKED)
-    bend = np.zeros_like(last.x) if before is None else bend_between(before, last)
+    bend = np.zeros_like(last.x)  # how fast the tangent turns, per unit of arclength
+    if before is not None:
+        bend = np.asarray((last.tangent - before.tangent) / np.linalg.norm(last.x - before.x))
     while length >= control.shortest:
         guess = last.x + length * last.tangent + 0.5 * length**2 * bend
         found = corrected(equations, guess, last.tangent, control.tolerance)
@@ -167,16 +169,11 @@ def stepped(
             gone = float(np.linalg.norm(found.x - guess))
             if found.tangent @ last.tangent > control.turn and gone < 0.5 * length and acceptable(found):
                 longer = 1.6 if found.corrections <= FEW_CORRECTIONS else 1.0
-                return found, length, min(control.longest, longer * length)
+                return found, min(control.longest, longer * length)
         else:
             lost = found
         length *= 0.5
     return lost
-
-
-def bend_between(one: Solved[D], other: Solved[D]) -> Floats:
-    """How fast the tangent turns from one neighbour to the other, per unit of arclength."""
-    return np.asarray((other.tangent - one.tangent) / np.linalg.norm(other.x - one.x))
 
 
 @dataclass(frozen=True)

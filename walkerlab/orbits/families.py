@@ -35,6 +35,7 @@ HALVINGS = 12  # of the amplitude on the way onto a branch
 TURN_OF_MULTIPLIERS = 0.6  # by how much a multiplier may change between neighbours, near the unit circle
 NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
 SHORTEST_STEP_S = 1e-3
+POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyond which no gait is resolved
 
 
 @dataclass(frozen=True)
@@ -54,19 +55,7 @@ class ValueSpan:
         return self.least <= value <= self.most
 
 
-@dataclass(frozen=True)
-class Limits:
-    """When a branch is given up.
-
-    points  on one branch, at most
-    growth  of a disturbance over a cycle, beyond which a gait of many steps is not resolved
-    """
-
-    points: int = 400
-    growth: float = 1e4
-
-
-CONTROL, LIMITS = StepControl(), Limits()
+CONTROL = StepControl()
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +156,11 @@ class BranchFollower:
         step_map: StepMap,
         span: ValueSpan,
         control: StepControl = CONTROL,
-        limits: Limits = LIMITS,
+        most: int = POINTS,
         advance: Callable[[], None] = lambda: None,
     ) -> None:
-        """Nothing is followed yet; `advance` is told of each point."""
-        self.step_map, self.span, self.control, self.limits, self.advance = step_map, span, control, limits, advance
+        """Nothing is followed yet; no branch gets more than `most` points, and `advance` is told of each."""
+        self.step_map, self.span, self.control, self.most, self.advance = step_map, span, control, most, advance
 
     def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
         """Every branch that the seeds lie on, and the cascades beyond their flips, after those that are known.
@@ -272,14 +261,14 @@ class BranchFollower:
             else self.control.first
         )
         while end is None:
-            if len(points) >= self.limits.points:
-                end = BranchEnd(points[-1].value, f"{self.limits.points} points are used up")
+            if len(points) >= self.most:
+                end = BranchEnd(points[-1].value, f"{self.most} points are used up")
                 break
             following = stepped(equations, last, step, self.control, self.near_enough(last), before)
             if isinstance(following, NotConverged):
                 end = BranchEnd(points[-1].value, why_lost(following))
                 break
-            solved, _, step = following
+            solved, step = following
             end, solved = self.within(equations, last, solved)
             if period % 2 == 0 and apart(last, period) @ apart(solved, period) < 0.0:  # the halves changed places
                 end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
@@ -288,9 +277,13 @@ class BranchFollower:
             located = (bifurcation_in(segment, kind, equations.scale) for kind in KINDS)
             bifurcations += [one for one in located if one is not None]
             points.append(self.point(solved, period))
-            crossings += crossings_between(self.step_map.monitors, points[-2], points[-1])
-            if end is None and abs(points[-1].multipliers[0]) > self.limits.growth:
-                end = BranchEnd(points[-1].value, f"a disturbance grows more than {self.limits.growth:g}-fold a cycle")
+            one, other = points[-2:]
+            for monitor, ahead, after in zip(self.step_map.monitors, one.monitors, other.monitors, strict=True):
+                if monitor.limit is not None and (ahead - monitor.limit) * (after - monitor.limit) < 0.0:
+                    share = (monitor.limit - ahead) / (after - ahead)
+                    crossings.append(Crossing(monitor, one.value + share * (other.value - one.value)))
+            if end is None and abs(points[-1].multipliers[0]) > GROWTH:
+                end = BranchEnd(points[-1].value, f"a disturbance grows more than {GROWTH:g}-fold a cycle")
             before, last = last, solved
         first = BranchEnd(points[0].value, "start")
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
@@ -353,10 +346,8 @@ def ends_at(branch: GaitBranch, flip: Bifurcation, period: int) -> bool:
     """Whether a branch of this period closes on this flip, at either end."""
     if branch.period != period:
         return False
-    values = branch.values
-    for end, last, before in ((branch.ends[0], 0, 1), (branch.ends[1], -1, -2)):
-        near = 2.0 * abs(values[last] - values[before]) if values.size > 1 else 0.0
-        if end.reason.startswith("closes") and abs(end.value - flip.value) <= near + 1e-12:
+    for end, values in zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True):
+        if end.reason.startswith("closes") and abs(end.value - flip.value) <= 2.0 * np.ptp(values) + 1e-12:
             return True
     return False
 
@@ -380,14 +371,3 @@ WHY = {
     Outcome.SOLVER_FAILED: "the solver's step fell to rounding, or the energy balance does not close",
     Outcome.BENT_KNEE: "the foot comes down on a knee that has not locked",
 }
-
-
-def crossings_between(monitors: Iterable[Monitor], one: GaitPoint, other: GaitPoint) -> list[Crossing]:
-    """Limits of assumptions that lie between two neighbours, by linear interpolation."""
-    found = []
-    for monitor, before, after in zip(monitors, one.monitors, other.monitors, strict=True):
-        limit = monitor.limit
-        if limit is not None and (before - limit) * (after - limit) < 0.0:
-            share = (limit - before) / (after - before)
-            found.append(Crossing(monitor, one.value + share * (other.value - one.value)))
-    return found

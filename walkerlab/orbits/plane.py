@@ -140,7 +140,7 @@ def traced(
         following = stepped(equations, last, length, control, before=before)
         if isinstance(following, NotConverged):
             return np.array(values), BranchEnd(float(values[-1][1]), why_lost(following))
-        solved, _, length = following
+        solved, length = following
         value = solved.x[-2:] * scales
         advance()
         if value[0] not in spans[0] or value[1] not in spans[1]:

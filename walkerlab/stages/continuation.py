@@ -36,7 +36,6 @@ from walkerlab.orbits.families import (
     Crossing,
     GaitBranch,
     GaitPoint,
-    Limits,
     Seed,
     ValueSpan,
     ends_at,
@@ -326,7 +325,7 @@ def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed,
     map_of = partial(rigid_map, parameter=parameter, scale=span.size)
     step_map = map_of(config)
     progress.start("continuation: branches of the rigid model")
-    follower = BranchFollower(step_map, span, limits=Limits(points=asked.points), advance=progress.advance)
+    follower = BranchFollower(step_map, span, most=asked.points, advance=progress.advance)
     seeds = []
     for value in asked.looked_at():
         walker = walker_at(value)
@@ -362,7 +361,7 @@ def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followe
         step_map = map_of(asked.config)
         progress.start("continuation: branches of the contact model")
         control = StepControl(tolerance=CONTACT_RESIDUAL, shortest=CONTACT_SHORTEST)
-        follower = BranchFollower(step_map, asked.span, control, Limits(points=asked.points), progress.advance)
+        follower = BranchFollower(step_map, asked.span, control, asked.points, progress.advance)
         seed = Seed(step_map.of_section(found.gait.z), value)
         return Followed(CONTACT, step_map, follower.family([seed], asked.periods), map_of), follower
     return Followed(CONTACT, None, ()), None
