@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from walkerlab.cli.console import Console
 from walkerlab.config.problems import nearest
@@ -17,7 +17,6 @@ from walkerlab.report.tables import as_csv, as_tex, csv_text, of_records
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.runs import makes, read_all, result_in, results_in
 from walkerlab.store.artifact import Stored
-from walkerlab.store.content import Group
 from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder
 
@@ -81,13 +80,14 @@ def export_from(folder: RunFolder, what: str, target: Target, width: float, mode
 
     Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
     """
-    what = figure_named(what)
+    if numbered := NUMBERED.fullmatch(what):
+        what = f"figure-{int(numbered[1]):02d}"
     make: Callable[[str], bytes]
     kinds: Sequence[str]
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(result_in(folder, model), kind)
     elif what in TABLES:
-        stem, kinds, make = what, TABLE_KINDS, lambda kind: table(rows_of(folder, what), kind)
+        stem, kinds, make = what, TABLE_KINDS, lambda kind: table(folder, what, kind)
     else:
         illustration = figure_in(folder, what)
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width)
@@ -106,25 +106,24 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     return put(path, drawn(loaded.config.walker, path.stem, kind), console)
 
 
-def figure_named(what: str) -> str:
-    """The name of a figure that is named by its number, as figure-7 or 7; another name as it is."""
-    found = NUMBERED.fullmatch(what)
-    return f"figure-{int(found[1]):02d}" if found else what
-
-
 def figure_in(folder: RunFolder, name: str) -> Illustration:
     """The figure of a name; ConfigError with what the run has if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
 
     named = {one.name: one for one in FIGURES}
-    if name not in named:
-        stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
-        near = nearest(name, (*named, *TABLES, TRAJECTORY))
-        meant = f" Did you mean {near}?" if near else ""
-        drawable = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
-        raise ConfigError(f"nothing is called {name}.{meant}", there_is(folder, [*drawable, *exportable(stored)]))
-    return named[name]
+    if name in named:
+        return named[name]
+    stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
+    near = nearest(name, (*named, *TABLES, TRAJECTORY))
+    meant = f" Did you mean {near}?" if near else ""
+    compared = stored["compare"].summary if "compare" in stored else {}
+    there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
+    there += [table for table, key in TABLES.items() if key in compared]
+    there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
+    nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
+    advice = f"{folder.path} has {listed(there)}." if there else nothing
+    raise ConfigError(f"nothing is called {name}.{meant}", advice)
 
 
 def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float) -> bytes:
@@ -138,36 +137,17 @@ def figure(folder: RunFolder, illustration: Illustration, kind: str, width: floa
     return illustration.as_file(stored, kind, width)
 
 
-def exportable(stored: Mapping[str, Stored]) -> list[str]:
-    """What there is besides figures: tables of the paper's numbers, and a trajectory."""
-    compared = stored["compare"].summary if "compare" in stored else {}
-    tables = [name for name, key in TABLES.items() if key in compared]
-    return tables + [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
-
-
-def there_is(folder: RunFolder, names: Sequence[str]) -> str:
-    """What a run has that can be exported."""
-    if names:
-        return f"{folder.path} has {listed(names)}."
-    return f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
-
-
-def rows_of(folder: RunFolder, name: str) -> Any:
-    """The rows of a table; ConfigError if the walker is another than the paper's."""
+def table(folder: RunFolder, name: str, kind: str) -> bytes:
+    """A table of the paper's numbers; ConfigError if the walker is another than the paper's."""
     summary = result_in(folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
             f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another."
         )
-    return summary[TABLES[name]]
-
-
-def table(rows: Any, kind: str) -> bytes:
-    """A table of a summary: rows of objects, or objects by row."""
+    rows = summary[TABLES[name]]
     if isinstance(rows, Mapping):
-        rows = [{"quantity": name, **row} for name, row in rows.items()]
-    found = of_records(rows)
-    return as_tex(found) if kind == "tex" else as_csv(found)
+        rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
+    return as_tex(of_records(rows)) if kind == "tex" else as_csv(of_records(rows))
 
 
 def trajectory(stored: Stored, kind: str) -> bytes:
@@ -181,21 +161,11 @@ def trajectory(stored: Stored, kind: str) -> bytes:
 
         about = {"title": f"walkerlab {stored.identity.stage}", "content_digest": stored.digest()}
         return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
-    names, values = columns_of(group)
-    return csv_text(names, zip(*values, strict=True))
-
-
-def columns_of(group: Group) -> tuple[list[str], list[list[Any]]]:
-    """Names with units, and values, of what a group has over time."""
-    names, values = [], []
+    columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
-        if variable.dims[:1] != ("time",):
-            continue
-        if len(variable.dims) == 1:
-            names.append(with_unit(name, variable.units))
-            values.append(variable.values.tolist())
-        else:
-            for place in range(variable.values.shape[1]):
-                names.append(with_unit(f"{name} {place}", variable.units))
-                values.append(variable.values[:, place].tolist())
-    return names, values
+        if variable.dims == ("time",):
+            columns[with_unit(name, variable.units)] = variable.values.tolist()
+        elif variable.dims[:1] == ("time",):
+            for place, values in enumerate(variable.values.T.tolist()):
+                columns[with_unit(f"{name} {place}", variable.units)] = values
+    return csv_text(list(columns), zip(*columns.values(), strict=True))
