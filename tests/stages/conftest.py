@@ -10,7 +10,8 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.stages.runner import Options, execute, plan
+from walkerlab.stages.plan import Planner
+from walkerlab.stages.runner import Options, execute
 from walkerlab.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent
@@ -38,7 +39,7 @@ class Toy:
 
     def plan(self, target, *sets, config=None, force=False):
         loaded, folder = self.loaded(*sets, config=config)
-        return plan(loaded, target, folder, force, self.graph)
+        return Planner(loaded, folder, self.graph, force).plan(self.graph.needed_for(target, loaded))
 
     def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)

@@ -11,18 +11,7 @@ import numpy as np
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_the_papers
-from walkerlab.hybrid.comparison import (
-    IMPACT_PHASE,
-    PHASES,
-    Array,
-    Motion,
-    WalkDifference,
-    between_impacts,
-    difference_in_phase,
-    difference_in_time,
-    orbit_distances,
-    sampled_at_strikes,
-)
+from walkerlab.hybrid import comparison
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
 from walkerlab.paper.departures import departures
@@ -152,27 +141,27 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
 
 
-def recorded(walk: Content, group: str, name: str) -> Array | None:
+def recorded(walk: Content, group: str, name: str) -> comparison.Array | None:
     """A variable of a stored walk; None if it is not there."""
     found = walk.groups.get(group, Group({}))
     return found[name] if name in found.variables else None
 
 
-def times_of_steps(walk: Content, name: str) -> Array:
+def times_of_steps(walk: Content, name: str) -> comparison.Array:
     """Times (s) that a stored walk has of its steps; none of a walk without a step, and of what the walker has not."""
     found = recorded(walk, "steps", name)
     return np.zeros(0) if found is None else found
 
 
-def motion_of(walk: Content) -> Motion | None:
+def motion_of(walk: Content) -> comparison.Motion | None:
     """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
     angle = recorded(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
     trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
-    motion = Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
-    return sampled_at_strikes(motion)
+    motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
+    return comparison.sampled_at_strikes(motion)
 
 
 @dataclass(frozen=True)
@@ -201,21 +190,21 @@ class Comparison:
         return {**said, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
 
 
-def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
+def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
     """The contact model's walk less the rigid one's, in time, in phase, and as orbits."""
     if rigid is None or contact is None:
         why = "no record of both walks: outputs does not ask for states, or a walk ended at once"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
-    time, raw = difference_in_time(contact, rigid)
+    time, raw = comparison.difference_in_time(contact, rigid)
     found = {"raw": raw}
     groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
     missing = ("differences in phase, and of the orbits", "step")
     if steps:
         missing = ("difference of the last stride, and of the orbits", "stride")
-        phases = np.linspace(0.0, 1.0, PHASES)
-        aligned = difference_in_phase(contact, rigid, phases)
-        smooth = between_impacts(contact, rigid, phases)
+        phases = np.linspace(0.0, 1.0, comparison.PHASES)
+        aligned = comparison.difference_in_phase(contact, rigid, phases)
+        smooth = comparison.between_impacts(contact, rigid, phases)
         found |= {"aligned": aligned, "between_impacts": part(aligned, smooth)}
         coordinates = {
             **numbered(len(aligned.angle), STEP, "step number"),
@@ -223,11 +212,11 @@ def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
             **legs(),
         }
         in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), "phase")
-        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": IMPACT_PHASE})
+        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
         if steps >= STRIDE:
             last = slice(-STRIDE, None)
             found["settled"] = part(part(aligned, last), smooth[last])
-            distances = orbit_distances(contact, rigid)
+            distances = comparison.orbit_distances(contact, rigid)
             text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
             groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
             orbit = distances.tolist()
@@ -240,12 +229,12 @@ def compare_motion(rigid: Motion | None, contact: Motion | None) -> Comparison:
     return Comparison(errors, orbit, groups, () if steps >= STRIDE else (lacking,))
 
 
-def part(difference: WalkDifference, where: Any) -> WalkDifference:
+def part(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
     """A difference at some of its steps and phases."""
-    return WalkDifference(difference.angle[where], difference.velocity[where])
+    return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
 
 
-def differences(way: str, found: WalkDifference, dims: tuple[str, ...], same: str) -> dict[str, Variable]:
+def differences(way: str, found: comparison.WalkDifference, dims: tuple[str, ...], same: str) -> dict[str, Variable]:
     """Differences at the same time or phase, as variables."""
     said = f"contact less rigid model, at the same {same}"
     return {

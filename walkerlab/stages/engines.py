@@ -11,21 +11,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab import __version__
-from walkerlab.benchmarks.engines.experiments import (
-    EXACT_ENOUGH,
-    OWN_TOUCHES,
-    Truth,
-    adams_rows,
-    has_settled,
-    least_wall,
-    our_rows,
-    own_law_rows,
-    same_law_rows,
-    swing_rows,
-    target_of,
-    truth_of,
-    tuned,
-)
+from walkerlab.benchmarks.engines import experiments
 from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
@@ -50,7 +36,7 @@ class EngineFindings:
     rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
     tuning: list[TuningRow] = field(default_factory=list)
-    truths: dict[str, Truth] = field(default_factory=dict)
+    truths: dict[str, experiments.Truth] = field(default_factory=dict)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
     def add(self, other: EngineFindings) -> None:
@@ -70,14 +56,14 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     length = None if rigid is None else float(rigid["step_length_m"])
     walks = scenes(config, length, tuple(float(x) for x in start))
     for scene in walks:
-        truth = truth_of(scene)
+        truth = experiments.truth_of(scene)
         if truth is None:
             why = "the walk under ADAMS's law ends before there is anything to compare"
             found.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
             continue
         found.truths[scene.name] = truth
         progress.start(f"engines: {scene.name}", len(engines) + 1)
-        found.rows += [*our_rows(scene, truth, __version__), *adams_rows(scene, __version__)]
+        found.rows += [*experiments.our_rows(scene, truth, __version__), *experiments.adams_rows(scene, __version__)]
         progress.advance()
         for measured in side_by_side(engines, scene, truth, jobs):
             found.add(measured)
@@ -87,7 +73,9 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     return content(found, rigid)
 
 
-def side_by_side(engines: Sequence[Engine], scene: EngineScene, truth: Truth, jobs: int) -> Iterator[EngineFindings]:
+def side_by_side(
+    engines: Sequence[Engine], scene: EngineScene, truth: experiments.Truth, jobs: int
+) -> Iterator[EngineFindings]:
     """What is found of each engine, `jobs` of them at a time; who stops waiting ends those that run."""
     processes = [OwnProcess() for _ in engines]
     with ThreadPoolExecutor(max(1, jobs)) as pool:
@@ -108,25 +96,25 @@ def not_installed() -> list[dict[str, str]]:
     ]
 
 
-def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: Truth) -> EngineFindings:
+def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: experiments.Truth) -> EngineFindings:
     """All experiments of one engine on one scene, in a process of its own."""
     found = EngineFindings()
-    version, target = engine.version, target_of(scene)
+    version, target = engine.version, experiments.target_of(scene)
     with process:
-        found.swings, lost = swing_rows(engine, scene, process)
+        found.swings, lost = experiments.swing_rows(engine, scene, process)
         found.left_out += [{"what": f"a swing in {engine.name}", "why": one.why} for one in lost]
-        found.rows += same_law_rows(engine, version, scene, truth, process)
+        found.rows += experiments.same_law_rows(engine, version, scene, truth, process)
         if target is None:
             found.left_out.append({"what": f"own contact of {engine.name}", "why": "the ground has no friction"})
             return found
         for contact in engine.adapter().CONTACTS:
-            own, rows, failed = tuned(engine, contact, scene, target, process)
+            own, rows, failed = experiments.tuned(engine, contact, scene, target, process)
             if own is None:
                 why = failed.why if failed is not None else "it could not be tuned"
                 found.left_out.append({"what": f"contact {contact} of {engine.name}", "why": why})
                 continue
             found.tuning += rows
-            found.rows += own_law_rows(engine, version, contact, own, scene, truth, process)
+            found.rows += experiments.own_law_rows(engine, version, contact, own, scene, truth, process)
     return found
 
 
@@ -193,9 +181,9 @@ def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]
         by_engine.setdefault(series[0].engine, []).extend(series)
     found: dict[str, dict[str, float]] = {}
     for level in LEVELS:
-        own = least_wall(ours, level)
+        own = experiments.least_wall(ours, level)
         for engine, runs in by_engine.items():
-            theirs = least_wall(runs, level)
+            theirs = experiments.least_wall(runs, level)
             if own is not None and theirs is not None:
                 found.setdefault(plain_power(level), {})[engine] = theirs / own
     return found
@@ -204,14 +192,14 @@ def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]
 def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
     """The contact whose walk at its smallest step comes closest to ADAMS's law; None if none walks to the end."""
     finest = [series[-1] for series in series_of(rows, scene, OWN_LAW).values()]
-    reached = [row for row in finest if row.error is not None and row.steps == OWN_TOUCHES]
+    reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
         return None
     best = min(reached, key=lambda row: float(row.error or 0.0))
     return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
 
 
-def three_digits(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, dict[str, float]]:
+def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
     """The largest step (s) from which on an engine's last period has three correct digits, by experiment and name.
 
     On the same law they are digits of the reference; on an engine's own, of what it gives at its finest.
@@ -257,7 +245,7 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
     return found
 
 
-def conclusions(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str, str]:
+def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
     """What was found, a paragraph for each experiment."""
     same, own = (series_of(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
     sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
@@ -266,10 +254,12 @@ def conclusions(rows: Sequence[EngineRow], scene: str, truth: Truth) -> dict[str
     falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
     finest, settled = (
         [runs[-1] for runs in own.values()],
-        [name for name in changes[OWN_LAW] if has_settled(*own[name][-2:])],
+        [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])],
     )
     best, period = closest(rows, scene), float(truth.walk.periods_s[-1])
     return {
-        SAME_LAW: words("engines.same_law", reached, engines, sizes[SAME_LAW], falling, plain_power(EXACT_ENOUGH)),
+        SAME_LAW: words(
+            "engines.same_law", reached, engines, sizes[SAME_LAW], falling, plain_power(experiments.EXACT_ENOUGH)
+        ),
         OWN_LAW: words("engines.own_law", best, finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
     }

@@ -211,13 +211,6 @@ def no_answer(result: Stored) -> str:
     return str(said.get("message", "no answer"))
 
 
-def plan(
-    config: Config, target: str, folder: RunFolder, force: bool = False, graph: Graph = PIPELINE
-) -> tuple[Step, ...]:
-    """What running a stage would do with it and with each stage that it needs, in that order; touches nothing."""
-    return Planner(config, folder, graph, force).plan(graph.needed_for(target, config))
-
-
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
     """What is stored in a run's own folder, and what running each stage there is would do; touches nothing."""
     return Planner(config, folder, graph, elsewhere=False).plan(graph.stages)

@@ -25,7 +25,6 @@ from walkerlab.stages.plan import (
     input_digest,
     left_out,
     no_answer,
-    plan,
     refuse_unsuited,
     why_unsuited,
 )
@@ -39,8 +38,6 @@ from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
-
-__all__ = ["StageDone", "StageReport", "execute", "plan"]
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,7 @@ from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
-from walkerlab.verification.maps import (
-    BUDGET,
-    NONE,
-    STEP,
-    STICTION_VELOCITY,
-    STIFFNESS,
-    VERDICTS,
-    WALK_STEPS,
-    Numbers,
-    along,
-    pieces_of,
-)
+from walkerlab.verification import maps
 from walkerlab.verification.ordinary import FINE, STEPS
 
 OF_STICTION = {
@@ -47,48 +36,48 @@ def run(
     jobs   processes
     """
     cells = config.stability.map_cells
-    complete(pieces_of(cells), parts, "stability maps", progress, jobs)
+    complete(maps.pieces_of(cells), parts, "stability maps", progress, jobs)
     stiction, step = stiction_group(cells, parts.kept), step_group(cells, parts.kept)
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 
 
-def stiction_group(cells: int, kept: Mapping[str, Numbers]) -> Group:
+def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     """How the default method's walks end, over stiction velocity and stiffness."""
     found = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(OF_STICTION, np.moveaxis(found, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
     answered = np.isin(columns["outcome"], [int(one) for one in Outcome if one.answered])
-    compared = answered & (columns["error"] != NONE)
+    compared = answered & (columns["error"] != maps.NONE)
     errors = np.where(compared, columns["error"], np.nan)
     variables = {name: whole(columns[name], dims, text) for name, text in OF_STICTION.items() if name != "error"}
     variables |= {
-        **axis("stiction_velocity", STICTION_VELOCITY, cells, "m/s", "stiction velocity"),
-        **axis("stiffness", STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
+        **axis("stiction_velocity", maps.STICTION_VELOCITY, cells, "m/s", "stiction velocity"),
+        **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
         "compared": whole(compared, dims, "1 if both runs have an answer and end alike after as many steps"),
         "error": Variable(errors, dims, "1", OF_STICTION["error"], missing=True),
     }
-    return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": WALK_STEPS, "budget": BUDGET})
+    return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.BUDGET})
 
 
-def step_group(cells: int, kept: Mapping[str, Numbers]) -> Group:
+def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     """What semi-implicit Euler makes of the walk, over step size and stiffness."""
     found = np.array([np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)])  # stiffness, step, of each
     verdicts, errors = found.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
     text = "of the state at the end, in legs, radians, pendulum times"
     variables = {
-        **axis("step_size", STEP, cells, "s", "step size"),
-        **axis("stiffness", STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
+        **axis("step_size", maps.STEP, cells, "s", "step size"),
+        **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
         "verdict": whole(verdicts, dims, "what became of it, see attribute verdicts"),
-        "error": Variable(np.where(errors == NONE, np.nan, errors), dims, "1", text, missing=True),
+        "error": Variable(np.where(errors == maps.NONE, np.nan, errors), dims, "1", text, missing=True),
     }
-    legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(VERDICTS))
+    legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICTS))
     return Group(variables, {"verdicts": legend, "steps_wanted": STEPS, "fine": FINE})
 
 
 def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str) -> dict[str, Variable]:
     """The coordinate of an axis."""
-    return {name: Variable(along(ends, cells), (name,), unit, text)}
+    return {name: Variable(maps.along(ends, cells), (name,), unit, text)}
 
 
 def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:
@@ -106,5 +95,5 @@ def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
         "ends_otherwise_sharper": int(np.count_nonzero(stiction["outcome"] != stiction["sharper_outcome"])),
         "largest_error": float(errors.max()) if errors.size else None,
         "median_error": float(np.median(errors)) if errors.size else None,
-        "fixed_step": {VERDICTS[int(one)]: int(many) for one, many in zip(verdicts, times, strict=True)},
+        "fixed_step": {maps.VERDICTS[int(one)]: int(many) for one, many in zip(verdicts, times, strict=True)},
     }

@@ -18,21 +18,10 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
+from walkerlab.orbits import scaled_starts
 from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
 from walkerlab.orbits.contact_map import angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
-from walkerlab.orbits.scaled_starts import (
-    TOLERANCES,
-    Adjustment,
-    Margin,
-    ScaledStarts,
-    as_map,
-    contact_row,
-    margins,
-    rigid_map,
-    scaled_starts,
-    smallest_change,
-)
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
@@ -82,18 +71,18 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
 
 def starts_of(
     scene: ContactScene, rigid: Standing, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
-) -> ScaledStarts:
+) -> scaled_starts.ScaledStarts:
     """A rigid start with its velocities scaled, in a scene, to settle on the gait if one was found."""
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:
         return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
 
-    starts = scaled_starts(scene.walker, scene.ground, start, steps, own)
-    return replace(starts, tolerances=replace(tolerances, method=TOLERANCES.method))
+    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
+    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.TOLERANCES.method))
 
 
-def for_a_map(starts: ScaledStarts, evaluations: int) -> ScaledStarts:
+def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """The same at tolerances of a map, with a budget by what the walk from the start as it stands evaluates."""
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))
 
@@ -120,7 +109,7 @@ class TuneRun:
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
-        self.margins: list[Margin] = []
+        self.margins: list[scaled_starts.Margin] = []
         self.adjusted_state: State | None = None
         self.paper: AdamsWalk | None = None  # None for another walker than the paper's compass
 
@@ -138,30 +127,32 @@ class TuneRun:
         progress.start("tune: map", swing.size * stance.size)
         quick = for_a_map(self.starts, self.as_it_stands.evaluations)
         rows = []
-        for row in in_order([partial(contact_row, quick, swing, float(factor)) for factor in stance], jobs):
+        for row in in_order(
+            [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs
+        ):
             rows.append(row)
             progress.advance(swing.size)
-        self.contact_map = as_map(swing, stance, rows)
+        self.contact_map = scaled_starts.as_map(swing, stance, rows)
         progress.start("tune: rigid map and margins")
-        self.rigid_map = rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
+        self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         self.adjustment = self.adjusted(quick)
         if self.adjustment is not None:
             factors = self.adjustment.swing, self.adjustment.stance
-            self.margins = margins(self.starts, factors, **({} if self.hinge else COARSE))
+            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_the_papers(self.config.walker):
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker)
 
-    def adjusted(self, quick: ScaledStarts) -> Adjustment | None:
+    def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
         """The smallest change of the velocities that walks; None if none does."""
         cells = self.contact_map
         if self.as_it_stands.walks:
-            return Adjustment(*AS_IT_STANDS, self.as_it_stands)
+            return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
         if not cells.walking.size:
             return None
         swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
-        return smallest_change(self.starts, quick, cells.walking, (swing, stance))
+        return scaled_starts.smallest_change(self.starts, quick, cells.walking, (swing, stance))
 
     @property
     def gait_factors(self) -> tuple[float, float] | None:
