@@ -33,7 +33,7 @@ def free_swing(walker):
 def swing(engine, integrator, step_s, tolerance=None, walker=compass):
     scene, start, truth, energy = free_swing(walker)
     stepping = Stepping(integrator, step_s, tolerance)
-    task = SwingTask(engine.name, stepping, *pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000)
+    task = SwingTask(engine.name, stepping, pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000)
     end = task.run().end
     return float(np.max(np.abs(end - truth))), abs(energy(end) - energy(start))
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.engines.adapter import Stepping
-from walkerlab.benchmarks.engines.planar import HINGED, planar_model, skeleton
+from walkerlab.benchmarks.engines.planar import HINGED, planar_model
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.runs import SwingTask
 from walkerlab.mechanics.rigid import standing
@@ -43,14 +43,13 @@ def test_the_swing_with_a_free_knee_converges_to_the_rigid_models_with_the_order
     engine = ENGINES[name]
     pytest.importorskip(engine.module, reason=f"{name} is not installed: {engine.install_line}")
     foot = KNEED.feet[STANCE]
-    bones = skeleton(KNEED, foot.body, foot.centre_m, KNEED.knees[STANCE:])
-    model = planar_model(KNEED, bones, HINGED, GRAVITY, SLOPE)
+    model = planar_model(KNEED, (foot.body, foot.centre_m), HINGED, GRAVITY, SLOPE, KNEED.knees[STANCE:])
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         if entry.adapts:
             continue
         errors = []
         for step_s in (COARSE_S, 0.5 * COARSE_S):
             stepping = Stepping(integrator, step_s)
-            task = SwingTask(name, stepping, model, bones.chain, SLOPE, body_by_body(START), SWING_S, 10_000)
+            task = SwingTask(name, stepping, model, SLOPE, body_by_body(START), SWING_S, 10_000)
             errors.append(float(np.max(np.abs(task.run().end - ours))))
         assert np.log2(errors[0] / errors[1]) == pytest.approx(entry.order, abs=0.25), integrator

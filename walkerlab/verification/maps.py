@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TENFOLD
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
-from walkerlab.verification.starts import ContactStart, JudgedWalk, configured, prepared
+from walkerlab.verification.starts import ContactStart, configured, prepared
 from walkerlab.verification.verdict import finite
 
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness_N_per_m_e
@@ -53,11 +52,19 @@ def on_ground(stiffness: float, stiction_velocity: float | None, steps: int, bud
     return case, config_of(case)
 
 
+def prepared_on_ground(config: Config, case: Case) -> ContactStart:
+    """The start of a cell."""
+    start = prepared(config, case)
+    assert isinstance(start, ContactStart), "the paper's slope has a gait"
+    return start
+
+
 @dataclass(frozen=True)
 class StictionCell:
     """The paper's walk with one stiffness and stiction velocity, by the default method.
 
-    run  outcome, steps, outcome at a tenfold tolerance, error between both, right-hand sides
+    run  outcome, steps, outcome at a tenfold tolerance, error between both in legs, radians and pendulum times (`NONE`
+         if they end unlike), right-hand sides
     """
 
     name: str
@@ -73,23 +80,12 @@ class StictionCell:
         if walk.outcome.answered:
             sharper = case.model_copy(update={"budget": SHARPER_BUDGET})
             again = start.walk(case, configured(start, sharper, TENFOLD))
-        numbers = (walk.outcome, walk.touches.size, again.outcome, apart(walk, again, config), walk.rhs_evaluations)
+        error = NONE
+        if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
+            ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
+            error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
+        numbers = walk.outcome, walk.touches.size, again.outcome, error, walk.rhs_evaluations
         return [float(number) for number in numbers]
-
-
-def prepared_on_ground(config: Config, case: Case) -> ContactStart:
-    """The start of a cell."""
-    start = prepared(config, case)
-    assert isinstance(start, ContactStart), "the paper's slope has a gait"
-    return start
-
-
-def apart(one: JudgedWalk, other: JudgedWalk, config: RigidConfig) -> float:
-    """How far two walks' touches and ends are apart, in legs, radians and pendulum times; `NONE` if they end unlike."""
-    if one.outcome is not other.outcome or one.touches.size != other.touches.size:
-        return NONE
-    ends = np.abs(np.subtract(one.record.end_state, other.record.end_state)) / natural_units(config)
-    return finite(float(np.max(np.concatenate([np.abs(one.touches - other.touches), ends]))))
 
 
 @dataclass(frozen=True)
@@ -116,12 +112,11 @@ class StepColumn:
         if not walk.outcome.answered:
             return [float(VERDICTS.index("no reference")), NONE] * self.cells
         arrival = arrival_of("map", walk.record, natural_units(config))
-        found = [fixed(arrival, start, h, MOST_EVALUATIONS) for h in self.steps_s]
-        return [
-            number
-            for one in found
-            for number in (float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error)
-        ]
+        numbers: Numbers = []
+        for h in self.steps_s:
+            one = fixed(arrival, start, h, MOST_EVALUATIONS)
+            numbers += [float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error]
+        return numbers
 
 
 MapPiece = StictionCell | StepColumn

@@ -179,7 +179,7 @@ def same_law_rows(
             # a whole number of steps leads to the end
             stepping = asked if integrator.adapts else Stepping(name, truth.until_s / steps)
             task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
-            answer = process.do(task, PATIENCE_S)
+            answer = process.do(task.run, PATIENCE_S)
             row = experiment.row(name, stepping, answer)
             yield row
             late = isinstance(answer, TaskLost) and answer.timed_out
@@ -214,7 +214,7 @@ def tuned(
 ) -> tuple[OwnContact | None, list[TuningRow], TaskLost | None]:
     """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
     task = runs.TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
-    answer: runs.TuningAnswer | TaskLost = process.do(task, PATIENCE_S)
+    answer: runs.TuningAnswer | TaskLost = process.do(task.run, PATIENCE_S)
     if isinstance(answer, TaskLost):
         return None, [], answer
     settings = dict(answer.own.settings)
@@ -242,7 +242,7 @@ def own_law_rows(
 
     def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
         task = runs.WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
-        answer = process.do(task, PATIENCE_S)
+        answer = process.do(task.run, PATIENCE_S)
         row = experiment.row(contact, stepping, answer, factor)
         if isinstance(answer, TaskLost):
             return row, most if answer.timed_out else 0
@@ -282,8 +282,8 @@ def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
 
 def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
     """The hinged walker's swing over step sizes, by each of an engine's integrators."""
-    model, chain = runs.pinned_model(scene)
-    n = len(chain)
+    model = runs.pinned_model(scene)
+    n = len(model.chain)
     start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
     truth, energy = swing_truth(scene, start)
     rows: list[SwingRow] = []
@@ -291,8 +291,8 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         before = None
         for stepping in steppings(integrator, entry, SWING_STEPS):
-            swing = model, chain, scene.ours.slope, start, SWING_S, entry.most_steps
-            answer = process.do(runs.SwingTask(engine.name, stepping, *swing), PATIENCE_S)
+            swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
+            answer = process.do(runs.SwingTask(engine.name, stepping, *swing).run, PATIENCE_S)
             if isinstance(answer, TaskLost):
                 lost.append(answer)
                 break

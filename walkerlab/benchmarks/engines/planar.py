@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,6 +58,7 @@ class PlanarModel:
     freedoms of the base against the world
     balls    the feet
     gravity  m/s^2, along the slope and towards it
+    chain    (bodies, links) which relative angles, base first, add up to each body's absolute one (assembly's order)
     """
 
     links: tuple[Link, ...]
@@ -65,6 +66,7 @@ class PlanarModel:
     balls: tuple[Ball, ...]
     gravity_along: float
     gravity_down: float
+    chain: Floats
 
     @property
     def size(self) -> int:
@@ -72,69 +74,58 @@ class PlanarModel:
         return len(self.freedoms) + len(self.links) - 1
 
 
-@dataclass(frozen=True)
-class Skeleton:
-    """Which bodies make up each link, and how the links hang from each other.
-
-    members  of each link: a body, and where its frame's origin is in the link's (m); the link's own body first
-    hinges   of each link: its parent's place, the hinge in the parent's frame and in its own (m)
-    chain    (bodies, links) which relative angles, base first, add up to each body's absolute one (assembly's order)
-    """
-
-    members: tuple[tuple[tuple[str, Position], ...], ...]
-    hinges: tuple[tuple[int, Position, Position], ...]
-    chain: Floats
-
-    def placed(self, body: str, at_m: Position) -> tuple[int, Position]:
-        """The link that a point of a body belongs to, and where it is in that link's frame."""
-        for link, members in enumerate(self.members):
-            for name, shift in members:
-                if name == body:
-                    return link, moved(at_m, shift)
-        raise KeyError(body)
-
-
 def moved(point: Position, shift: Position) -> Position:
     """A point in a frame whose origin is shifted."""
     return (point[0] + shift[0], point[1] + shift[1])
 
 
-def skeleton(assembly: Assembly, base: str, base_point: Position, welds: Collection[Knee] = ()) -> Skeleton:
-    """The assembly from its base outwards, depth first; shank and thigh of a welded knee are one link."""
-    one = [{knee.thigh, knee.shank} for knee in welds]
-    members: list[list[tuple[str, Position]]] = [[(base, (0.0, 0.0))]]
-    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base_point)]
-    rows = {base: np.eye(1, len(assembly.bodies))[0]}
+def planar_model(
+    assembly: Assembly,
+    base: tuple[str, Position],
+    freedoms: tuple[Freedom, ...],
+    gravity: float,
+    slope: float,
+    welds: Collection[Knee] = (),
+) -> PlanarModel:
+    """The assembly hung from a point of its base, from there outwards, depth first.
 
-    def grow(name: str, link: int, shift: Position) -> None:
+    base     a body and a point of it
+    gravity  m/s^2
+    slope    rad
+    welds    knees whose shank and thigh are one link
+    """
+    root, base_point = base
+    one = [{knee.thigh, knee.shank} for knee in welds]
+    # of each link: its bodies, and where their frames' origins are in its own; and how it hangs from its parent
+    members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
+    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base_point)]
+    placed: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
+    rows = {root: np.eye(1, len(assembly.bodies))[0]}
+
+    def grow(name: str) -> None:
+        link, shift = placed[name]
         for other, leaving, entering in neighbours(assembly, name):
             if other in rows:
                 continue
             hinge, rows[other] = moved(leaving, shift), rows[name].copy()
             if {name, other} in one:
-                place, there = link, (hinge[0] - entering[0], hinge[1] - entering[1])
-                members[link].append((other, there))
+                placed[other] = link, (hinge[0] - entering[0], hinge[1] - entering[1])
+                members[link].append((other, placed[other][1]))
             else:
-                place, there = len(members), (0.0, 0.0)
-                rows[other][place] = 1.0
-                members.append([(other, there)])
+                placed[other] = len(members), (0.0, 0.0)
+                rows[other][len(members)] = 1.0
+                members.append([(other, (0.0, 0.0))])
                 hinges.append((link, hinge, entering))
-            grow(other, place, there)
+            grow(other)
 
-    grow(base, 0, (0.0, 0.0))
-    chain = np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)]
-    return Skeleton(tuple(tuple(link) for link in members), tuple(hinges), np.ascontiguousarray(chain))
-
-
-def planar_model(
-    assembly: Assembly, bones: Skeleton, freedoms: tuple[Freedom, ...], gravity: float, slope: float
-) -> PlanarModel:
-    """The assembly hung from a point of its base; gravity in m/s^2, slope in rad."""
-    links = tuple(lumped(assembly, *link) for link in zip(bones.members, bones.hinges, strict=True))
-    balls = tuple(
-        Ball(*bones.placed(foot.body, foot.centre_m), *ball_and_ground(foot.radius_m)) for foot in assembly.feet
-    )
-    return PlanarModel(links, freedoms, balls, gravity * math.sin(slope), gravity * math.cos(slope))
+    grow(root)
+    chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
+    links = tuple(lumped(assembly, *link) for link in zip(members, hinges, strict=True))
+    balls = []
+    for foot in assembly.feet:
+        link, shift = placed[foot.body]
+        balls.append(Ball(link, moved(foot.centre_m, shift), *ball_and_ground(foot.radius_m)))
+    return PlanarModel(links, freedoms, tuple(balls), gravity * math.sin(slope), gravity * math.cos(slope), chain)
 
 
 def ball_and_ground(radius_m: float) -> tuple[float, float]:
@@ -143,9 +134,7 @@ def ball_and_ground(radius_m: float) -> tuple[float, float]:
     return ball, radius_m - ball
 
 
-def lumped(
-    assembly: Assembly, members: tuple[tuple[str, Position], ...], hinge: tuple[int, Position, Position]
-) -> Link:
+def lumped(assembly: Assembly, members: Sequence[tuple[str, Position]], hinge: tuple[int, Position, Position]) -> Link:
     """Bodies that move as one, and the particles on them, as a link."""
     parent, parent_point, point = hinge
     every = [

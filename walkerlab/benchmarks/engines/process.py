@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import tempfile
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from walkerlab.workers import Worker, WorkerDiedError, WorkerTimeoutError
 
 START_UP_S = 60.0  # for a first task, which loads the engine and compiles
-R_co = TypeVar("R_co", covariant=True)
 R = TypeVar("R")
-
-
-class Task(Protocol[R_co]):
-    """Something to be done there; processes can be sent it."""
-
-    def run(self) -> R_co:
-        """Its result."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +44,15 @@ class OwnProcess:
         self._end()
         self._folder.cleanup()
 
-    def do(self, task: Task[R], timeout_s: float) -> R | TaskLost:
-        """A task's result, or what became of it; RuntimeError once it is abandoned."""
+    def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
+        """The result of a task that processes can be sent, or what became of it; RuntimeError once it is abandoned."""
         if self._abandoned:
             raise RuntimeError("nobody waits for this process any more")
         if self._worker is None:
             self._worker = Worker(folder=Path(self._folder.name), quiet=True)
             timeout_s += START_UP_S
         try:
-            return self._worker.do(task.run, timeout_s=timeout_s)
+            return self._worker.do(task, timeout_s=timeout_s)
         except WorkerTimeoutError:
             self._end()
             return TaskLost(f"no answer within {timeout_s:.0f} s", timed_out=True)

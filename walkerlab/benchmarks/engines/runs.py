@@ -154,7 +154,6 @@ class SwingTask:
     engine: str
     stepping: Stepping
     model: planar.PlanarModel
-    chain: Floats
     slope: float
     start: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
     until_s: float
@@ -162,14 +161,14 @@ class SwingTask:
 
     def run(self) -> SwingAnswer:
         """Swing."""
-        n = len(self.chain)
-        absolute = np.column_stack((self.start[:n] + self.slope, self.start[n:]))
-        q, v = np.linalg.lstsq(self.chain, absolute, rcond=None)[0].T
+        chain = self.model.chain
+        absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
+        q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
         engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v, None)
         begun = time.process_time()
         motion = recorded(engine, self.most, self.until_s)
         wall = time.process_time() - begun
-        end = np.concatenate((self.chain @ motion.q[-1] - self.slope, self.chain @ motion.v[-1]))
+        end = np.concatenate((chain @ motion.q[-1] - self.slope, chain @ motion.v[-1]))
         return SwingAnswer(end, wall)
 
 
@@ -193,11 +192,11 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
     return EngineMotion(*(np.array(column) for column in zip(*seen, strict=True)))
 
 
-def pinned_model(scene: EngineScene) -> tuple[planar.PlanarModel, Floats]:
-    """The scene's walker hinged at the centre of its stance foot, and its chain of angles."""
+def pinned_model(scene: EngineScene) -> planar.PlanarModel:
+    """The scene's walker hinged at the centre of its stance foot."""
     foot = scene.assembly.feet[scene.stance]
-    bones = planar.skeleton(scene.assembly, foot.body, foot.centre_m, scene.locked)
-    return planar.planar_model(scene.assembly, bones, planar.HINGED, scene.gravity, scene.ours.slope), bones.chain
+    base = foot.body, foot.centre_m
+    return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.ours.slope, scene.locked)
 
 
 @dataclass(frozen=True)
@@ -250,7 +249,7 @@ class Bench:
         target, adapter = self.target, ENGINES[self.task.engine].adapter()
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
         ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
-        model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity)
+        model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
         name = adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, ROUNDING if adapter.INTEGRATORS[name].adapts else None)
         engine = adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, Skeleton, planar_model, skeleton
+from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
@@ -55,19 +55,15 @@ class EngineScene:
     locked: tuple[Knee, ...] = ()
 
     @cached_property
-    def bones(self) -> Skeleton:
-        """What hangs from what."""
-        return skeleton(self.assembly, self.base, self.hip, self.locked)
+    def model(self) -> PlanarModel:
+        """What an engine builds."""
+        base = self.base, self.hip
+        return planar_model(self.assembly, base, FLOATING, self.gravity, self.ours.slope, self.locked)
 
     @property
     def chain(self) -> Floats:
         """Matrix (bodies, links): which relative angles add up to each absolute one."""
-        return self.bones.chain
-
-    @cached_property
-    def model(self) -> PlanarModel:
-        """What an engine builds."""
-        return planar_model(self.assembly, self.bones, FLOATING, self.gravity, self.ours.slope)
+        return self.model.chain
 
     @cached_property
     def knee_places(self) -> tuple[int, ...]:
