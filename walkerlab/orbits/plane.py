@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from walkerlab.orbits.attractors import settled
 from walkerlab.orbits.bifurcations import Bifurcation, Kind, critical_value, eigenvector
 from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
 from walkerlab.orbits.families import BranchEnd, BranchFollower, GaitBranch, ValueSpan, why_lost
-from walkerlab.orbits.newton import Evaluated, Floats, NotConverged
+from walkerlab.orbits.newton import Equations, Evaluated, Floats, NotConverged
 from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
@@ -38,49 +38,36 @@ TRANSIENT, KEPT = 400, 96  # steps
 KICK = 1e-3  # away from an unstable gait, coordinates being of magnitude one
 
 
-class MapAt(Protocol):
-    """Step maps over the first parameter, by the value of the second."""
-
-    def __call__(self, second: float) -> StepMap | None:
-        """The map; None where the second parameter makes no walker."""
+MapAt = Callable[[float], StepMap | None]
+"""Step maps over the first parameter, by the value of the second; None where that makes no walker."""
 
 
-class CriticalGaits:
-    """P^n(z) - z = 0 and a test function, over x = (z, first / its scale, second / its scale)."""
+def critical_gaits(
+    map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]
+) -> Equations[IteratedMap | None]:
+    """P^n(z) - z = 0 and a test function, over x = (z, first / its scale, second / its scale), for gaits of n steps."""
+    maps = lru_cache(MAPS)(map_at)
 
-    def __init__(self, map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> None:
-        """Bifurcations of a kind of gaits of `period` steps."""
-        self._map_at = lru_cache(MAPS)(map_at)
-        self.kind, self.period, self.scales = kind, period, scales
+    def cycle(x: Floats) -> IteratedMap | None:
+        step_map = maps(float(x[-1]) * scales[1])
+        walked = None if step_map is None else walk_steps(step_map, x[:-2], float(x[-2]) * scales[0], period)
+        return None if walked is None or walked.outcome is not Outcome.WALKED else walked
 
-    def cycle(self, x: Floats) -> IteratedMap | None:
-        """The steps from x; None where there is no walker or the walk ends."""
-        step_map = self._map_at(float(x[-1]) * self.scales[1])
-        if step_map is None:
-            return None
-        cycle = walk_steps(step_map, x[:-2], float(x[-2]) * self.scales[0], self.period)
-        return cycle if cycle.outcome is Outcome.WALKED else None
-
-    def __call__(self, x: Floats) -> Evaluated[IteratedMap | None]:
+    def equations(x: Floats) -> Evaluated[IteratedMap | None]:
         """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
-        d = x.size - 2
-        here = self.cycle(x)
-        beside = [[self.cycle(x + sign * REACH * unit) for sign in (1.0, -1.0)] for unit in np.eye(x.size)]
-        if here is None or any(cycle is None for pair in beside for cycle in pair):
+        d, reach = x.size - 2, REACH * np.eye(x.size)
+        beside = (cycle(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
+        walked = [one for one in (cycle(x), *beside) if one is not None]
+        if len(walked) < 1 + 2 * x.size:
             return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
+        here, tests = walked[0], np.array([critical_value(kind, one.DP) for one in walked])
         jacobian = np.zeros((d + 1, d + 2))
-        jacobian[:d, :d] = here.DP - np.eye(d)
-        jacobian[:d, d] = self.scales[0] * here.Dp
-        for column, (up, down) in enumerate(beside):
-            assert up is not None
-            assert down is not None
-            jacobian[d, column] = (critical_value(self.kind, up.DP) - critical_value(self.kind, down.DP)) / (
-                2.0 * REACH
-            )
-            if column == d + 1:
-                jacobian[:d, column] = (up.z - down.z) / (2.0 * REACH)
-        value = np.append(here.z - x[:d], critical_value(self.kind, here.DP))
-        return Evaluated(Outcome.WALKED, value, jacobian, here)
+        jacobian[:d, :d], jacobian[:d, d] = here.DP - np.eye(d), scales[0] * here.Dp
+        jacobian[:d, d + 1] = (walked[-2].z - walked[-1].z) / (2.0 * REACH)
+        jacobian[d] = (tests[1::2] - tests[2::2]) / (2.0 * REACH)
+        return Evaluated(Outcome.WALKED, np.append(here.z - x[:d], tests[0]), jacobian, here)
+
+    return equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,27 +101,27 @@ def curve_through(
     points  at most, each way
     """
     scales = (spans[0].size, spans[1].size)
-    equations = CriticalGaits(map_at, bifurcation.kind, period, scales)
+    equations = critical_gaits(map_at, bifurcation.kind, period, scales)
     x = np.append(bifurcation.point.x, second / scales[1])
     x[-2] = bifurcation.value / scales[0]
     at_second = np.append(np.zeros(x.size - 1), 1.0)
     start = corrected(equations, x, at_second, control.tolerance)
     if isinstance(start, NotConverged):
         return None
-    halves = [
+    (behind, first), (ahead, last) = (
         traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance, control)
         for sign in (-1.0, 1.0)
-    ]
-    along = np.vstack((halves[0][0][::-1], halves[1][0][1:]))
-    return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (halves[0][1], halves[1][1]))
+    )
+    along = np.vstack((behind[::-1], ahead[1:]))
+    return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (first, last))
 
 
 def traced(
-    equations: CriticalGaits, start: Solved[IteratedMap | None], spans: tuple[ValueSpan, ValueSpan], points: int,
-    advance: Callable[[], None], control: StepControl,
+    equations: Equations[IteratedMap | None], start: Solved[IteratedMap | None], spans: tuple[ValueSpan, ValueSpan],
+    points: int, advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
-    scales = np.array(equations.scales)
+    scales = np.array([span.size for span in spans])
     values, before, last, length = [start.x[-2:] * scales], None, start, control.first
     while len(values) < points:
         following = stepped(equations, last, length, control, before=before)

@@ -263,7 +263,16 @@ class RigidMap(StepMap):
         walker_at  the walker at a value of the parameter; None where it makes no walker
         scale      magnitude of changes of the parameter that matter
         """
-        self._unit_at = lru_cache(REMEMBERED)(lambda p: similar_of(walker_at(p)))
+
+        @lru_cache(REMEMBERED)
+        def unit_at(p: float) -> Similar | None:
+            walker = walker_at(p)
+            if walker is None:
+                return None
+            unit, units = unit_walker(walker)
+            return Similar(unit, units, section_of(unit))
+
+        self._unit_at = unit_at
         self.scale = scale
         self.names = SECTION_NAMES[: int(like.coordinates)]
         self._like, self._exact, self._quick = like, Shooting(like, EXACT), Shooting(like, QUICK)
@@ -328,11 +337,3 @@ class Similar(NamedTuple):
     walker: Standing
     units: Units
     section: StrikeSection
-
-
-def similar_of(walker: Standing | None) -> Similar | None:
-    """The similar walker of one that there is."""
-    if walker is None:
-        return None
-    unit, units = unit_walker(walker)
-    return Similar(unit, units, section_of(unit))
