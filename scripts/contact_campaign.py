@@ -26,6 +26,7 @@ import argparse
 import random
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -274,6 +275,14 @@ def rounding(plain: plain_walk.Plain, rounds: int) -> dict[str, float]:
     return {name: share * units[unit] for name, unit in UNITS.items()}
 
 
+def scene_of(drawn: Drawn) -> tuple[Config, ContactScene]:
+    """What is walked."""
+    config = load(Path(drawn.base), drawn.sets).config
+    assert config.contact is not None, "drawn with one"
+    pitch = config.contact.pad_pitch
+    return config, contact_scene(config, PLANE_MEASURE_M if isinstance(pitch, str) else pitch)
+
+
 def ours_at(scene: ContactScene, config: Config, start: Any, steps: int, tighter: float) -> ContactWalkResult:
     """Our walk with the config's tolerances, or tighter ones."""
     settings = config.solver.contact
@@ -293,9 +302,7 @@ def compare(drawn: Drawn, steps: int) -> Compared:
 
 def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
     """Walk a drawn walk both ways, plainly with steps of step_s at most and of half of it."""
-    config, start = load(Path(drawn.base), drawn.sets).config, drawn.start
-    pads = config.contact is not None and config.contact.pad_pitch not in ("rigid", "own")
-    scene = contact_scene(config, float(config.contact.pad_pitch) if config.contact and pads else PLANE_MEASURE_M)
+    (config, scene), start = scene_of(drawn), drawn.start
     plain, hinged = plain_scene(config, scene.pitch_m), scene.pinned
     coarse, fine = (plainly(plain, start, hinged, steps, h) for h in (step_s, 0.5 * step_s))
     expected = of_plain(plain, fine)
@@ -326,28 +333,42 @@ def largest(one: Any, other: Any) -> float:
 def spread(numbers: list[float]) -> str:
     """Median, 90 % and largest."""
     median, most, largest = np.quantile(numbers, (0.5, 0.9, 1.0))
-    return f"{median:.1e} (median), {most:.1e} (90 %), {largest:.1e} (largest)"
+    return f"{median:.2g} (median), {most:.2g} (90 %), {largest:.2g} (largest)"
+
+
+def arguments(about: str | None, walks: int, steps: int) -> argparse.Namespace:
+    """Which walks are asked for, and how long ones, of a script about something."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--walker", choices=tuple(WALKERS), default="both")
+    parser.add_argument("--walks", type=int, default=walks)
+    parser.add_argument("--steps", type=int, default=steps)
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args()
+
+
+def walks_of(chosen: argparse.Namespace) -> Iterator[tuple[int, Drawn]]:
+    """The walks that are asked for, with their seeds."""
+    return ((seed, WALKERS[chosen.walker](seed)) for seed in range(chosen.seed, chosen.seed + chosen.walks))
+
+
+def tell_row(*cells: object) -> None:
+    """A row of a table in Markdown."""
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
 
 
 def main() -> None:
     """Run the campaign."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--walker", choices=tuple(WALKERS), default="both")
-    parser.add_argument("--walks", type=int, default=200)
-    parser.add_argument("--steps", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=0)
-    chosen = parser.parse_args()
+    chosen = arguments(__doc__, walks=200, steps=3)
     found: list[Compared] = []
-    print("| seed | walk | ends | steps | " + " | ".join(f"{name}: apart, error" for name in UNITS) + " | |")
-    print("|---" * (5 + len(UNITS)) + "|")
-    for seed in range(chosen.seed, chosen.seed + chosen.walks):
-        one = compare(WALKERS[chosen.walker](seed), chosen.steps)
+    tell_row("seed", "walk", "ends", "steps", *(f"{name}: apart, error" for name in UNITS), "")
+    tell_row(*["---"] * (5 + len(UNITS)))
+    for seed, drawn in walks_of(chosen):
+        one = compare(drawn, chosen.steps)
         found.append(one)
         said = f"{', '.join(one.wrong)}: {' '.join(one.drawn.sets)}; {one.drawn.start}" if one.wrong else ""
         last = one.judged[-1]
         numbers = (f"{last.apart[name]:.1e}, {last.error[name]:.1e}" for name in UNITS)
-        row = (seed, one.drawn.ground, last.outcome, one.steps, *numbers, said)
-        print("| " + " | ".join(str(cell) for cell in row) + " |", flush=True)
+        tell_row(seed, one.drawn.ground, last.outcome, one.steps, *numbers, said)
     wrong = [one for one in found if one.wrong]
     ends = ", ".join(f"{count} {label}" for label, count in Counter(one.expected for one in found).most_common())
     print(f"\n{len(found)} walks: {ends}; {len(wrong)} differ")

@@ -11,19 +11,14 @@ second walk over that of the first; below it how often the numerical error is wi
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parent))
 
-from contact_campaign import PLANE_MEASURE_M, TIGHTER, WALKERS, Drawn, ours_at
+from contact_campaign import TIGHTER, Drawn, arguments, ours_at, scene_of, spread, tell_row, walks_of
 
-from walkerlab.config.loader import load
-from walkerlab.scene.contact import contact_scene
 from walkerlab.stages.numerical_error import OF_EACH_STEP, change
 from walkerlab.stages.tune import walk_summary
 
@@ -34,10 +29,7 @@ LEAST = 1e-11  # s or m: below it both are rounding, or the last digits of an ev
 
 def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
     """Summaries of the walk from the default to the tightest tolerance, and their right-hand sides."""
-    config = load(Path(drawn.base), drawn.sets).config
-    contact = config.contact
-    assert contact is not None, "drawn with one"
-    scene = contact_scene(config, PLANE_MEASURE_M if isinstance(contact.pad_pitch, str) else contact.pad_pitch)
+    config, scene = scene_of(drawn)
     walks = [ours_at(scene, config, drawn.start, steps, tighter) for tighter in TIGHTER]
     return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]
 
@@ -49,19 +41,13 @@ def told(error: dict[str, Any], key: str) -> str:
 
 def main() -> None:
     """Walk them all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--walker", choices=tuple(WALKERS), default="both")
-    parser.add_argument("--walks", type=int, default=60)
-    parser.add_argument("--steps", type=int, default=6)
-    parser.add_argument("--seed", type=int, default=0)
-    chosen = parser.parse_args()
+    chosen = arguments(__doc__, walks=60, steps=6)
     ratios: dict[str, list[float]] = {key: [] for key in ERRORS}
     numerical: list[float] = []
     costs, unknown, missed = [], 0, 0
-    print("| seed | walk | ends | steps | " + " | ".join(f"{key}: numerical, true" for key in ERRORS) + " | cost |")
-    print("|---" * (5 + len(ERRORS)) + "|")
-    for seed in range(chosen.seed, chosen.seed + chosen.walks):
-        drawn = WALKERS[chosen.walker](seed)
+    tell_row("seed", "walk", "ends", "steps", *(f"{key}: numerical, true" for key in ERRORS), "cost")
+    tell_row(*["---"] * (5 + len(ERRORS)))
+    for seed, drawn in walks_of(chosen):
         (first, second, third), work = walked(drawn, chosen.steps)
         reported, true = change(first, second), change(first, third)
         unknown += "reason" in reported
@@ -72,15 +58,13 @@ def main() -> None:
                 ratios[key].append((reported[key] + LEAST) / (true[key] + LEAST))
         numerical += [reported["end_time_s"]] if "end_time_s" in reported else []
         numbers = (f"{told(reported, key)}, {told(true, key)}" for key in ERRORS)
-        row = (seed, drawn.ground, first["outcome"], first["steps"], *numbers, f"{costs[-1]:.1f}")
-        print("| " + " | ".join(str(cell) for cell in row) + " |", flush=True)
+        tell_row(seed, drawn.ground, first["outcome"], first["steps"], *numbers, f"{costs[-1]:.1f}")
     print(f"\n{chosen.walks} walks; {unknown} end otherwise in the second walk, {missed} more in the third")
     for key, found in ratios.items():
         near = ", ".join(f"{sum(1 / f <= r <= f for r in found)} within a factor of {f:g}" for f in FACTORS)
         print(f"{key}: of {len(found)} {near}; least ratio {min(found):.2g}, largest {max(found):.2g}")
-    for name, numbers_of in (("numerical error of the end (s)", numerical), ("cost of the second walk", costs)):
-        median, most, largest = np.quantile(numbers_of, (0.5, 0.9, 1.0))
-        print(f"{name}: {median:.2g} (median), {most:.2g} (90 %), {largest:.2g} (largest)")
+    print("numerical error of the end (s):", spread(numerical))
+    print("cost of the second walk:", spread(costs))
 
 
 if __name__ == "__main__":
