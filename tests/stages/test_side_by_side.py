@@ -8,7 +8,8 @@ import pytest
 from process_table import workers_below
 
 from walkerlab.stages.graph import Graph
-from walkerlab.stages.runner import STILL_COMPUTED, Options, any_side_by_side, execute
+from walkerlab.stages.plan import STILL_COMPUTED
+from walkerlab.stages.runner import Options, any_side_by_side, execute
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerDiedError
 

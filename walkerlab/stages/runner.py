@@ -17,17 +17,8 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.kernel_cache import watched
 from walkerlab.scene.left_out import LeftOut
+from walkerlab.stages import plan
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import (
-    STILL_COMPUTED,
-    Planner,
-    Step,
-    input_digest,
-    left_out,
-    no_answer,
-    refuse_unsuited,
-    why_unsuited,
-)
 from walkerlab.stages.precompiler import Precompiler
 from walkerlab.stages.progress import Reporter, Silent, StageReporter
 from walkerlab.stages.runs import claim, refuse_another_config
@@ -113,9 +104,9 @@ def execute(
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
-    refuse_unsuited(target, graph[target], config)
+    plan.refuse_unsuited(target, graph[target], config)
     stages = graph.needed_for(target, config) + (graph.campaigns_of(target) if options.full else ())
-    planner = Planner(config, folder, graph, options.force)
+    planner = plan.Planner(config, folder, graph, options.force)
     steps = planner.plan(stages)
     run = Execution(planner, reporter or Silent(), options.jobs)
     changes = any(step.action == "run" or step.origin is not None for step in steps)
@@ -126,7 +117,7 @@ def execute(
         with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
             # Decided anew, stage by stage: another process may have worked here until now.
-            run = Execution(Planner(config, folder, graph, options.force), run.reporter, options.jobs)
+            run = Execution(plan.Planner(config, folder, graph, options.force), run.reporter, options.jobs)
             run.carry_out(stages, [step.stage for step in steps if step.action == "run"])
     else:
         for step in steps:
@@ -138,7 +129,7 @@ def execute(
 class Begun:
     """A stage that runs."""
 
-    step: Step
+    step: plan.Step
     task: StageTask
     provenance: Provenance
     reporter: StageReporter
@@ -148,7 +139,7 @@ class Begun:
 class Execution:
     """One execution: what is known of the results, and what was done so far."""
 
-    def __init__(self, planner: Planner, reporter: Reporter, jobs: int) -> None:
+    def __init__(self, planner: plan.Planner, reporter: Reporter, jobs: int) -> None:
         """Nothing is done yet."""
         self.planner = planner
         self.folder = planner.folder
@@ -177,7 +168,7 @@ class Execution:
             for begun in self.running.values():
                 begun.reporter.end("")
 
-    def skip(self, step: Step) -> None:
+    def skip(self, step: plan.Step) -> None:
         """Take note of a stage that does not run."""
         done = StageDone(step.stage.name, step.action, step.reason)
         self.done.append(done)
@@ -200,7 +191,7 @@ class Execution:
             self._settle(self.running.pop(None), answer)
             self._draw_early(stages)
 
-    def _pass_over(self, step: Step) -> None:
+    def _pass_over(self, step: plan.Step) -> None:
         """Go on without running a stage; its result may lie in another run folder."""
         if step.origin is not None:
             take_over(step.origin, self.folder.artifact(step.stage.name))
@@ -261,7 +252,7 @@ class Execution:
         """The stages that wait or run."""
         return {one.name for one in self.waiting} | {begun.task.name for begun in self.running.values()}
 
-    def _begin(self, step: Step) -> Begun:
+    def _begin(self, step: plan.Step) -> Begun:
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
         if step.damaged and step.origin is None:
@@ -270,7 +261,7 @@ class Execution:
         if self.planner.force:
             parts.forget()
         inputs = self.planner.inputs(stage)
-        digests = {name: input_digest(stage, result) for name, result in inputs.items()}
+        digests = {name: plan.input_digest(stage, result) for name, result in inputs.items()}
         task = task_of(
             stage,
             self.planner.config,
@@ -307,7 +298,7 @@ class Execution:
         if stage.keeps_parts:
             Parts(self.folder.parts(stage.name), identity.key).forget()
         self.planner.settle(stage, result)
-        reason = begun.step.reason if result.complete else f"no answer: {no_answer(result)}"
+        reason = begun.step.reason if result.complete else f"no answer: {plan.no_answer(result)}"
         done = StageDone(stage.name, "run", reason, time.perf_counter() - begun.started)
         self.done.append(done)
         self.left = [name for name in self.left if name != stage.name]
@@ -321,12 +312,12 @@ class Execution:
         for stage in self.waiting:
             inputs = self.planner.inputs(stage)
             wanted = unsettled.intersection(stage.inputs(config))
-            pending = {name for name in wanted if why_unsuited(graph[name], config) is None}
+            pending = {name for name in wanted if plan.why_unsuited(graph[name], config) is None}
             others = [name for name in pending if not graph[name].draws]
             if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
                 continue
             absent = [entry for entry in self.planner.missing_inputs(stage) if entry.what not in pending]
-            absent += [LeftOut(one.name, STILL_COMPUTED) for one in stages if one.name in pending]
+            absent += [LeftOut(one.name, plan.STILL_COMPUTED) for one in stages if one.name in pending]
             task = task_of(stage, config, inputs, folder=self.folder.path, left_out=tuple(absent))
             self.reporter.drawn(task.run(Silent()).content.summary, self.folder.path)
 
@@ -358,7 +349,7 @@ class Execution:
         graph = self.planner.graph
         found = list(self.planner.missing_inputs(target)) if target.draws else []
         found = [entry for entry in found if not graph[entry.what].optional]
-        found += [left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
+        found += [plan.left_out(done.stage, done.reason) for done in self.done if done.action == "leave out"]
         entries = [*by_stage]
         for done in self.done:
             if done.action != "leave out":
