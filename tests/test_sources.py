@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import walkerlab
-from walkerlab.sources import Sources, code_digest
+from walkerlab.sources import Sources
 from walkerlab.stages.graph import STAGES
 
 NUMBER = itertools.count()
@@ -52,9 +52,9 @@ IMPORTS = [
 def test_digest_follows_every_way_to_import(package, statement):
     name = package(other="", law="FORCE = 1\n")
     package(start=statement.format(package=name) + "\n")
-    before = code_digest(f"{name}.start")
+    before = Sources().code_digest(f"{name}.start")
     package(law="FORCE = 2\n")
-    assert code_digest(f"{name}.start") != before
+    assert Sources().code_digest(f"{name}.start") != before
 
 
 def test_digest_follows_imports_of_imports_and_packages_on_the_way(package):
@@ -66,28 +66,28 @@ def test_digest_follows_imports_of_imports_and_packages_on_the_way(package):
         "deep__SLASH__b": "from .. import nothing",
     }
     name = package(**sources)
-    before = code_digest(f"{name}.start")
+    before = Sources().code_digest(f"{name}.start")
     for changed, text in sources.items():
         package(**{**sources, changed: f"{text}\nCHANGED = True\n"})
-        assert code_digest(f"{name}.start") != before, changed
+        assert Sources().code_digest(f"{name}.start") != before, changed
     package(**sources)
-    assert code_digest(f"{name}.start") == before
+    assert Sources().code_digest(f"{name}.start") == before
 
 
 def test_digest_ignores_what_is_not_imported(package):
     name = package(start="from .law import force  # not: from .other import x", law="force = 1", other="x = 1")
-    before = code_digest(f"{name}.start")
+    before = Sources().code_digest(f"{name}.start")
     package(other="x = 2", new="y = 3")
-    assert code_digest(f"{name}.start") == before
+    assert Sources().code_digest(f"{name}.start") == before
 
 
 def test_digest_covers_data_beside_the_code(package):
     name = package(start="", page__SLASH____init__="", page__SLASH__draw="")
     package(**{"page__SLASH__parts__SLASH__page.html": "<html>"})
-    drawing, other = code_digest(f"{name}.page.draw"), code_digest(f"{name}.start")
+    drawing, other = Sources().code_digest(f"{name}.page.draw"), Sources().code_digest(f"{name}.start")
     package(**{"page__SLASH__parts__SLASH__page.html": "<html lang='en'>"})
-    assert code_digest(f"{name}.page.draw") != drawing
-    assert code_digest(f"{name}.start") == other
+    assert Sources().code_digest(f"{name}.page.draw") != drawing
+    assert Sources().code_digest(f"{name}.start") == other
 
 
 def test_a_stage_outside_this_package_is_followed_into_it(package):
@@ -102,7 +102,7 @@ def test_circular_imports_end(package):
 
 def test_a_module_that_does_not_exist_is_an_error(package):
     with pytest.raises(ModuleNotFoundError):
-        code_digest(package() + ".nowhere")
+        Sources().code_digest(package() + ".nowhere")
 
 
 IMPORTED = """

@@ -116,18 +116,13 @@ def cache_folder() -> Path:
 
 def _remove_unused(generations: list[Path]) -> None:
     """Remove those that were not used for long, beyond the latest few; a process that has one open compiles anew."""
-    latest_first = sorted(((_last_used(folder), folder) for folder in generations), reverse=True)
-    for last_used, folder in latest_first[KEPT_GENERATIONS:]:
-        if time.time() - last_used > UNUSED_S:
+    last_used: dict[Path, float] = {}  # s since the epoch
+    for folder in generations:
+        with contextlib.suppress(OSError):  # one that has just gone
+            last_used[folder] = folder.stat().st_mtime
+    for folder in sorted(last_used, key=last_used.__getitem__, reverse=True)[KEPT_GENERATIONS:]:
+        if time.time() - last_used[folder] > UNUSED_S:
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def _last_used(folder: Path) -> float:
-    """Time (s since the epoch) at which a process last began to use a folder; now for one that has just gone."""
-    try:
-        return folder.stat().st_mtime
-    except OSError:
-        return time.time()
 
 
 def nothing_compiled_yet() -> bool:

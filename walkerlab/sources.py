@@ -112,12 +112,12 @@ class Module:
         for found in IMPORT.finditer(text):
             if found["quoted"]:
                 yield found["quoted"]
-            elif found["modules"]:
-                yield from first_words(found["modules"])
             else:
-                origin = self._absolute(found["origin"])
-                yield origin
-                yield from (f"{origin}.{name}" for name in first_words(found["names"].strip("() \t\n")))
+                origin = None if found["modules"] else self._absolute(found["origin"])
+                yield from [origin] if origin else []
+                listed = (found["modules"] or found["names"].strip("() \t\n")).split(",")
+                names = [entry.split()[0] for entry in listed if entry.strip()]  # of 'a, b as c'
+                yield from (f"{origin}.{name}" if origin else name for name in names)
 
     def _absolute(self, origin: str) -> str:
         """The full name of what follows `from`, be it relative."""
@@ -153,13 +153,3 @@ def data_files(folder: Path) -> Iterator[Path]:
                 yield from data_files(path)
         elif path.suffix not in {".py", ".pyc", ".pyi", ".so", ".md"} and path.name != "py.typed":
             yield path
-
-
-def first_words(listed: str) -> Iterator[str]:
-    """The names in 'a, b as c'."""
-    yield from (entry.split()[0] for entry in listed.split(",") if entry.strip())
-
-
-def code_digest(name: str) -> str:
-    """The digest of one module's code, read now; see `Sources.code_digest`."""
-    return Sources().code_digest(name)

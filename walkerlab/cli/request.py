@@ -178,17 +178,13 @@ class KeysAreNoOptions(TyperCommand):
             return super().parse_args(ctx, args)
         except Exception as error:  # click's NoSuchOption, which each version of typer has in another place
             typed = str(getattr(error, "option_name", ""))
-            key = key_of_option(typed) if any(option.name == "sets" for option in self.params) else None
+            name = typed.lstrip("-").replace("-", "_")
+            keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
+            key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
             if key is not None:
                 said = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
                 error.message = said  # type: ignore[attr-defined]
             raise
-
-
-def key_of_option(typed: str) -> str | None:
-    """The key of a config that somebody has typed as an option; None if it is no key."""
-    name = typed.lstrip("-").replace("-", "_")
-    return next((key for key in keys_to_vary("") if name in (key, key.rpartition(".")[2])), None) if name else None
 
 
 def command(

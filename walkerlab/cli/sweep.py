@@ -77,8 +77,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Run a stage over many values of parameters; results that exist are reused."""
         with exit_on_failure("sweep", request):
+            from walkerlab.config.sweep import Sweep
             from walkerlab.sweeps.engines import Order, engine_named
-            from walkerlab.sweeps.question import axis_of_text
+            from walkerlab.sweeps.question import asked, axis_of_text
             from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
             options = dict(text.split("=", 1) for text in engine_option or () if "=" in text)
@@ -86,8 +87,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
             chosen, address = engine_named(engine)
             loaded = request.loaded
-            texts = [axis_of_text(text) for text in over or ()]
-            question = question_of(loaded.config.sweep, texts, stage, zipped, sample, seed)
+            given = loaded.config.sweep or Sweep()  # what the options leave open
+            own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+            question = asked(
+                stage or given.stage,
+                [axis_of_text(text) for text in over or ()] or own,
+                zipped or (given.zip and not over),
+                sample if sample is not None else "" if over else given.sample,
+                given.seed if seed is None else seed,
+            )
             order = Order(
                 workers=jobs,
                 address=address,
@@ -96,39 +104,16 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 options=options,
             )
             if request.dry_run:
-                asked = SweepRun(question, loaded, request.folder, graph)
-                show_plan(request, asked.foresee(jobs or os.cpu_count() or 1, SHOWN))
+                foreseen = SweepRun(question, loaded, request.folder, graph)
+                show_plan(request, foreseen.foresee(jobs or os.cpu_count() or 1, SHOWN))
                 return
             with chosen.begun(order) as begun:
-                asked = SweepRun(question, loaded, request.folder, graph)
+                run = SweepRun(question, loaded, request.folder, graph)
                 # What is needed at the end is loaded while others compute.
                 threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
                 work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph))
-                swept = asked.run(work, request.console)
+                swept = run.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
-
-
-def question_of(
-    block: Any,
-    over: list[tuple[str, Any, str]],
-    stage: str | None,
-    zipped: bool,
-    sample: str | None,
-    seed: int | None,
-) -> Any:
-    """What is asked: the options, and of what they leave open the config's `sweep` block."""
-    from walkerlab.config.sweep import Sweep
-    from walkerlab.sweeps.question import asked
-
-    given = block or Sweep()
-    listed = over or [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
-    return asked(
-        stage or given.stage,
-        listed,
-        zipped or (given.zip and not over),
-        sample if sample is not None else "" if over else given.sample,
-        given.seed if seed is None else seed,
-    )
 
 
 def where(graph: Graph) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, Problem, nearest, refusal, shown
+from walkerlab.config.problems import KEYS_ARE_LISTED, nearest, refused, shown
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
@@ -68,22 +68,22 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
     while True:
         root = read(_text_of(file, asked), file.label)
         if str(file.path.resolve()) in seen:
-            raise refusal([Problem(asked, f"extends: {file.label} extends itself")])
+            raise refused(asked, f"extends: {file.label} extends itself")
         if len(seen) == MAX_EXTENDS:
-            raise refusal([Problem(asked, f"extends: more than {MAX_EXTENDS} files deep")])
+            raise refused(asked, f"extends: more than {MAX_EXTENDS} files deep")
         seen.append(str(file.path.resolve()))
         if not isinstance(root, Mapping):
             empty = root is None or (isinstance(root, Scalar) and root.value is None)
             held = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
             start = root.position if root else Position(file.label, 1, 1)
-            raise refusal([Problem(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")])
+            raise refused(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")
         layers.insert(0, with_cases(root.without("extends"), file.path.parent))
         extends = root.entries.get("extends")
         if extends is None:
             return layers
         asked = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
-            raise refusal([Problem(asked, "extends: is not the name of a config", _what_there_is())])
+            raise refused(asked, "extends: is not the name of a config", _what_there_is())
         named = extends.value in builtin_names()  # else a path from the file's folder
         file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
 
@@ -102,8 +102,7 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
     file = file_at(folder / named.value)
     cases = read(_text_of(file, named.position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
-        problem = Problem(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
-        raise refusal([problem])
+        raise refused(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
     whole, inner = layer.without(), block.without()
     inner.put("cases", cases, block.keys["cases"])
     whole.put("stability", inner, layer.keys["stability"])
@@ -127,25 +126,24 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
         mode = file.path.stat().st_mode
         if not stat.S_ISREG(mode):
             what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
-            raise refusal([Problem(asked, f"{kind} {file.label} is {what}", "a YAML file")])
+            raise refused(asked, f"{kind} {file.label} is {what}", "a YAML file")
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
         there_is = wanted or _what_there_is() if asked else f"a run, {_what_there_is()}"
-        problem = Problem(asked, f"there is no {kind} {file.label}", there_is, _near(file))
         advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
-        raise refusal([problem], advice) from None
+        raise refused(asked, f"there is no {kind} {file.label}", there_is, _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise refusal([Problem(asked, f"{kind} {file.label} cannot be read: {reason.lower()}")]) from None
+        raise refused(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
     if len(data) > 4 * MAX_CHARACTERS:
-        raise refusal([Problem(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")])
+        raise refused(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         lines = data[: error.start].split(b"\n")
         where = Position(file.label, len(lines), len(lines[-1].decode("utf-8")) + 1)
-        raise refusal([Problem(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?")]) from None
+        raise refused(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?") from None
 
 
 def _near(file: ConfigFile) -> str:

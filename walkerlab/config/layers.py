@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from walkerlab.config.problems import Problem, refusal, shown
+from walkerlab.config.problems import refused, shown
 from walkerlab.config.reader import MAX_DEPTH, read
 from walkerlab.config.tree import Mapping, Node, Position, Scalar
 
@@ -59,7 +59,7 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
     if len(slopes) == len(SLOPE_KEYS):
         (first, there), (second, here) = slopes
         where = f" at {there}" if there else ""
-        raise refusal([Problem(here, f"{second}: the slope is given already, as {first}{where}", "one of both")])
+        raise refused(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
 
 
 def setting_of(text: str) -> ConfigSetting:
@@ -69,9 +69,9 @@ def setting_of(text: str) -> ConfigSetting:
     start = Position(source, 1, 1)
     path = tuple(part.strip() for part in key.split("."))
     if not equals or not all(path):
-        raise refusal([Problem(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")])
+        raise refused(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")
     if len(path) > MAX_DEPTH:
-        raise refusal([Problem(start, f"nested deeper than {MAX_DEPTH} levels")])
+        raise refused(start, f"nested deeper than {MAX_DEPTH} levels")
     column = len(key) + 2
     node = read(value, source, column)
     return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
@@ -107,6 +107,6 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
         inner = Mapping(setting.position)
     if not isinstance(inner, Mapping):
         above, whole = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
-        raise refusal([Problem(setting.position, f"{shown(whole)}: {shown(above)} is a value, not a block of keys")])
+        raise refused(setting.position, f"{shown(whole)}: {shown(above)} is a value, not a block of keys")
     result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
     return result

@@ -7,7 +7,7 @@ from typing import Any
 
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
-from walkerlab.config.problems import Problem, refusal
+from walkerlab.config.problems import refused
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
@@ -54,7 +54,7 @@ def refuse_bad_cases(config: Config, tree: Mapping) -> None:
     for case, node in zip(config.stability.cases, listed.items, strict=True):
         assert isinstance(node, Mapping), "a case that is typed is a block"
         if case.name in places:
-            raise refusal([Problem(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")])
+            raise refused(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")
         places[case.name] = node.keys["name"]
         lines = node.entries.get("config", Mapping(node.position))
         assert isinstance(lines, Mapping), "lines that are typed are a block"
@@ -67,7 +67,7 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
     """Raise ConfigError if a case of the contact model has no ground, or pads as long as a step of no length."""
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
-        raise refusal([Problem(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")])
+        raise refused(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
     if isinstance(config.start, str):
         return
     # a step of no length leaves steps nothing to be judged by on other terrains too
@@ -75,7 +75,7 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)
         text = f"start: case {case.name} starts with its feet together, and so pads of its step have no length"
-        raise refusal([Problem(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")])
+        raise refused(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")
 
 
 def tree_of(block: Keys[str, Any], position: Position) -> Mapping:

@@ -47,6 +47,13 @@ def refusal(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> Confi
     return ConfigError("\n".join(lines), advice)
 
 
+def refused(
+    position: Position | None, text: str, allowed: str = "", near: str = "", advice: str = KEYS_ARE_LISTED
+) -> ConfigError:
+    """One error for one problem; see `Problem`."""
+    return refusal([Problem(position, text, allowed, near)], advice)
+
+
 def nearest(word: str, candidates: Iterable[str]) -> str:
     """The candidate most like `word`, empty if none is like it."""
     spelled = {candidate.lower(): candidate for candidate in candidates}

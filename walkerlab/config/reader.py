@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 from typing import Any, Final, NoReturn
 
-from walkerlab.config.problems import Problem, refusal, shown
+from walkerlab.config.problems import Problem, refusal, refused, shown
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
 
 MAX_CHARACTERS: Final = 64 * 1024
@@ -57,12 +57,12 @@ def read(text: str, source: str, column: int = 1) -> Node | None:
     Raises ConfigError with the position of whatever is not a plain YAML tree.
     """
     if len(text) > MAX_CHARACTERS:
-        raise refusal([Problem(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")])
+        raise refused(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")
     strange = _NOT_YAML.search(text)
     if strange:
         lines = text[: strange.start()].split("\n")
         where = Position(source, len(lines), len(lines[-1]) + (column if len(lines) == 1 else 1))
-        raise refusal([Problem(where, f"character {shown(strange.group())} cannot be in a config, which is text")])
+        raise refused(where, f"character {shown(strange.group())} cannot be in a config, which is text")
     return _Composer(source, column, _events(text, source, column)).document()
 
 
@@ -76,8 +76,8 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
         if r"'\t'" in str(reason):
-            raise refusal([Problem(where, "a tab: YAML is indented by spaces")], "Replace tabs by spaces.") from None
-        raise refusal([Problem(where, f"not YAML: {shown(str(reason))}")]) from None
+            raise refused(where, "a tab: YAML is indented by spaces", advice="Replace tabs by spaces.") from None
+        raise refused(where, f"not YAML: {shown(str(reason))}") from None
 
 
 def _position(mark: Any, source: str, column: int) -> Position:

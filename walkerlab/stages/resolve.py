@@ -9,7 +9,7 @@ from pathlib import Path
 
 from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, ConfigFile, builtin, builtin_names, find
 from walkerlab.config.loader import LoadedConfig, load
-from walkerlab.config.problems import Problem, refusal
+from walkerlab.config.problems import refused
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.stages.runs import config_text, find_run, read_all, stored_in
@@ -71,7 +71,7 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
     try:
         level_walker(config.walker, config.gravity_m_s2)
     except ConfigError as error:
-        raise refusal([Problem(read.tree.entries["walker"].position, error.message)], error.advice) from None
+        raise refused(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:

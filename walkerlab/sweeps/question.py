@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import extra, leaves
 from walkerlab.config.layers import ConfigSetting
-from walkerlab.config.problems import Problem, nearest, refusal
+from walkerlab.config.problems import nearest, refused
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
@@ -134,7 +134,7 @@ def asked(
     repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
-        raise refusal([Problem(None, f"sweep: {text}", "--over KEY=VALUES, each key once")], EXAMPLE)
+        raise refused(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
         return Question(stage, sampled(axes, sample, seed), "list")
     for one in axes:
@@ -142,10 +142,10 @@ def asked(
             raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
     if zip and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
-        raise refusal([Problem(None, f"--zip: the parameters have different numbers of values: {lengths}")])
+        raise refused(None, f"--zip: the parameters have different numbers of values: {lengths}")
     question = Question(stage, axes, "list" if zip else "grid")
     if len(question) > MOST_POINTS:
-        raise refusal([Problem(None, f"sweep: {len(question)} points", f"up to {MOST_POINTS} in one sweep")])
+        raise refused(None, f"sweep: {len(question)} points", f"up to {MOST_POINTS} in one sweep")
     return question
 
 
@@ -165,7 +165,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
     """What to raise for something wrong with a parameter, an option or a key, which is its place."""
-    return refusal([Problem(Position(source, 0, 0), text, allowed, near)])
+    return refused(Position(source, 0, 0), text, allowed, near)
 
 
 @cache
@@ -225,7 +225,7 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MOST_POINTS:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
-        raise refusal([Problem(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)])
+        raise refused(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
     import numpy as np
 
     count, dimensions, generator = int(number), len(axes), np.random.default_rng(seed)
