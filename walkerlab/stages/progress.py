@@ -54,26 +54,19 @@ class Silent:
     """A reporter that says nothing, of stages too."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
-        """Nothing."""
+        """Say nothing of a stage either."""
         return self
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Nothing."""
+        """Let it go untold."""
 
     def advance(self, n: int = 1) -> None:
-        """Nothing."""
+        """Let it go untold."""
 
     def note(self, text: str) -> None:
-        """Nothing."""
+        """Let it go untold."""
 
-    def warn(self, text: str) -> None:
-        """Nothing."""
-
-    def compiling(self, kernel: str) -> None:
-        """Nothing."""
-
-    def end(self, said: str) -> None:
-        """Nothing."""
+    warn = compiling = end = note
 
     def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
-        """Nothing."""
+        """Let it go untold."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -90,26 +90,14 @@ def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offer
 class PipeReporter:
     """The progress of a stage in a worker: each call is told as it is to the process that waits."""
 
-    def start(self, label: str, total: int | None = None) -> None:
-        """A piece of work begins."""
-        tell(("start", label, total))
-
-    def advance(self, n: int = 1) -> None:
-        """So many more parts are done."""
-        tell(("advance", n))
-
-    def note(self, text: str) -> None:
-        """One line."""
-        tell(("note", text))
-
-    def compiling(self, kernel: str) -> None:
-        """A kernel is being compiled, or is there."""
-        tell(("compiling", kernel))
+    def __getattr__(self, call: str) -> Callable[..., None]:
+        """What a stage calls."""
+        return lambda *arguments: tell((call, *arguments))
 
 
 def run_in_worker(task: StageTask) -> StageAnswer:
     """Run a stage in a worker, telling its progress."""
-    reporter = PipeReporter()
+    reporter: Any = PipeReporter()
     importlib.import_module(task.module)
     with kernel_cache.watched(reporter.compiling):
         return task.run(reporter)
