@@ -183,15 +183,8 @@ class Judge:
 
         late, off  by how much Table 3's periods differ (s), and the error that this makes alone
         """
-        ways = {
-            "raw": "at the same time",
-            "aligned": "at the same phase of each step",
-            "between_impacts": "of that outside the impacts",
-            "settled": "and on the last stride",
-        }
         errors: dict[str, tuple[float, ...]] = {way: getattr(legs, which) for way, legs in self.measured.errors.items()}
-        found = {words: errors[way] for way, words in ways.items() if way in errors}
-        text = prose("evidence.error", entry, late, off, self.measured.equations, found)
+        text = prose("evidence.error", entry, late, off, self.measured.equations, errors)
         raw, aligned = (max(errors[way]) if way in errors else None for way in ("raw", "aligned"))
         limit = AROUND * entry.value
         otherwise = EXPLAINED if aligned is not None and aligned <= limit else REFUTED

@@ -37,20 +37,6 @@ def section(results: Results) -> Section | None:
     return Section("adjustment", "The parameter adjustment", tuple(blocks), finding)
 
 
-LIMIT_COLUMNS = tuple(
-    measured(said, key, partial(number, digits=3))
-    for key, said in {
-        "stiffness_factor": "stiffness",
-        "damping_factor": "damping",
-        "stiction_velocity_factor": "stiction velocity",
-        "period_error_s": "period error",
-        "angle_error_rad": "angle, in phase",
-        "velocity_error_rad_s": "velocity, in phase",
-        "raw_angle_error_rad": "angle, same time",
-        "numerical_time_s": "numerical error",
-        "run_wall_s": "run time",
-    }.items()
-)
 ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
 
 
@@ -60,9 +46,11 @@ def limit(results: Results) -> Section | None:
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     if not (reaches or orders):
         return None
-    note = "The first three columns are factors on the config's contact; differences are from the rigid walk."
+    note = words("adjustment.factors")
+    titles = words.terms("adjustment.distances").items()
+    columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
     blocks: list[PageBlock] = [
-        table(f"Towards the rigid limit: {name}", LIMIT_COLUMNS, found["settings"], note=note)
+        table(f"Towards the rigid limit: {name}", columns, found["settings"], note=note)
         for name, found in reaches.items()
         if found["settings"]
     ]
@@ -72,33 +60,19 @@ def limit(results: Results) -> Section | None:
     return Section("limit", "Towards the rigid limit", tuple(blocks), words("adjustment.reached", reaches), COSTS)
 
 
-STARTS = {
-    "paper_matlab": "paper, MATLAB",
-    "paper_adams": "paper, ADAMS",
-    "paper_percent_of_matlab": "% of MATLAB",
-    "paper_percent_of_adams": "% of ADAMS",
-    "ours_rigid": "rigid gait",
-    "ours_adjusted": "adjusted",
-    "ours_percent_of_rigid": "change, % of rigid",
-    "ours_percent_of_adjusted": "change, % of adjusted",
-}
-"""Columns beside the coordinates, as in the paper's Table 2."""
-
-
 def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     if results.of_the_paper:
         caption = "Table 2 again: the start before and after the adjustment"
         note = "The paper's percentages are those of the ADAMS value, without saying so."
-        first, shown = Column("row", lambda row: in_signs(f"{row['name']} ({row['unit']})")), STARTS
+        first = Column("row", lambda row: in_signs(f"{row['name']} ({row['unit']})"))
     else:
         caption, note = "The start before and after the adjustment", ""
         first = Column("coordinate", lambda row: f"{symbol(row['name'])} ({row['unit']})")
-        shown = {key: STARTS[key] for key in ("ours_rigid", "ours_adjusted")}
     beside = (
-        Column(head, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
-        for key, head in shown.items()
+        Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
+        for key, title in words.terms("adjustment.starts", results.of_the_paper).items()
     )
     return table(caption, (first, *beside), rows, note=note)
 

@@ -10,13 +10,6 @@ from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, measured, table
 from walkerlab.report.words import words
 
-MEASURES = {
-    "raw": "at the same time",
-    "aligned": "at the same phase of each step",
-    "between_impacts": "at the same phase, outside the impacts",
-    "settled": "at the same phase, on the last stride",
-}
-"""The ways in which `compare` takes the difference of the legs' motions."""
 DIFFERENCE_COLUMNS = (
     Column("contact model less rigid model"),
     Column("angle (rad)", written=partial(number, digits=3), numeric=True),
@@ -49,7 +42,7 @@ def section(results: Results) -> Section | None:
     angle, velocity = summary.get("max_angle_error_rad"), summary.get("max_velocity_error_rad_s")
     if not angle or not velocity:
         return None
-    rows = [(said, angle[key], velocity.get(key)) for key, said in MEASURES.items() if key in angle]
+    rows = [(said, angle[key], velocity.get(key)) for key, said in words.terms("models.ways").items() if key in angle]
     note = words("models.differences", summary.get("orbit_distance"))
     blocks: list[PageBlock] = [table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note)]
     if releases := summary.get("releases"):

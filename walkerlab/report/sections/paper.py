@@ -72,19 +72,6 @@ def unit_of(row: Row) -> str:
     return f" ({unit})" if unit not in ("", "1") else ""
 
 
-HEADS = {
-    "paper": "paper",
-    "paper_matlab": "paper, MATLAB",
-    "paper_adams": "paper, ADAMS",
-    **BESIDE,
-    "used": "used here",
-    "paper_percent": "paper, %",
-    "percent_of_matlab": "% of MATLAB",
-    "percent_of_adams": "% of ADAMS",
-}
-"""Heads of columns; one that is not among them is called by its name."""
-
-
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
     summary, notes = results.summary("compare"), words.terms("paper.notes")
@@ -98,11 +85,11 @@ def tables(results: Results) -> Section | None:
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     """One table; its rows are named by their symbol and unit, and columns without any value are left away."""
-    columns = [Column("row", "row")]
+    columns, heads = [Column("row", "row")], words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
         texts = any(isinstance(row.get(key), str) for row in rows.values())
         written = in_signs if texts else partial(number, digits=3 if "percent" in key else 6)
-        columns.append(Column(HEADS.get(key, key.replace("_", " ")), key, written, numeric=not texts))
+        columns.append(Column(heads.get(key, key.replace("_", " ")), key, written, numeric=not texts))
     shown = [column for column in columns if column.of != "unit"]
     names = {symbol: f"{said}, {symbol}" for symbol, said in words.terms("paper.quantities").items()}
     return table(
