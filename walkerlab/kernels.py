@@ -1,6 +1,7 @@
 """How physics becomes machine code: compiled functions, and functions whose bodies are chosen by type."""
 
 import functools
+import hashlib
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -8,8 +9,17 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, overload, register_jitable
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
+from numba.extending import (
+    NativeValue,
+    intrinsic,
+    lower_builtin,
+    lower_getattr_generic,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
 from numba.np.arrayobj import make_array, populate_array
 
 from walkerlab.compiler import KernelCache, KernelCompiler, PartCompiler, absent, cached_plainly
@@ -19,10 +29,11 @@ from walkerlab.compiler import KernelCache, KernelCompiler, PartCompiler, absent
 # as long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 # parts of a kernel are never entered from outside
-PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "nopython": True}
+PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # of what takes lanes: handing them on in memory costs as much as the work
 WOVEN_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
 
 if not absent:
     PART_FLAGS["pipeline_class"] = PartCompiler
@@ -40,12 +51,39 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
-    return cast(F, register_jitable(**PART_FLAGS)(function))
+    compile_as(function, lambda *_: (function, PART_FLAGS))
+    return function
 
 
 def woven(function: F) -> F:
     """As `inlined`, and put into the code of its callers, however large."""
-    return cast(F, register_jitable(**WOVEN_FLAGS)(function))
+    compile_as(function, lambda *_: (function, WOVEN_FLAGS))
+    return function
+
+
+def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
+    """Have compiled code that calls `function` call another body, once compiled for all its callers.
+
+    body_for  gives the body and how it is compiled, from numba's types of the arguments
+    """
+    parts: dict[Any, Any] = {}
+    compiled: dict[Any, Any] = {}
+
+    class Template(AbstractTemplate):  # type: ignore[misc]
+        key = function
+
+        def generic(self, given: Any, named: Any) -> Any:
+            body, flags = body_for(*given)
+            if body not in parts:
+                parts[body] = numba.njit(**flags)(body)
+            found: Any = types.Dispatcher(parts[body]).get_call_type(self.context, given, named)
+            compiled[found.args] = parts[body].get_overload(found.args)
+            return found
+
+        def get_impl_key(self, found: Any) -> Any:
+            return compiled[found.args]
+
+    infer_global(function, types.Function(Template))
 
 
 def uncompiled(compiled: F) -> F:
@@ -92,10 +130,10 @@ class ByType:
         self._default = body
         return body
 
-    def body(self, kind: Any, woven: bool) -> Callable[..., Any] | None:
-        """The body for numba's type of a first argument, if it is woven or is not; else None."""
+    def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
+        """The body for numba's type of a first argument, and how it is compiled."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._body_for(chosen, str(kind)) if (chosen in self._woven) == woven else None
+        return self._body_for(chosen, str(kind)), WOVEN_FLAGS if chosen in self._woven else PART_FLAGS
 
     def _body_for(self, chosen: type, said: str) -> Callable[..., Any]:
         body = self._bodies.get(chosen, self._default)
@@ -113,14 +151,7 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     """
     chosen = ByType(declaration)
 
-    def called(*arguments: Any) -> Callable[..., Any] | None:
-        return chosen.body(arguments[0], woven=False)
-
-    def woven(*arguments: Any) -> Callable[..., Any] | None:
-        return chosen.body(arguments[0], woven=True)
-
-    overload(chosen, strict=False, jit_options=PART_FLAGS)(called)
-    overload(chosen, strict=False, jit_options=WOVEN_FLAGS)(woven)
+    compile_as(chosen, chosen.compiled_body)
     return chosen
 
 
@@ -129,6 +160,59 @@ def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     chosen = by_type(declaration)
     chosen.default(declaration)
     return chosen
+
+
+class Reference(types.Type):
+    """Numba's type of a NamedTuple that is handed on by its address: see `by_reference`."""
+
+    def __init__(self, held: Any) -> None:
+        """To a NamedTuple, by numba's type of that."""
+        self.held, self.instance_class = held, held.instance_class
+        super().__init__(f"reference to {held.name}")
+
+    @property
+    def mangling_args(self) -> tuple[str, tuple[()]]:
+        """Its name in compiled code: the whole one, with those of all fields, is longer than most functions."""
+        return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
+
+
+def by_reference(chosen: C) -> C:
+    """Have kernels hand on the address of a NamedTuple, not each of its fields' numbers: made in Python, read in them.
+
+    A function with a record of twenty arrays for an argument else takes a hundred more, and most of the time to compile
+    goes into taking them apart and together.
+    """
+
+    def reference(value: Any, asked: Any) -> Reference:
+        return Reference(types.containers.BaseTuple.from_types([typeof_impl(field, asked) for field in value], chosen))
+
+    typeof_impl.register(chosen)(reference)
+    return chosen
+
+
+@register_model(Reference)
+class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Reference) -> None:
+        super().__init__(manager, kind, manager.lookup(kind.held).get_value_type().as_pointer())
+
+
+@infer_getattr
+class _ReferencedFields(AttributeTemplate):  # type: ignore[misc]
+    key = Reference
+
+    def generic_resolve(self, kind: Reference, name: str) -> Any:
+        return kind.held[kind.held.fields.index(name)] if name in kind.held.fields else None
+
+
+@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
+def _load_field(_context: Any, builder: Any, kind: Reference, value: Any, name: str) -> Any:
+    return builder.load(cgutils.gep_inbounds(builder, value, 0, kind.held.fields.index(name)))
+
+
+@unbox(Reference)  # type: ignore[untyped-decorator]
+def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
+    held = c.unbox(kind.held, value)
+    return NativeValue(cgutils.alloca_once_value(c.builder, held.value), held.is_error, held.cleanup)
 
 
 def vector(like: Any) -> Any:

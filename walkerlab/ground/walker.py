@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import State
 
@@ -140,6 +140,7 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
     return walker._replace(forms=forms)
 
 
+@by_reference
 class OnGround(NamedTuple):
     """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
 

@@ -13,7 +13,7 @@ from walkerlab.ground.knees import extension, extension_rate
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.terrain import Terrain, cell_edges
 from walkerlab.ground.walker import BENT, OF_BODIES, STOPPING, FootMotion, Form, OnGround, foot_motion, sines_cosines
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
 # event functions of each foot
@@ -41,6 +41,7 @@ class Frame(NamedTuple):
     locate_switching: bool  # end steps at the switching points of the force law
 
 
+@by_reference
 class JudgedGround(NamedTuple):
     """What a walk happens on and is judged by."""
 
@@ -48,6 +49,7 @@ class JudgedGround(NamedTuple):
     frame: Frame
 
 
+@by_reference
 class WalkState(NamedTuple):
     """What a walk remembers: read by its rules, and in part its result."""
 

@@ -9,7 +9,7 @@ from walkerlab.ground.knees import knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_type_or_default, inlined, kernel, matrix, vector
+from walkerlab.kernels import by_reference, by_type_or_default, inlined, kernel, matrix, vector
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
@@ -23,6 +23,7 @@ NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
 WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
 
 
+@by_reference
 class ContactObserver(NamedTuple):
     """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.walker import OF_STATES
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.radau5_tableau import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
@@ -29,6 +29,7 @@ A = np.array(
 )
 
 
+@by_reference
 class Tangent(NamedTuple):
     """The derivative Phi and the memory to carry it along, with room for the whole walker's state of n numbers.
 

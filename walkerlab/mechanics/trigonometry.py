@@ -1,12 +1,8 @@
 """Sine and cosine together, for the small angles of legs."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
-from numba.extending import overload
-
-from walkerlab.kernels import PART_FLAGS, inlined
+from walkerlab.kernels import PART_FLAGS, compile_as, inlined
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.lanes import Lanes, any_positive, holds_lanes, nearest
 
@@ -76,6 +72,4 @@ def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
     return sine, cosine
 
 
-@overload(sine_cosine, strict=False, jit_options=PART_FLAGS)
-def _compiled(x: Any) -> Callable[..., Any]:
-    return lanes_sine_cosine if holds_lanes(x) else sine_cosine
+compile_as(sine_cosine, lambda x: (lanes_sine_cosine if holds_lanes(x) else sine_cosine, PART_FLAGS))

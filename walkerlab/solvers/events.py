@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import polynomial
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_reference, inlined
 
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
@@ -26,6 +26,7 @@ CLOSEST = 2.0**-52  # how finely a crossing is located within its piece
 DEPTH = 64
 
 
+@by_reference
 class CrossingFinder(NamedTuple):
     """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
 

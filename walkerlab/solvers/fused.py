@@ -3,13 +3,12 @@
 A general licence to contract would let the compiler choose, and code compiled twice could differ in the last bits.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin
 
-from walkerlab.kernels import PART_FLAGS
 from walkerlab.solvers.lanes import LANES, multiply_add
 
 
@@ -18,19 +17,17 @@ def fused(a: float, b: float, c: float) -> float:
     return a * b + c
 
 
-@intrinsic
-def _fma(context: Any, a: Any, b: Any, c: Any) -> Any:
-    number = LANES if LANES in (a, b, c) else types.float64
+class _OneRounding(AbstractTemplate):  # type: ignore[misc]
+    key = fused
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return multiply_add(builder, *arguments)
-
-    return number(number, number, number), generate
+    def generic(self, given: Any, named: Any) -> Any:  # noqa: ARG002 - numba calls it so
+        number = LANES if LANES in given else types.float64
+        return signature(number, number, number, number)
 
 
-@overload(fused, jit_options=PART_FLAGS)
-def _compiled(a: Any, b: Any, c: Any) -> Callable[..., Any]:
-    def rounded_once(a: Any, b: Any, c: Any) -> Any:
-        return _fma(a, b, c)
+infer_global(fused, types.Function(_OneRounding))
 
-    return rounded_once
+
+@lower_builtin(fused, types.Any, types.Any, types.Any)
+def _multiply_add(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
+    return multiply_add(builder, *arguments)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import by_reference, inlined
 from walkerlab.solvers.radau5_tableau import ALPHA, BETA, GAMMA, INV_1, INV_2, INV_3, T_1, T_2, C
 from walkerlab.solvers.shifted_system import factor_shifted, solve_shifted
 from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
@@ -20,6 +20,7 @@ NEWTON_MOST = 7
 H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 6
 
 
+@by_reference
 class Radau5(NamedTuple):
     """The method with its memory for n equations."""
 
