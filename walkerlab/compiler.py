@@ -20,6 +20,13 @@ from walkerlab.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
 # usual ones a quarter of the time goes into looking them through
 SELDOM = (100_000, 50, 100)
 
+# passes of numba's for closures, array expressions and functions put into others by numba: kernels have none
+NEEDLESS = {
+    "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes", "InlineInlinables", "InlineOverloads",
+    "LiteralPropagationSubPipelinePass", "LiteralUnroll", "MakeFunctionToJitFunction", "NopythonRewrites",
+    "WithLifting",
+}  # fmt: skip
+
 compiling: list[tuple["KernelCache", str]] = []
 """The kernels that this process is compiling, with their signatures; each is called by the one before it."""
 absent: list[str] = []
@@ -56,6 +63,7 @@ JITCodeLibrary = inner_part(
 )
 Compiler = inner_part("numba.core.compiler.Compiler", "compile_extra")
 CompilerBase = inner_part("numba.core.compiler.CompilerBase", "define_pipelines")
+Flags = inner_part("numba.core.compiler.Flags", "_values")
 DefaultPassBuilder = inner_part("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
 Record = inner_part("numba.core.types.npytypes.Record", "mangling_args")
 
@@ -188,8 +196,32 @@ def _finished(lock: Any) -> None:
         tell(compiling[-1][0].kernel if compiling else "")
 
 
+class QuickFlags(Flags):  # type: ignore[misc, valid-type]
+    """How a function is compiled, told apart by what was set.
+
+    Numba goes by flags wherever an operator is looked up, and compares all that could be set.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the same was set."""
+        return isinstance(other, QuickFlags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        """By what was set, to whatever value."""
+        return hash(frozenset(self._values))
+
+
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's own compiler, with garbage collected seldom meanwhile."""
+
+    def __init__(self, *given: Any) -> None:
+        """With what numba's own is given."""
+        super().__init__(*given)
+        self.state.flags = QuickFlags(self.state.flags)
+
+    def define_pipelines(self) -> list[Any]:
+        """Numba's own."""
+        return with_what_is_needed(super().define_pipelines())
 
     def compile_extra(self, func: Any) -> Any:
         """The compiled function."""
@@ -204,6 +236,27 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
             raise
         finally:
             gc.set_threshold(*usual)
+
+
+def with_what_is_needed(pipelines: list[Any]) -> list[Any]:
+    """Numba's pipelines without passes that do nothing to kernels but take time."""
+    for pipeline in pipelines:
+        pipeline.passes = [(each, said) for each, said in pipeline.passes if each.__name__ not in NEEDLESS]
+        pipeline.finalize()
+    return pipelines
+
+
+class _Refreshed:
+    """A context of numba's as it is: what a kernel is compiled in knows all that its parts can use."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def refresh(self) -> None:
+        """Nothing."""
 
 
 class _WithoutEnvironment:
@@ -244,12 +297,17 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
 class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
     """Numba's own passes, into a library of parts."""
 
+    def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
+        """In contexts that the kernel's own compiler has refreshed."""
+        super().__init__(_Refreshed(typing), _Refreshed(target), *rest)
+        self.state.typingctx, self.state.flags = typing, QuickFlags(self.state.flags)
+
     def define_pipelines(self) -> list[Any]:
         """The passes."""
         state = self.state
         if state.library is None:
             state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return with_what_is_needed([DefaultPassBuilder.define_nopython_pipeline(state)])
 
 
 def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
