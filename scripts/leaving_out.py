@@ -75,7 +75,7 @@ def with_books(kept: bool) -> None:
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, BUDGET)
-    replace(scene, pinned=False).walk(start_state(scene, GAIT), 10, tolerances, track_energy=kept)
+    replace(scene, pinned=False).walk(start_state(scene, GAIT), 10, replace(tolerances, track_energy=kept))
 
 
 @dataclass(frozen=True)

@@ -123,10 +123,10 @@ class ContactTrial:
         from walkerlab.hybrid.contact_run import walk_contact
 
         scene = self.walker, self.ground, False, self.stance, self.start
-        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget)
+        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget, track_energy=False)
 
         def run() -> TrialRun:
-            result = walk_contact(*scene, tolerances, self.steps, None, track_energy=False)
+            result = walk_contact(*scene, tolerances, self.steps, None)
             return finished(result.outcome, np.array(result.end_state), result.work)
 
         return run

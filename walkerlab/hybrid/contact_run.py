@@ -233,7 +233,7 @@ def new_observer(
     """An observer of a walk from state y.
 
     times         (samples,) rising, in s; no samples without them
-    track_energy  whether to keep the energy balance, by which a walk is judged; ladders of methods do not
+    track_energy  whether to keep the energy balance
     directions    how many directions of the start to carry along as the tangent
     """
     times = np.zeros(0) if times is None else times
@@ -310,16 +310,14 @@ def walk_contact(
     tolerances: Tolerances,
     steps: int,
     sampling: float | Floats | None,
-    track_energy: bool = True,
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
-    hinged        whether the stance foot of the first step is
-    stance        the foot that carries the first step
-    start         state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
-    tolerances    how to integrate
-    sampling      time between samples, their times (samples,), rising, in s, or None for none
-    track_energy  whether to keep the energy balance, by which the walk is judged; ladders of methods do without
+    hinged      whether the stance foot of the first step is
+    stance      the foot that carries the first step
+    start       state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
+    tolerances  how to integrate
+    sampling    time between samples, their times (samples,), rising, in s, or None for none
 
     The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
     """
@@ -333,7 +331,7 @@ def walk_contact(
     while True:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
         times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
-        observer = new_observer(walker, walk_state, start, times, track_energy)
+        observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
         stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
         if room == 0 or observer.recorded[0] < room:
             return gather(stopped, walk_state, observer, walker, tolerances)

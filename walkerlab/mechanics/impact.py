@@ -65,7 +65,7 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         for l in range(n):
             factors[k, l] = M[k, l]
     factor_linked(model, phase, factors, p)
-    momenta(model, M, F, U, new, 0, along, upward, p)
+    momenta(model, M, F, U, new[n : 2 * n], along, upward, p)
     gathered(model, phase, p)
     solve_linked(model, phase, factors, p)
     jump, turned = vector(like), vector(like)
@@ -82,8 +82,8 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         for k in range(n):
             place = model.roles[k] if other_foot else k
             new[at + k], new[at + n + k] = y[at + place], y[at + n + place]
-        momenta(model, M, F, U, new, at, along, upward, p)
-        mass_change(model, s, c, F, U, new, at, jump, jump_along, jump_upward, turned)
+        momenta(model, M, F, U, new[at + n : at + 2 * n], along, upward, p)
+        mass_change(model, s, c, new[at : at + n], jump, jump_along, jump_upward, turned)
         for k in range(n):
             p[k] -= turned[k]
         gathered(model, phase, p)
@@ -93,37 +93,37 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
 
 
 @woven
-def momenta(model: Standing, M: Any, F: Any, U: Any, y: Any, at: int, along: float, upward: float, p: Any) -> None:
-    """Z' M u into p (n,), with the angular velocities of the block of y from `at` on.
+def momenta(model: Standing, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
+    """Z' M u into p (n,), with the angular velocities omega (n,).
 
     M is M' of standing.py, whose part in the rolling of angular velocities is taken out again.
     """
     n, R = len(model.arm_x), model.radius
-    sliding = along + R * y[at + n + STANCE]
+    sliding = along + R * omega[STANCE]
     for k in range(n):
         total = upward * F[k] - sliding * U[k]
         for l in range(n):
-            total += M[k, l] * y[at + n + l]
+            total += M[k, l] * omega[l]
         p[k] = total
     p[STANCE] -= R * model.mass * sliding
 
 
 @woven
-def mass_change(
-    model: Standing, s: Any, c: Any, F: Any, U: Any, turn: Any, at: int, jump: Any, along: float, upward: float, p: Any
-) -> None:
+def mass_change(model: Standing, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
     """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
 
-    turn  its numbers from `at` on are how the angles change
+    turn  (n,) how the angles change
     """
     n = len(model.arm_x)
+    F, U = vector(model.arm_x), vector(model.arm_x)
+    projections(model.arm_x, model.arm_y, s, c, F, U)
     pulled = 0.0
     for k in range(n):
-        turn_k = turn[at + k]
+        turn_k = turn[k]
         total = -F[k] * turn_k * along - U[k] * turn_k * upward
         for l in range(n):
             cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            total += (model.B[k, l] * cos_d - model.A[k, l] * sin_d) * (turn[at + l] - turn_k) * jump[l]
+            total += (model.B[k, l] * cos_d - model.A[k, l] * sin_d) * (turn[l] - turn_k) * jump[l]
         p[k] = total
         pulled += F[k] * turn_k * jump[k]
     p[STANCE] += model.radius * pulled

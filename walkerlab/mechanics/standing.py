@@ -198,7 +198,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
         by_angle, by_rate = matrix(like), matrix(like)
-        torque_gradients(model, y, s, c, F, U, alpha, by_angle, by_rate)
+        torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
             # alpha serves as the column's right-hand side: d alpha of E' M' E d alpha = E' (dr - dM' alpha)
             for k in range(n):
@@ -213,11 +213,11 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
 
 
 @woven
-def torque_gradients(
-    model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, alpha: Any, by_angle: Any, by_rate: Any
-) -> None:
+def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     """Derivatives (n, n) of r - M' alpha at fixed alpha with respect to the angles and to their velocities."""
     n, R = len(model.arm_x), model.radius
+    F, U = vector(model.arm_x), vector(model.arm_x)
+    projections(model.arm_x, model.arm_y, s, c, F, U)
     for k in range(n):
         own = model.gravity_down * U[k] - model.gravity_along * F[k] - R * F[k] * alpha[STANCE]
         for l in range(n):
@@ -247,7 +247,7 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     equations(model, y, s, c, F, U, M, alpha)
     factor_linked(model, phase, M, alpha)
     solve_linked(model, phase, M, alpha)
-    torque_gradients(model, y, s, c, F, U, alpha, by_angle, by_rate)
+    torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0

@@ -55,17 +55,10 @@ class ContactScene:
         return JudgedGround(self.terrain, self.frame)
 
     def walk(
-        self,
-        start: State,
-        steps: int,
-        tolerances: Tolerances,
-        sampling: float | Floats | None = None,
-        track_energy: bool = True,
+        self, start: State, steps: int, tolerances: Tolerances, sampling: float | Floats | None = None
     ) -> ContactWalkResult:
         """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`."""
-        return walk_contact(
-            self.walker, self.ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling, track_energy
-        )
+        return walk_contact(self.walker, self.ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:

@@ -59,15 +59,17 @@ ENDLESS = 2**62
 class Tolerances:
     """By which method a walk is integrated, and how exactly.
 
-    method      its name
-    rtol, atol  on the error of a step
-    budget      right-hand sides of a walk
+    method        its name
+    rtol, atol    on the error of a step
+    budget        right-hand sides of a walk
+    track_energy  whether a contact walk keeps its energy balance, by which it is judged; ladders of methods do without
     """
 
     method: str
     rtol: float
     atol: float
     budget: int
+    track_energy: bool = True
 
     @property
     def compiled(self) -> bool:

@@ -70,10 +70,8 @@ class Truth:
 
 def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
     """Our walk; with `until_s` also the state then."""
-    tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS)
-    return walk_contact(
-        scene.ours, scene.ground, False, scene.stance, scene.start, tolerances, steps, until_s, track_energy=False
-    )
+    tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS, track_energy=False)
+    return walk_contact(scene.ours, scene.ground, False, scene.stance, scene.start, tolerances, steps, until_s)
 
 
 def truth_of(scene: EngineScene) -> Truth | None:
