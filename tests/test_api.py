@@ -159,6 +159,11 @@ def test_a_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
     assert done.returncode == 0
 
 
+def test_a_keyword_that_a_sweep_does_not_have_is_refused(tmp_path):
+    with pytest.raises(TypeError, match="smaple"):
+        walkerlab.sweep("fixedpoint", {"slope_deg": "1:3"}, runs=tmp_path, smaple="sobol:4")
+
+
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
 def test_where_a_guard_is_needed_this_is_said_at_once(tmp_path, from_standard_input):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")

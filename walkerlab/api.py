@@ -249,9 +249,8 @@ def sweep(
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
     block = found.loaded.config.sweep or SweepBlock()
-    seed = combined.get("seed")
-    drawn = block.seed if seed is None else seed
-    question = asked(stage, listed, combined.get("zip", False), combined.get("sample", ""), drawn)
+    said: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
+    question = asked(stage, listed, **{"seed": block.seed, **said})
     chosen, address = engine_named(engine)
     order = Order(jobs, address, modules_of(stage, found.loaded.config, PIPELINE), found.folder.path)
     swept = SweepRun(question, found.loaded, found.folder).run(SweepWork(chosen, order))
