@@ -115,7 +115,11 @@ def swept(
     for value in values:
         here = settled(step_map, z, float(value), transient, kept)
         if isinstance(here, Outcome) and found:
-            here = led(step_map, found[-1], float(value), transient, kept)
+            for between in np.linspace(found[-1].value, float(value), SMALLER_STEPS + 1)[1:]:
+                here = settled(step_map, z, float(between), transient, kept)
+                if isinstance(here, Outcome):
+                    break
+                z = here.last
         advance()
         if isinstance(here, Outcome):
             lost = float(value)
@@ -137,19 +141,6 @@ def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) 
     flipping = min(gait.multipliers.real)
     aside = ASIDE * np.max(np.abs(gait.z)) * eigenvector(gait.solved.evaluated.data.DP, flipping)
     return settled(step_map, gait.z + aside, gait.value, transient, kept)
-
-
-def led(step_map: StepMap, last: Attractor, value: float, transient: int, kept: int) -> Attractor | Outcome:
-    """The attractor at a value, reached from that at another in a few steps of the parameter."""
-    z = last.last
-    here: Attractor | Outcome = last
-    for part in range(1, SMALLER_STEPS + 1):
-        between = last.value + part / SMALLER_STEPS * (value - last.value)
-        here = settled(step_map, z, between, transient, kept)
-        if isinstance(here, Outcome):
-            return here
-        z = here.last
-    return here
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
