@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator
+from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, Tag
@@ -116,17 +117,12 @@ def kind(annotation: Any) -> str:
     return "block"
 
 
-def words_of(field: FieldInfo) -> tuple[str, ...]:
-    """The words that a key allows, also inside a list or beside numbers; empty if it allows none."""
-    return tuple(_words(field.annotation))
-
-
-def _words(annotation: Any) -> Iterator[str]:
+def words_of(annotation: Any) -> tuple[str, ...]:
+    """The words that a value may be, also inside a list or beside numbers; empty if there are none."""
+    parts = get_args(annotation)
     if get_origin(annotation) is Literal:
-        yield from (word for word in get_args(annotation) if isinstance(word, str))
-        return
-    for part in get_args(annotation):
-        yield from _words(part)
+        return tuple(word for word in parts if isinstance(word, str))
+    return tuple(chain.from_iterable(map(words_of, parts)))
 
 
 def bounds_of(field: FieldInfo) -> str:
@@ -135,7 +131,7 @@ def bounds_of(field: FieldInfo) -> str:
     if spoken:
         return spoken
     if get_origin(field.annotation) is Literal:
-        return ", ".join(words_of(field))
+        return ", ".join(words_of(field.annotation))
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
         return f"from {short(limits['ge'])} to {short(limits['le'])}"

@@ -169,7 +169,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         text = f"contact.units: {key} stays {value}, as {position.source} has it, and {reason}"
         return Problem(units, text, "si with the numbers of the block set as well")
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
-    meant = nearest(word, words_of(field)) if word else ""
+    meant = nearest(word, words_of(field.annotation)) if word else ""
     right = allowed(field) if what in _REASONS else ""
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 

@@ -8,13 +8,11 @@ import json
 import re
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
-
-import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
@@ -229,9 +227,3 @@ def stored_chunks(
         if stored.identity.key in wanted:
             why_not = None if stored.complete else str(stored.summary.get("no_answer", {}).get("message", ""))
             yield Chunk((told(stored.identity.key, stored, why_not),), labels_in(stored, {}))
-
-
-def median_wall_s(rows: Sequence[PointResult]) -> float | None:
-    """What a point took, s; None if nothing is known."""
-    walls = [row.wall_s for row in rows if row.wall_s > 0.0]
-    return float(np.median(walls)) if walls else None

@@ -28,7 +28,7 @@ from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, PointResult, median_wall_s, store, stored_chunks
+from walkerlab.sweeps.chunk import Chunk, PointResult, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.fan_out import FanOut
 from walkerlab.sweeps.question import Question
@@ -194,8 +194,10 @@ class SweepRun:
             there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
         count = len(self.question)
         missing = int(np.sum(~there))
-        wall = median_wall_s(rows)
-        estimate = 0.0 if not missing else None if wall is None else wall * missing / max(1, workers)
+        walls = [row.wall_s for row in rows if row.wall_s > 0.0]
+        estimate: float | None = 0.0
+        if missing:
+            estimate = float(np.median(walls)) * missing / max(1, workers) if walls else None
         said = tuple(self.question.said(index) for index in range(min(shown, count)))
         return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
 
