@@ -11,13 +11,14 @@ from jinja2 import UndefinedError
 from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_sim, fixedpoint, simulate, stored
 
 from walkerlab.paper.prose import prose
+from walkerlab.prose import parts
 from walkerlab.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
 from walkerlab.report.page import Page as Sheet
 from walkerlab.report.page import render, said, source
 from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
-from walkerlab.report.words import words
+from walkerlab.report.words import in_row, words
 from walkerlab.scene.left_out import LeftOut
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
@@ -212,3 +213,9 @@ def test_sentences_name_only_what_there_is(templates):
 def test_a_sentence_is_one_line_and_keeps_the_blanks_of_its_numbers():
     assert words("gait.finding", fixedpoint().summary).count("\u00a0") == 2
     assert "\n" not in words("stability.judgement")
+
+
+def test_a_template_sets_its_parts_apart_and_none_is_empty():
+    assert parts("| one |\n two,\u00a0m | | three|four |") == ["one", "two,\u00a0m", "three|four"]
+    assert in_row(" a |\n b | c |") == "a, b and c"
+    assert words.terms("adjustment.walks", True)["released"] == "without the joint, from the rigid state"

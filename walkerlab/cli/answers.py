@@ -149,7 +149,10 @@ def compare(summary: Summary) -> list[str | Table]:
     errors = summary.get("numerical_error", {})
     told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
-        return [words("models.paper", summary["verdicts"]), numbers_table(summary["paper_numbers"]), *told]
+        verdicts = summary["verdicts"]
+        fared = listed(f"{many} {'is' if many == 1 else 'are'} {name}" for name, many in verdicts.items())
+        head = f"Of {sum(verdicts.values())} numbers that the paper prints, {fared}."
+        return [head, numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 
 
