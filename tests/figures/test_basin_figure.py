@@ -20,15 +20,21 @@ CONFIG = load(None, ["basin.cells=[4,3]"]).config
 Z = [0.17, -0.6, -0.86]
 
 
-def basin(attractor, aperiodic=False, config=CONFIG):
+def basin(attractor, aperiodic=False, config=CONFIG, steps=7):
     """Cells walk where they have an attractor or -2, for none; the others fall."""
     window = window_of(config, Z)
     attractor = np.resize(attractor, window.size)
     walks = attractor != NONE
-    found = WalkEnds(np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, 7, 1))
+    found = WalkEnds(
+        np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, steps, 1)
+    )
     attractors = [{"period": 1}, {"period": 2}]
     said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
     return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}
+
+
+def test_walks_that_have_settled_from_their_first_step_on_are_drawn():
+    assert FIGURE.drawn(basin([0, NONE], steps=0)).png.startswith(b"\x89PNG")
 
 
 def test_it_says_how_much_of_the_window_walks_and_where_to():

@@ -161,7 +161,8 @@ def draw_basins(results: Results) -> Drawn:
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
     left.set_title("(a) where walks end")
-    settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"])
+    # on a scale of powers what has settled from its first step on has the colour of one step
+    settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"].clip(min=1))
     right.set_title("(b) steps to the attractor")
     if settled.count():
         least = float(settled.min())

@@ -179,7 +179,9 @@ class Recorder:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
         lengths, begun = np.zeros(self.steps), self.start
-        for k, row in enumerate(before.tolist()):  # between the points of contact, and what the stance foot rolled
+        for k, row in enumerate(
+            map(np.ndarray.tolist, before)
+        ):  # between the points of contact, and what the stance foot rolled
             lengths[k] = swing_foot(self.walker, row)[1] + rolled_distance(self.walker, begun, row)
             begun = after[k]
         return RigidWalkResult(
