@@ -15,7 +15,6 @@ from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.sections import adjustment, families, gaits, stability, walks
 from walkerlab.report.sections.families import parameter
 from walkerlab.report.sections.paper import numbers_table
-from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
 from walkerlab.report.words import words
 
@@ -210,8 +209,8 @@ def continuation(summary: Summary) -> list[str | Table]:
 
 def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
-    shares = in_signs(words("basin.shares", summary))
-    return [shares, *words.parts("basin.grounds", summary), families.attractors(summary)]
+    told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
+    return [*told, families.attractors(summary)]
 
 
 def engines(summary: Summary) -> list[str | Table]:
