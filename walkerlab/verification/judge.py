@@ -16,7 +16,7 @@ from walkerlab.solvers.registry import METHODS, Method, method_named
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.ordinary import Choice, choices
 from walkerlab.verification.scaling import scaled, to_twin
-from walkerlab.verification.starts import JudgedWalk, Start, configured, prepared
+from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, configured, prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.workers import in_order
 
@@ -94,7 +94,8 @@ def judge(case: Case, config: Config) -> CaseResult:
             differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected
             if differs and short.steps == case.steps:
                 remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
-    found += start.momentum(walk, case)
+    if isinstance(start, ContactStart):
+        found.append(start.momentum(walk, case))
     numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
     measures = tuple(one for one in found if isinstance(one, Measure))
     missing = tuple(one for one in found if isinstance(one, NotMeasured))

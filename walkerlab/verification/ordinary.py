@@ -26,6 +26,7 @@ from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
+from walkerlab.scene.rigid import compass_or_none
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
@@ -76,13 +77,14 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
         return ()
     short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
     start = prepared(config, short)
-    if isinstance(start, RigidStart) and start.compass is not None:
+    compass = compass_or_none(config, config.equations)
+    if isinstance(start, RigidStart) and compass is not None:
         walk = start.walk(short, Tolerances(*RIGID_REFERENCE, short.budget)).record
         if not walk.steps:
             return ()
         units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
         arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
-        return tuple(script(arrival, start.compass, walk, name) for name in LIBRARY)
+        return tuple(script(arrival, compass, walk, name) for name in LIBRARY)
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.terrain.order_matters:
         return ()
     walk = start.walk(short, Tolerances(*REFERENCE, short.budget)).record

@@ -10,17 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import WalksConfig
-from walkerlab.config.schema import SolverSettings
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import Gait, find_gaits
-from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import compass_or_none, rigid_walker
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED, RHS
 from walkerlab.solvers.system import State
@@ -58,30 +56,15 @@ class JudgedWalk:
 class RigidStart:
     """A walker of the rigid model and the state that it starts from.
 
-    kept  what its residual is of, in words
+    energy  m g L and the kinetic energy of the start (J): what residuals are measured by
+    kept    what its residual is of, in words
     """
 
     kept: ClassVar[str] = "energy drift within a swing"
     config: WalksConfig
     walker: Standing
     start: State
-
-    @property
-    def settings(self) -> SolverSettings:
-        """Method and tolerances of the config."""
-        return self.config.solver.rigid
-
-    @property
-    def energy(self) -> float:
-        """What residuals are measured by (J): m g L and the kinetic energy of the start."""
-        walker, start = self.walker, self.start
-        speed = walker.leg_length * max(abs(rate) for rate in start[len(start) // 2 :])
-        return float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
-
-    @property
-    def compass(self) -> RigidWalker | None:
-        """The walker of Appendix A, if it is that."""
-        return compass_or_none(self.config, self.config.equations)
+    energy: float
 
     def again(self, case: Case) -> Case:
         """As far as a case is walked again: no further than times are compared."""
@@ -110,10 +93,6 @@ class RigidStart:
             Measure("energy won at a heel strike", finite(won), ROUNDING),
         ]
 
-    def momentum(self, _walk: JudgedWalk, _case: Case) -> list[Measure | NotMeasured]:
-        """Nothing beside what heel strikes keep: no force of the ground is known here but by the equations."""
-        return []
-
 
 @dataclass(frozen=True)
 class ContactStart:
@@ -128,11 +107,6 @@ class ContactStart:
     scene: ContactScene
     start: State
     energy: float
-
-    @property
-    def settings(self) -> SolverSettings:
-        """Method and tolerances of the config."""
-        return self.config.solver.contact
 
     def again(self, case: Case) -> Case:
         """As far as a case is walked again: all the way, since how it ends is compared too."""
@@ -157,11 +131,11 @@ class ContactStart:
         back = finite(max(0.0, float(np.max(falls))) / self.energy)
         return [Measure("energy won back from friction and damping", back, NEVER_LESS * case.balance)]
 
-    def momentum(self, walk: JudgedWalk, case: Case) -> list[Measure | NotMeasured]:
+    def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
         """The momentum's balance of a walk that has an outcome and a length."""
         if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
-            return [NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")]
-        return [momentum_finding(self.config, self.scene, self.start, case)]
+            return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
+        return momentum_finding(self.config, self.scene, self.start, case)
 
 
 Start = RigidStart | ContactStart
@@ -169,7 +143,8 @@ Start = RigidStart | ContactStart
 
 def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
     """The config's method, at tolerances so many times its own, within the case's budget."""
-    settings = start.settings
+    solver = start.config.solver
+    settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
     return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
 
 
@@ -190,7 +165,9 @@ def prepared(config: WalksConfig, case: Case) -> Start | None:
     else:
         state, length = config.start, abs(float(swing_foot(walker, config.start)[1]))
     if case.model == "rigid":
-        return RigidStart(config, walker, state)
+        speed = walker.leg_length * max(abs(rate) for rate in state[len(state) // 2 :])
+        energy = float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
+        return RigidStart(config, walker, state, energy)
     pitch = length
     if config.contact is not None and wants_own_pitch(config.contact):
         found = contact_gait(config, length, state).gait
