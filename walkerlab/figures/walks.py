@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import is_
 from typing import Any, Final
 
@@ -34,10 +34,8 @@ NO_ENERGIES = "'energies' is not among the config's outputs"
 NO_STEP = "no step was completed"
 TOUCHES = "touch_time_s"
 
-RIGID_STATES, CONTACT_STATES = (Need(stage, TRAJECTORY, STATES, NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE))
-RIGID_ENERGIES, CONTACT_ENERGIES = (
-    Need(stage, TRAJECTORY, ENERGIES, NO_ENERGIES) for stage in (RIGID_STAGE, CONTACT_STAGE)
-)
+RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATES, NO_STATES)
+RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
 STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
     Need(stage, STEPS, (TOUCHES, "touch_along_m"), NO_STEP) for stage in (RIGID_STAGE, CONTACT_STAGE)
 )
@@ -91,21 +89,14 @@ class Walk:
         if strikes.size == self.strikes.size:
             return self
         end = int(np.searchsorted(self.time, strikes[-1], side="right"))
-        return Walk(self.look, self.outcome, self.steps, strikes, self.samples, end)
-
-    @property
-    def described(self) -> str:
-        """How it went, in words: 'the rigid model walked 10 steps'."""
-        count = f"{self.steps} step" + ("" if self.steps == 1 else "s")
-        if self.outcome == "walked":
-            return f"the {self.look.label} walked {count}"
-        return f"the {self.look.label} took {count} ({self.outcome})"
+        return replace(self, strikes=strikes, end=end)
 
 
-def walks_with(results: Results, rigid: Need, contact: Need) -> list[Walk]:
-    """The walks of the models whose results have what is needed, the rigid model's first."""
-    both = ((rigid, RIGID), (contact, CONTACT))
-    return [walk_of(results[need.stage], look) for need, look in both if need.missing_in(results, {}) is None]
+def walks_with(results: Results, names: tuple[str, ...]) -> list[Walk]:
+    """The walks of the models whose trajectories have some variables, the rigid model's first."""
+    both = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT))
+    there = [(stage, look) for stage, look in both if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
+    return [walk_of(results[stage], look) for stage, look in there]
 
 
 def walk_of(result: Content, look: Look) -> Walk:
@@ -120,8 +111,13 @@ def touch_times(steps: Group) -> Array:
 
 
 def sentence(walks: list[Walk]) -> str:
-    """How the walks went, as a sentence."""
-    text = ", ".join(walk.described for walk in walks)
+    """How the walks went: 'The rigid model walked 10 steps, the contact model took 1 step (fell).'."""
+    said = []
+    for walk in walks:
+        count = f"{walk.steps} step" + ("" if walk.steps == 1 else "s")
+        went = f"walked {count}" if walk.outcome == "walked" else f"took {count} ({walk.outcome})"
+        said.append(f"the {walk.look.label} {went}")
+    text = ", ".join(said)
     return text[:1].upper() + text[1:] + "."
 
 
@@ -222,7 +218,7 @@ def draw_states(results: Results) -> Drawn:
 
     Told: how much is shown, and how the walks went.
     """
-    walks, extent = shown(walks_with(results, RIGID_STATES, CONTACT_STATES))
+    walks, extent = shown(walks_with(results, STATES))
     first = walks[0]
     figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
     for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
@@ -299,7 +295,7 @@ ARROW_LENGTH = 0.06
 
 def draw_cycles(results: Results) -> Drawn:
     """A phase plane for each leg, both on the same scales; told: how much is shown, and how the walks went."""
-    walks, extent = shown(walks_with(results, RIGID_STATES, CONTACT_STATES), CYCLES)
+    walks, extent = shown(walks_with(results, STATES), CYCLES)
     figure = blank(4.2)
     axes = list(figure.subplots(1, 2, sharex=True, sharey=True))
     for leg, one in enumerate(axes):
@@ -368,7 +364,7 @@ def draw_energies(results: Results) -> Drawn:
     Told: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are impacts,
     and how the walks went.
     """
-    walks, extent = shown(walks_with(results, RIGID_ENERGIES, CONTACT_ENERGIES))
+    walks, extent = shown(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
     bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
