@@ -88,13 +88,16 @@ class Stopped:
 
 
 @kernel
-def sampled_energies(walker: ContactWalker, states: Any, has_ground: Any, knees: Any, energies: Any) -> None:
-    """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3)."""
-    form = walker.forms[0, 0]
+def sampled_energies(system: OnGround, states: Any, has_ground: Any, knees: Any, energies: Any) -> None:
+    """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3).
+
+    system  with all bodies, free; its ground and its knees are set to those of each sample
+    """
     for i in range(states.shape[0]):
-        energies[i, 0] = kinetic_energy(form, states[i])
-        energies[i, 1] = potential_energy(form, states[i])
-        system = OnGround(form, walker.normal, walker.friction, walker.stop, has_ground[i], knees[i])
+        for k in range(2):
+            system.has_ground[k], system.knee[k] = has_ground[i, k], knees[i, k]
+        energies[i, 0] = kinetic_energy(system.form, states[i])
+        energies[i, 1] = potential_energy(system.form, states[i])
         energies[i, 2] = total_energy(system, states[i])
 
 

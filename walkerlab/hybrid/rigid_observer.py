@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
@@ -18,6 +18,7 @@ CLOSER = 3  # parabolas to an extremum
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
 
+@by_reference
 class Observer(NamedTuple):
     """What is recorded of a walk besides its heel strikes; nothing, if it is not `watching`."""
 

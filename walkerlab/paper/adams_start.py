@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.walker import ContactWalker
+from walkerlab.ground.walker import ContactWalker, on_ground
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
 from walkerlab.hybrid.outcome import Outcome
@@ -135,5 +135,6 @@ def forces_of(
         raise ValueError("the walk was not sampled")
     feet, dissipated = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
     sampled_feet(walker, samples.states, samples.has_ground, feet)
-    sampled_energies(walker, samples.states, samples.has_ground, samples.knees, dissipated)
+    system = on_ground(walker, (False, False))
+    sampled_energies(system, samples.states, samples.has_ground, samples.knees, dissipated)
     return samples.time_s, feet[:, :, 2], dissipated[:, 0] + dissipated[:, 1]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.stepping import (
@@ -54,6 +54,7 @@ D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL)
 ERROR_5, ERROR_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
 
 
+@by_reference
 class Dop853(NamedTuple):
     """The method with its memory for n equations."""
 

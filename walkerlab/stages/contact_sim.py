@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import hinge_of
+from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
@@ -216,7 +217,8 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
 def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
     """Energies as the paper plots them, from the current stance foot, and the energy balance from a fixed origin."""
     energies = np.zeros((samples.time_s.size, 3))
-    sampled_energies(scene.walker, samples.states, samples.has_ground, samples.knees, energies)
+    system = on_ground(scene.walker, (False, False))
+    sampled_energies(system, samples.states, samples.has_ground, samples.knees, energies)
     kinetic, potential, total = energies.T
     walker, row, lost = scene.walker, np.arange(samples.time_s.size), samples.dissipated_J
     foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]
