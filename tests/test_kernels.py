@@ -18,6 +18,7 @@ from walkerlab import compiler
 from walkerlab.compiler import compiling
 from walkerlab.kernel_cache import watched
 from walkerlab.kernels import (
+    by_reference,
     by_type,
     by_type_or_default,
     inlined,
@@ -116,6 +117,44 @@ def test_types_without_a_body_of_their_own_have_the_default():
         assert compiled_corners(shape) == corners(shape) == expected
     assert Square in corners
     assert Circle not in corners
+
+
+@by_reference
+class Lid(NamedTuple):
+    """A part of a record."""
+
+    open: bool
+    weights: np.ndarray
+
+
+@by_reference
+class Box(NamedTuple):
+    """A record with arrays and a record in it."""
+
+    sides: np.ndarray
+    depth: float
+    lid: Lid
+
+
+@inlined
+def filled(box, share):
+    """What is in the box, which is written down in it."""
+    box.sides[0] += share
+    return box.depth * box.sides[0] * box.sides[1] + (box.lid.weights[-1] if box.lid.open else 0.0)
+
+
+@kernel
+def filled_twice(box, share):
+    return filled(box, share) + filled(box, 2.0 * share)
+
+
+def test_a_record_handed_on_by_its_address_is_the_callers_own():
+    """If a new numba breaks this, see `Reference`."""
+    for run in (filled_twice, uncompiled(filled_twice)):
+        box = Box(np.array([1.0, 2.0]), 3.0, Lid(True, np.array([5.0, 7.0])))
+        assert run(box, 1.0) == 6.0 * 2.0 + 7.0 + 6.0 * 4.0 + 7.0
+        assert box.sides[0] == 4.0
+        assert run(box._replace(lid=Lid(False, np.zeros(1))), 0.0) == 48.0
 
 
 @inlined
