@@ -68,7 +68,7 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Flo
     assert gait is not None, "the slope has a gait"
     trial = contact_trial(config, tuple(gait.state), gait.step_length, 1)
     methods = Tolerances("radau5", 1e-10, 1e-13, 10**7)
-    y = walk_contact(trial.walker, trial.ground, False, TRAILING, trial.start, methods, 1, None, False).end_state
+    y = walk_contact(trial.walker, trial.ground, False, TRAILING, trial.start, methods, 1, None).end_state
     assert not trial.walker.whole.release_at_touch, "both knees are still locked as the foot sinks in"
     system = on_ground(trial.walker, (True, True), (LOCKED, LOCKED))
     return system, folded(system.form, y)
