@@ -1,7 +1,5 @@
 """The package from Python: runs that are stored as the command line stores them, and plain objects in memory."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What can go wrong for a user, each with the exit code of the command line; everything else is a bug."""
 
-from __future__ import annotations
-
 import re
 from typing import ClassVar, Final
 

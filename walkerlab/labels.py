@@ -1,7 +1,5 @@
 """What the columns of a result are: unit and meaning, typed once, beside the field that holds the values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

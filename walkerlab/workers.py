@@ -5,8 +5,6 @@ script, so that scripts without a guard, code from standard input and notebooks 
 process that started them, however that ends; an interrupt of the keyboard is that process's to deal with.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import os

@@ -1,7 +1,5 @@
 """Walks on compliant ground to measure methods by: the config's contact, and one near the rigid limit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from walkerlab.benchmarks.trials import ContactTrial

@@ -1,7 +1,5 @@
 """One method on one scene, tolerance by tolerance: what is run, how it is timed, and when it is given up."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The truth that methods are measured by, and how well it is known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Optional (extra `reference`). Biscani, Izzo: Revisiting high-order Taylor method
 mechanics, MNRAS 504 (2021).
 """
 
-from __future__ import annotations
-
 import importlib.util
 from typing import Any
 

@@ -3,8 +3,6 @@
 A peer to measure by; nothing else uses it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

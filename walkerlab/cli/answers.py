@@ -1,7 +1,5 @@
 """What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial

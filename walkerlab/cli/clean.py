@@ -1,7 +1,5 @@
 """`walkerlab clean`: remove the results of a run."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`walkerlab animate`: a walk as GIF, or as MP4 where ffmpeg is found."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """`walkerlab init`: a commented config to begin with."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`walkerlab rerun`: a stored result computed again from its own config."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`walkerlab show STAGE`: what is stored."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

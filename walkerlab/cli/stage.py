@@ -1,7 +1,5 @@
 """A stage's command: run it, or say what would happen; then print the result."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import asdict
 from typing import Any

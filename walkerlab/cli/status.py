@@ -1,7 +1,5 @@
 """`walkerlab status`: which results are current."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

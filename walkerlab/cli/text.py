@@ -1,7 +1,5 @@
 """JSON values as aligned text for people."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

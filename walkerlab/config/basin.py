@@ -1,7 +1,5 @@
 """The basin block: which starts are led to an attractor or a fall."""
 
-from __future__ import annotations
-
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator

@@ -1,7 +1,5 @@
 """The part of a config that a type names, and one text for one content: what keys of results are made of."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The contact block: numbers as ADAMS dialogs show them (N, mm, s) or in SI, and their conversion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 

@@ -1,7 +1,5 @@
 """Annotations of config keys: every key carries unit, bounds, meaning and source, and says in words what it allows."""
 
-from __future__ import annotations
-
 import types
 from collections.abc import Iterator
 from itertools import chain

@@ -1,7 +1,5 @@
 """Config files: where they are, what they hold, and the built-in ones."""
 
-from __future__ import annotations
-
 import contextlib
 import stat
 from dataclasses import dataclass

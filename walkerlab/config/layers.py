@@ -1,7 +1,5 @@
 """Layers of a config: a file over what it extends, and `--set` over both."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """From a file, `--set` and `--strides` to one typed config, its warnings and the name of its run."""
 
-from __future__ import annotations
-
 import math
 import re
 import unicodedata

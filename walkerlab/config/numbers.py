@@ -1,7 +1,5 @@
 """Numbers as short texts that read back as the same number, and when two are the same."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal
 from typing import Any, Final

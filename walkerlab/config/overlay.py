@@ -1,7 +1,5 @@
 """A few lines over the paper config: how cases of a catalogue are written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping as Keys
 from typing import Any
 

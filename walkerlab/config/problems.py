@@ -1,7 +1,5 @@
 """Problems with a config: where, which value, what is allowed, and the nearest key."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ ruamel.yaml splits the text; what plain scalars mean is the core schema of YAML 
 are refused, so that no text can cost more than its own length.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from itertools import takewhile

@@ -1,7 +1,5 @@
 """The reference of all config keys, made from the schema: a table for people, a JSON schema for editors."""
 
-from __future__ import annotations
-
 import json
 import re
 import textwrap

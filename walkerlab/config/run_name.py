@@ -1,7 +1,5 @@
 """Run identity: a config changed by `--set` runs beside the unchanged one, in a folder named after the change."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The config's keys: types, units, bounds, defaults, meaning and source. The defaults are the paper's."""
 
-from __future__ import annotations
-
 import math
 from importlib.util import find_spec
 from typing import Annotated, Any, Final, Literal, get_args

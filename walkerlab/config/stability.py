@@ -1,7 +1,5 @@
 """The stability block: cases of one's own, beside the catalogue that comes with the package."""
 
-from __future__ import annotations
-
 from typing import Any, Final, Literal, get_args
 
 from pydantic import field_validator

@@ -1,7 +1,5 @@
 """The sweep block: one question over many configs."""
 
-from __future__ import annotations
-
 from walkerlab.config.fields import Block, key
 
 Values = str | list[float | int | bool | str]

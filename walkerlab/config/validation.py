@@ -1,7 +1,5 @@
 """A tree typed by the schema; whatever does not fit is reported with its position, all at once."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, TypeAlias

@@ -1,7 +1,5 @@
 """The kinds of walkers and their measures: keys of the block `walker`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A config as YAML text that loads back to the same: bare, as artifacts carry it, or with a comment on each key."""
 
-from __future__ import annotations
-
 import json
 import re
 import textwrap

@@ -1,7 +1,5 @@
 """Blank figures, and figures as bytes that are the same whenever the figure is."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Iterator, Sequence

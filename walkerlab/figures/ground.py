@@ -1,7 +1,5 @@
 """What the ground does: its forces, held against the friction cone, and the energy that every step loses, by cause."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

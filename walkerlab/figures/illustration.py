@@ -1,7 +1,5 @@
 """What an illustration is: its name, its words, what it needs of the stored results, and how it is drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

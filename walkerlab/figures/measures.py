@@ -1,7 +1,5 @@
 """A walker's measures to scale, named as the config names them: one leg upright, or every part in its own frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

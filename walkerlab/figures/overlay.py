@@ -1,7 +1,5 @@
 """Two runs over one another: the legs' angles and the energy of each walk in time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The illustrations there are, in the order in which they are shown."""
 
-from __future__ import annotations
-
 from walkerlab.figures import costs, families, ground, maps, stick_diagram, walks
 from walkerlab.figures.illustration import Illustration
 

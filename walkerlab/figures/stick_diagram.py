@@ -1,7 +1,5 @@
 """A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and moving pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

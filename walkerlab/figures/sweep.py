@@ -1,7 +1,5 @@
 """Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any, Final

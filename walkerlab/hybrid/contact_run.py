@@ -1,7 +1,5 @@
 """A whole walk on compliant ground: hinged first step if wanted, then free, with everything observed on the way."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -7,8 +7,6 @@ walks do not settle on a gait at least one over their steps, since they cannot t
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ z = (theta_2, dtheta_1, dtheta_2). Attractors are found by walking: long walks f
 walk has reached an attractor once it is so near that everything around there stays near, which is tried out too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -7,8 +7,6 @@ eigenvalues (the bialternate product). Each is smooth along a branch, so that ze
 Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Literal

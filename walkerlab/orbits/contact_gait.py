@@ -4,8 +4,6 @@ Where a walk from the start leads nowhere, the gait is followed from nearly rigi
 walks on: the force laws are led to the wanted ones in steps as large as Newton's method allows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

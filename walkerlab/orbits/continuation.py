@@ -8,8 +8,6 @@ Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue probl
 applied bifurcation theory, chapter 10.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar

@@ -4,8 +4,6 @@ A branch is followed from a gait both ways until it leaves the span or cannot go
 the period is entered along the eigenvector to -1, as far as the flip's normal form says, and followed alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Newton's method, for gaits of either model and for the points of their branches alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar

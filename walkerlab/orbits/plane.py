@@ -10,8 +10,6 @@ none, a walk from the attractor of a neighbouring cell, or from beside the gait,
 Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

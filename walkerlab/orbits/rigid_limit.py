@@ -4,8 +4,6 @@ Stiffness k, damping c and stiction velocity v_s are the knobs. With k the penet
 the static penetration does, and with v_s the friction velocity v_d.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

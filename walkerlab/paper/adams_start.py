@@ -1,7 +1,5 @@
 """The start that the paper gives its ADAMS model (Table 2), in both models, and why it ends as it does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Arithmetic on the paper's printed numbers alone: no model, no config."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

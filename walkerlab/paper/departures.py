@@ -1,7 +1,5 @@
 """In what a config's scene is not the one of the paper: then its numbers neither confirm nor refute the paper's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Any, Final

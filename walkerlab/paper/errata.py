@@ -1,7 +1,5 @@
 """The errata of the paper, each with its evidence and what was measured for it; see `study` for the measuring."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, fields
 from typing import Annotated

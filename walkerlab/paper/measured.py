@@ -1,7 +1,5 @@
 """What the printed numbers are held against: the rigid model with either set of equations, and the contact model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What the misprints of Appendix A do, with the heel strike solved as (A.57) has it: six equations, entry by entry."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the paper prints, as it prints it: every number with where it stands, and the walker that it is about."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from typing import Final

@@ -1,7 +1,5 @@
 """The paper's numbers, each with its verdict: what it puts in and starts from, then what it gets out."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Measurements on the paper's own walker and slope, whatever the config: what its errata are shown with."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The paper's three tables beside what was measured."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

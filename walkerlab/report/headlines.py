@@ -1,7 +1,5 @@
 """The numbers of each stage's summary that say most: at most ten of them, for differences and tables of many runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import chain
 from typing import Final

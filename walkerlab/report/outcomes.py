@@ -1,7 +1,5 @@
 """The models that walk, how a walk ends, and how far its numbers are off, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pages: sections set in the template, style and script included, so that the file needs nothing but itself."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

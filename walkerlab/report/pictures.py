@@ -1,7 +1,5 @@
 """Drawn figures as a part of the page: their shapes and texts, small, in colours that the page decides."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Mapping, Sequence

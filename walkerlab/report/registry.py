@@ -4,8 +4,6 @@ A section is a function that makes a `Section` of the results, or None if there 
 needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give None for a stage that did not run.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What a section may draw on: the stored results of a run, the figures drawn from them, and what is missing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Formulas written in plain letters, as results hold them, in the signs that a reader expects."""
 
-from __future__ import annotations
-
 import re
 
 LETTERS = {"theta": "θ", "omega": "ω", "phi": "φ", "mu": "μ", "lambda": "λ"}

@@ -1,7 +1,5 @@
 """One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

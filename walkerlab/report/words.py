@@ -1,7 +1,5 @@
 """Sentences of the report: a file of templates for each section."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from walkerlab.prose import Prose, parts

@@ -1,7 +1,5 @@
 """A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """From the walker of a config to the parts that both models are made of."""
 
-from __future__ import annotations
-
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
 from walkerlab.errors import ConfigError
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute

@@ -1,7 +1,5 @@
 """Every method by name: one list, one signature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

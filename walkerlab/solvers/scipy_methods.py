@@ -3,8 +3,6 @@
 They serve as peers and as a check. Walks with them run in Python: the same source, uncompiled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Error against run time: every method on every scene of the config, over a ladder of tolerances."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence

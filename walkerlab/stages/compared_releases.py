@@ -4,8 +4,6 @@ Beside each the rigid model with the rule that it stands for: released in the co
 the impact, released at first touch it is free.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

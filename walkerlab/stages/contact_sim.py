@@ -1,7 +1,5 @@
 """The contact model: an assembled walker on compliant ground, walked from the rigid model's start state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The periodic gaits of the rigid model, with the corrected equations and with those that the paper prints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a stage's result is determined by, whether it is stored, a point of a sweep, or an answer in memory."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

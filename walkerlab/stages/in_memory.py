@@ -1,7 +1,5 @@
 """A stage computed in memory, with what it needs and without a file: points of a sweep, objects of the Python API."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 
 from walkerlab.config.schema import Config

@@ -1,7 +1,5 @@
 """Problems with known answers, run through the contact code: the same for every scene, so answered once for all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict
 

@@ -1,7 +1,5 @@
 """The numerical error of a walk: how much its numbers change when it is walked again at tighter tolerances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final

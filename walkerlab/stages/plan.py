@@ -1,7 +1,5 @@
 """What would happen, and why: for each stage whether its result is reused, made, or left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

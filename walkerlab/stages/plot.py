@@ -1,7 +1,5 @@
 """The figures: every one that there are results for, as SVG and PNG."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -4,8 +4,6 @@ On a new machine they would else wait for the compiler, one after the other. Wha
 all processes share. A stage whose kernels were not compiled ahead compiles for itself.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Collection, Sequence
 from concurrent.futures import Future

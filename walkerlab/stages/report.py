@@ -1,7 +1,5 @@
 """The report: HTML pages of everything that there is a result of."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a command is asked about: a config, and the run folder that its results belong in."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Runs a stage and what it needs: reuses what is up to date, stores each result as soon as it is there."""
 
-from __future__ import annotations
-
 import datetime
 import importlib
 import time

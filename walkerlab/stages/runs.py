@@ -1,7 +1,5 @@
 """Run folders: which there are, what config and results each holds, and how two of them differ."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

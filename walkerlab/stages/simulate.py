@@ -1,7 +1,5 @@
 """A walk of the rigid model from its fixed point or from a given start."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

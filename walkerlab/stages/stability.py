@@ -1,7 +1,5 @@
 """Extreme cases and known problems: every one judged by measures that the walk itself does not use."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeGuard

@@ -1,7 +1,5 @@
 """Maps of stability over stiffness, stiction velocity and step size, made piece by piece: a run may be cut off."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One stage ready to run, here or in another process."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import sys

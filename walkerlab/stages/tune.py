@@ -1,7 +1,5 @@
 """The paper's parameter adjustment as a method for any walker: is it needed, how large is it, what lies behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What the rigid limit takes, and which part of the contact makes which part of the difference: of `tune`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,8 +4,6 @@ Both models store a walk under the same names, in the same shapes, with the same
 absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """A stage's result as one HDF5 file: written whole or not at all, accepted only if it is what it says it is."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

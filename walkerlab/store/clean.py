@@ -1,7 +1,5 @@
 """Which files of a run folder are this program's, and their removal; nothing else in it is touched."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rows of results as labelled arrays: names, units and meanings come from the labels of their fields."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from operator import getitem
 from typing import Any

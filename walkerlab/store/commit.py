@@ -3,8 +3,6 @@
 Nothing but the standard library is needed: the build, which runs before anything is installed, loads this file too.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a stage hands over to be stored: labelled arrays in groups, and a summary; no file, no HDF5."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

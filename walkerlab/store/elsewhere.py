@@ -1,7 +1,5 @@
 """Results in other run folders: a stage key names a result wherever it lies."""
 
-from __future__ import annotations
-
 import mmap
 import os
 import shutil

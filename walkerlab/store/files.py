@@ -1,7 +1,5 @@
 """Whole files, replaced in one step or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib

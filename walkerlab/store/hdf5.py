@@ -1,7 +1,5 @@
 """Content as the bytes of an HDF5 file that xarray opens, and back; made and read in memory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path

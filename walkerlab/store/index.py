@@ -1,7 +1,5 @@
 """The files that a drawing stage has written, as a group of its artifact: names and digests."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath

@@ -1,7 +1,5 @@
 """What a result is determined by, as a key: config slice, inputs, code."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

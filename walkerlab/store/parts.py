@@ -4,8 +4,6 @@ A journal beside the artifact: a line for each part, each with a checksum, the f
 they belong to. Lines are only ever added; a last one that was cut short is dropped.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

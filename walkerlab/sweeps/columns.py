@@ -1,7 +1,5 @@
 """The numbers of many summaries as arrays: one variable for each thing that a summary says."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Collection, Mapping, Sequence
 from itertools import chain

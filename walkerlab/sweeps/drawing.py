@@ -1,7 +1,5 @@
 """The figure and the page of a sweep, beside its file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

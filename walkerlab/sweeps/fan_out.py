@@ -1,7 +1,5 @@
 """Points handed to an engine in chunks, and what comes back; a worker that dies takes nothing with it."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """What a sweep asks: a stage, parameters with their values, and how they are combined."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A sweep's one file: parameters as coordinates, the stage's numbers as variables over them."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Iterable, Iterator, Mapping

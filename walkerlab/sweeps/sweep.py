@@ -1,7 +1,5 @@
 """A sweep from its question to its file: take over what is there, compute the rest, put it together."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import time

@@ -1,7 +1,5 @@
 """The catalogue of cases: read, typed by the schema, and turned into configs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final

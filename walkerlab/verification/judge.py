@@ -1,7 +1,5 @@
 """Cases, each walked, again with a tenfold tolerance and by another method, and as its twin."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Balls, blocks, rods and wheels are two bodies and two feet, as walkers are, with
 part, driven by the walkers' own code. The rules by which walks end are put out of reach; a run ends at a given time.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

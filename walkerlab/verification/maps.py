@@ -4,8 +4,6 @@ The paper's walk over stiffness and stiction velocity, and over stiffness and th
 is the paper's.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Momentum and energy of walkers from their masses, place by place: not from their equations of motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

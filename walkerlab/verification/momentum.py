@@ -5,8 +5,6 @@ impulses from the forces of the ground at states that the walk passes. Where for
 over within milliseconds, the walk is looked at again and again at closer times, until the sums settle.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -5,8 +5,6 @@ switching points and pads' flanks, integrated to where the walk of this project 
 sharp tolerance, whatever the case asks for. The rigid scene as a script of one's own, with an event function.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Iterator

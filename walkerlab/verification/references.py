@@ -1,7 +1,5 @@
 """Answers to the known problems that use nothing of the contact code: closed forms, and SciPy on laws written anew."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

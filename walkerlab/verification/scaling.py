@@ -1,7 +1,5 @@
 """Walkers of another size, mass and gravity that must do the same, in their own units (dimensional analysis)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """The catalogue of a scene's own extremes: its walker on harder and softer ground, other slopes, from other starts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Walkers in the states that cases start from: how either model walks from there, and what its walk must keep."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """What is found about a case, and what follows from it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Final

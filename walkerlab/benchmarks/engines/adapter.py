@@ -1,7 +1,5 @@
 """What an adapter is: a module that builds a planar model in its engine and steps it."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

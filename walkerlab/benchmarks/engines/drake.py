@@ -8,8 +8,6 @@ s = v / v_s, in Lagged as s / sqrt(1 + s^2); SAP regularises it by itself.
 Source: Drake documentation, Multibody: contact modeling; Castro, Permenter, Han (2022).
 """
 
-from __future__ import annotations
-
 import logging
 import math
 from typing import Any

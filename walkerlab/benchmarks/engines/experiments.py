@@ -1,7 +1,5 @@
 """The three experiments: same law, own law, no contact; each engine against our own walk, run after run."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Sequence

@@ -6,8 +6,6 @@ full friction over a zone of slip; so the exponent is ADAMS's own, and so is the
 Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -4,8 +4,6 @@ An engine gives states at the ends of its steps only. Between two of them a foot
 its values and velocities, so that a touch is located to the fourth order in the step.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ at (1 - d) g / K whatever its mass, and a foot creeps at (1 - d) a_0 / (impratio
 Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

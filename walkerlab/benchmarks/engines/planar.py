@@ -1,7 +1,5 @@
 """What an engine is told of a walker: a tree of rigid bodies in a plane, hung from its base, under tilted gravity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What is found of the walk in other engines, row by row."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

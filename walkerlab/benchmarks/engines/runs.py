@@ -1,7 +1,5 @@
 """What is done in an engine's process: a walk, a swing without ground, a ball and a block on its own contact."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass, replace

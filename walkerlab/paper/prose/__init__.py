@@ -3,8 +3,6 @@
 A package of its own: only results of modules that import it depend on its words.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

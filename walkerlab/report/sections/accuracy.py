@@ -1,7 +1,5 @@
 """What accuracy costs: error against run time, method by method."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any

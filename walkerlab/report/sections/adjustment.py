@@ -1,7 +1,5 @@
 """The paper's parameter adjustment: whether it was needed, how much, and what explains it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

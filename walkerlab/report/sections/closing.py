@@ -1,7 +1,5 @@
 """What closes the report: what is one link away, what its words mean, and what is not in it, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms

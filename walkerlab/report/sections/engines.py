@@ -1,7 +1,5 @@
 """What other engines make of the same walk: their integrators on our law, and their own contact."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Families of gaits over a parameter, their bifurcations, a diagram whose gaits walk, and basins of attraction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial

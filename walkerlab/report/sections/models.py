@@ -1,7 +1,5 @@
 """How far the two models differ, and what the knees have to do with it."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from walkerlab.report.blocks import PageBlock, Section

@@ -1,7 +1,5 @@
 """What is seen: the walk, moving, with a foot in close-up and three views on one clock; and the figures."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

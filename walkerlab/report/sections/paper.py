@@ -1,7 +1,5 @@
 """The page of the paper: every number that it prints beside what is computed here, its tables, and its errata."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Where the numbers come from: config, software, machine, and what determines each result."""
 
-from __future__ import annotations
-
 import datetime
 
 from walkerlab.config.writer import to_yaml

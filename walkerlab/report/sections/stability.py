@@ -1,7 +1,5 @@
 """How extreme cases end, what known problems come to, and what ordinary methods make of the same scenes."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """The verdict, first of all: what has no answer, how the walkers fared, and what of the paper stands."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

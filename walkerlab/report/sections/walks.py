@@ -1,7 +1,5 @@
 """The walks: the numbers of the contact one, the assumptions of the rigid one, and every step of both."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any

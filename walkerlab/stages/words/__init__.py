@@ -1,7 +1,5 @@
 """What measured run times and errors say, as templates: a file for each stage."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from walkerlab.prose import Prose, f
