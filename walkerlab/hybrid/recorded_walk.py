@@ -148,8 +148,10 @@ class Recorder:
         knees = seen.knee_time + self.time
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after), (self.knees, knees)):
-            kept.append(new[:taken])
+        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
+            kept.append(new)
+        if self.kneed:
+            self.knees.append(knees[:taken])
         self.steps += taken
         if taken:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
@@ -179,9 +181,7 @@ class Recorder:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
         lengths, begun = np.zeros(self.steps), self.start
-        for k, row in enumerate(
-            map(np.ndarray.tolist, before)
-        ):  # between the points of contact, and what the stance foot rolled
+        for k, row in enumerate(map(np.ndarray.tolist, before)):  # between touches, and what the stance foot rolled
             lengths[k] = swing_foot(self.walker, row)[1] + rolled_distance(self.walker, begun, row)
             begun = after[k]
         return RigidWalkResult(
