@@ -256,7 +256,7 @@ class _Refreshed:
         return getattr(self._context, name)
 
     def refresh(self) -> None:
-        """Nothing."""
+        """Leave the context as the compiler of the kernel has refreshed it."""
 
 
 class _WithoutEnvironment:
@@ -269,7 +269,7 @@ class _WithoutEnvironment:
         return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Nothing."""
+        """Leave the environment out."""
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
