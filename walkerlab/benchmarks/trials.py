@@ -90,7 +90,8 @@ class RigidTrial:
         n, entry = len(self.walker.blank), METHODS[method]
         solver = entry.new(n, rtol, atol, budget)
         finder = finder_for(solver, RIGID_EVENTS)
-        walker, observer, strikes = np.asarray(self.walker), unwatched(), new_heel_strikes(self.steps, n)
+        walker, observer = np.asarray(self.walker), unwatched()
+        strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
         stride = walk if entry.compiled else uncompiled(walk)
 
         def run() -> TrialRun:

@@ -127,7 +127,7 @@ class Recorder:
 
     def walk_on(self, steps: int) -> Outcome:
         """Take up to `steps` more steps."""
-        seen, times = new_heel_strikes(steps, self.numbers), np.zeros(0)
+        seen, times = new_heel_strikes(steps, self.numbers, self.kneed), np.zeros(0)
         if self.sampled:  # as many as the steps may reach, from the start of the first of them
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time

@@ -299,10 +299,10 @@ class HeelStrikes(NamedTuple):
     knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
 
 
-def new_heel_strikes(steps: int, m: int) -> HeelStrikes:
-    """Room for some heel strikes, with states of m numbers."""
+def new_heel_strikes(steps: int, m: int, kneed: bool = True) -> HeelStrikes:
+    """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees."""
     before, after = np.zeros((2, steps, m))
-    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps))
+    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0))
 
 
 @kernel
