@@ -3,10 +3,11 @@
 from typing import Any
 
 from walkerlab.ground.knees import knee_energy
-from walkerlab.ground.motion import tree_equations
 from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.walker import OF_BODIES, Form, OnGround, foot_force, half_size, one_foot_motion, sines_cosines
 from walkerlab.kernels import inlined, matrix, vector
+from walkerlab.mechanics import tree
+from walkerlab.mechanics.tree import add_inertia, projections
 
 
 @inlined
@@ -14,30 +15,24 @@ def kinetic_energy(form: Form, y: Any) -> float:
     """Kinetic energy (J)."""
     # what is added to r here is not wanted
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
-    sines_cosines(form, y, s, c)
-    tree_equations(form, s, c, y, M, r)
     half, total = half_size(form), 0.0
+    omega = y[half + form.places : 2 * half]
+    sines_cosines(form, y, s, c)
+    add_inertia(form, form.bodies, s, c, omega, M, r)
     for i in range(form.places):
         total += form.mass * (y[half + i] * y[half + i])
-    rates = half + form.places
-    for k in range(form.bodies):
-        for l in range(form.bodies):
-            total += M[k, l] * y[rates + k] * y[rates + l]
-    return 0.5 * total
+    return 0.5 * total + tree.kinetic_energy(form.bodies, M, omega)
 
 
 @inlined
 def potential_energy(form: Form, y: Any) -> float:
     """Potential energy of gravity (J) from the slope frame's origin."""
-    if form.places > 0:
-        return form.mass * (form.gravity_down * y[1] - form.gravity_along * y[0])
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
-    total = form.mass * (form.gravity_down * form.root_height - form.gravity_along * form.root_along)
-    for k in range(form.bodies):
-        total += form.gravity_down * (s[k] * form.arm_x[k] + c[k] * form.arm_y[k])
-        total -= form.gravity_along * (c[k] * form.arm_x[k] - s[k] * form.arm_y[k])
-    return total
+    projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
+    if form.places > 0:
+        return tree.potential_energy(form, form.bodies, y[0], y[1], F, U)
+    return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)
 
 
 @inlined

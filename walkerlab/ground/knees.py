@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
 from walkerlab.ground.walker import STOPPING, Form, OnGround, half_size
-from walkerlab.kernels import by_type_or_default, inlined
+from walkerlab.kernels import inlined
+from walkerlab.mechanics.hinges import HingeTorque, add_hinge_gradients, add_hinge_torque, hinge_energy, hinge_torque
 
 Floats = NDArray[np.float64]
 FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
@@ -34,46 +35,25 @@ def extension_rate(form: Form, knee: int, y: Any) -> float:
     return y[rates + form.shanks[knee]] - y[rates + form.thighs[knee]]
 
 
-class StopTorque(NamedTuple):
-    """Torque against the extension, and its derivatives."""
-
-    torque: float  # N m
-    spring: float  # N m, the elastic part
-    by_angle: float  # N m
-    by_rate: float  # N m s
-
-
-@by_type_or_default
-def stop_torque(stop: Any, angle: float, rate: float) -> StopTorque:
-    """Torque of a stop at an extension (rad) and its rate: none of an ideal lock, which acts in no time."""
-    return StopTorque(0.0, 0.0, 0.0, 0.0)
-
-
-@stop_torque.case(NormalLaw)
-def impact_torque(stop: NormalLaw, angle: float, rate: float) -> StopTorque:
-    """The IMPACT law, in N m and rad."""
+@hinge_torque.case(NormalLaw)
+def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
+    """A stop by the IMPACT law, in N m and rad, that acts beyond straight."""
     if angle <= 0.0:
-        return StopTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, stop)
-    return StopTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
+        return HingeTorque(0.0, 0.0, 0.0, 0.0)
+    torque = impact_normal_force(angle, rate, law)
+    return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
-@by_type_or_default
-def stop_energy(stop: Any, angle: float) -> float:
-    """Elastic energy (J) of a stop: none of an ideal lock."""
-    return 0.0
-
-
-@stop_energy.case(NormalLaw)
-def spring_energy(stop: NormalLaw, angle: float) -> float:
-    """That of its spring."""
-    return elastic_energy(angle, stop)
+@hinge_energy.case(NormalLaw)
+def stop_energy(law: NormalLaw, angle: float) -> float:
+    """Elastic energy (J) of a stop."""
+    return elastic_energy(angle, law)
 
 
 @inlined
-def torque_now(system: OnGround, knee: int, y: Any) -> StopTorque:
+def torque_now(system: OnGround, knee: int, y: Any) -> HingeTorque:
     """The torque of a knee's stop in a state."""
-    return stop_torque(system.stop, extension(system.form, knee, y), extension_rate(system.form, knee, y))
+    return hinge_torque(system.stop, extension(system.form, knee, y), extension_rate(system.form, knee, y))
 
 
 @inlined
@@ -81,24 +61,17 @@ def add_stop_torques(system: OnGround, y: Any, r: Any) -> None:
     """Add the torques (N m) of the stops to r (n,): each pushes the shank back and the thigh forward."""
     for knee in range(2):
         if system.knee[knee] == STOPPING:
-            torque = torque_now(system, knee, y).torque
-            r[system.form.shanks[knee]] -= torque
-            r[system.form.thighs[knee]] += torque
+            add_hinge_torque(torque_now(system, knee, y), system.form.shanks[knee], system.form.thighs[knee], r)
 
 
 @inlined
-def add_stop_gradients(system: OnGround, y: Any, J: Any) -> None:
-    """Add the derivatives of those torques to the rows of the angles in J."""
+def add_stop_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
     form = system.form
-    p, rates = form.places, half_size(form) + form.places
     for knee in range(2):
         if system.knee[knee] == STOPPING:
-            now, shank, thigh = torque_now(system, knee, y), form.shanks[knee], form.thighs[knee]
-            for row, sign in ((rates + thigh, 1.0), (rates + shank, -1.0)):
-                J[row, p + shank] += sign * now.by_angle
-                J[row, p + thigh] -= sign * now.by_angle
-                J[row, rates + shank] += sign * now.by_rate
-                J[row, rates + thigh] -= sign * now.by_rate
+            now = torque_now(system, knee, y)
+            add_hinge_gradients(now, form.shanks[knee], form.thighs[knee], by_angle, by_rate)
 
 
 @inlined
@@ -107,7 +80,7 @@ def knee_energy(system: OnGround, y: Any) -> float:
     total = 0.0
     for knee in range(2):
         if system.knee[knee] == STOPPING:
-            total += stop_energy(system.stop, extension(system.form, knee, y))
+            total += hinge_energy(system.stop, extension(system.form, knee, y))
     return total
 
 
@@ -118,7 +91,7 @@ def knee_power(system: OnGround, y: Any) -> float:
     for knee in range(2):
         if system.knee[knee] == STOPPING:
             now = torque_now(system, knee, y)
-            total += (now.torque - now.spring) * extension_rate(system.form, knee, y)
+            total += (now.torque - now.elastic) * extension_rate(system.form, knee, y)
     return total
 
 

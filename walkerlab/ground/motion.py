@@ -14,6 +14,13 @@ from walkerlab.ground.walker import (
 )
 from walkerlab.kernels import inlined, matrix, vector, woven
 from walkerlab.mechanics.links import Counted, factor_linked, gathered, solve_linked
+from walkerlab.mechanics.tree import (
+    add_gravity,
+    add_gravity_gradient,
+    add_inertia,
+    add_inertia_gradients,
+    projections,
+)
 from walkerlab.solvers.system import block, derivative, jacobian
 
 
@@ -24,47 +31,33 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 
 
 @woven
-def tree_equations(form: Form, s: Any, c: Any, y: Any, M: Any, r: Any) -> None:
-    """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
-    n, first = form.bodies, half_size(form) + form.places
-    for k in range(n):
-        M[k, k] = form.A[k, k]
-        for l in range(k):
-            A, B = form.A[k, l], form.B[k, l]
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            M[k, l] = A * cos_d + B * sin_d
-            M[l, k] = M[k, l]
-            r[k] += y[first + l] * y[first + l] * (A * sin_d - B * cos_d)
-            r[l] -= y[first + k] * y[first + k] * (A * sin_d - B * cos_d)
-
-
-@woven
 def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
     """Force along and normal to the slope (N) on a foot with ground; its torques (N m) are added to r (n,)."""
     form = system.form
     motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
         return 0.0, 0.0
-    force = foot_force(system, motion)
+    force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)
+    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
-        forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
-        upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
-        r[k] += force.along * (form.rolling[foot, k] - upward) + force.normal.force * forward
+        r[k] += force.along * (form.rolling[foot, k] - U[k]) + force.normal.force * F[k]
     return force.along, force.normal.force
 
 
 @woven
-def all_forces(system: OnGround, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Force of the ground along and normal to the slope (N); all torques on the bodies (N m) into r (n,).
+def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
+    """Force of the ground along and normal to the slope (N); M (n, n) and all torques on the bodies (N m) into r (n,).
 
     They are those of the ground, of the centrifugal terms, of the knees' stops and, about a hinge, of gravity.
     """
     form = system.form
-    for k in range(form.bodies):
+    n, half = form.bodies, half_size(form)
+    for k in range(n):
         r[k] = 0.0
-        if form.places == 0:
-            r[k] -= form.gravity_along * (s[k] * form.arm_x[k] + c[k] * form.arm_y[k])
-            r[k] -= form.gravity_down * (c[k] * form.arm_x[k] - s[k] * form.arm_y[k])
+    if form.places == 0:
+        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        add_gravity(form, n, F, U, r)
     along, normal = 0.0, 0.0
     for foot in range(2):
         if system.has_ground[foot] != 0:
@@ -72,6 +65,7 @@ def all_forces(system: OnGround, s: Any, c: Any, y: Any, r: Any) -> tuple[float,
             along += push[0]
             normal += push[1]
     add_stop_torques(system, y, r)
+    add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
     return along, normal
 
 
@@ -82,8 +76,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
-    along, normal = all_forces(system, s, c, y, r)
-    tree_equations(form, s, c, y, M, r)
+    along, normal = all_forces(system, s, c, y, M, r)
     links = Counted(form.E, form.arm_x[:n])
     factor_linked(links, 0, M, r)
     solve_linked(links, 0, M, r)
@@ -97,8 +90,11 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 
 @inlined
-def motion_gradient(form: Form, foot: int, s: Any, c: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state."""
+def motion_gradient(form: Form, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
+    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state.
+
+    F, U  (n,) projections of the levers to the foot
+    """
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
@@ -106,12 +102,10 @@ def motion_gradient(form: Form, foot: int, s: Any, c: Any, y: Any, j: int) -> tu
         if k == -1:
             return (0.0, -1.0, 0.0) if moves else (-1.0, 0.0, 0.0)
         return 0.0, 0.0, 1.0 if moves else 0.0
-    forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
-    upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
     if moves:
-        return 0.0, -forward, form.rolling[foot, k] - upward
+        return 0.0, -F[k], form.rolling[foot, k] - U[k]
     omega = y[half + p + k]
-    return -forward, omega * upward, -omega * forward
+    return -F[k], omega * U[k], -omega * F[k]
 
 
 @inlined
@@ -121,16 +115,14 @@ def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J:
     motion = foot_motion(form, foot, s, c, y)
     if motion.height >= 0.0:
         return
-    force = foot_force(system, motion)
+    force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)
+    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     p, half = form.places, half_size(form)
-    F, U = vector(OF_BODIES), vector(OF_BODIES)
     for k in range(form.bodies):
-        F[k] = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
-        U[k] = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
         J[half + p + k, p + k] -= force.along * F[k] + force.normal.force * U[k]
     for j in range(2 * half):
         # how penetration, its rate and the slip change along coordinate or velocity j
-        deeper, deeper_rate, faster = motion_gradient(form, foot, s, c, y, j)
+        deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
         normal = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
         along = force.coefficient * normal + force.by_slip * faster
         if p > 0:
@@ -141,22 +133,16 @@ def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J:
 
 
 @inlined
-def add_tree_gradients(form: Form, s: Any, c: Any, y: Any, alpha: Any, J: Any) -> None:
-    """Add the derivatives of (gravity and centrifugal terms - M alpha) at fixed alpha to the angles' rows of J."""
+def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives (n, n) of the torques but the ground's, less M alpha at fixed alpha, by angles and rates."""
+    form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
-    for k in range(n):
-        row = half + p + k
-        if p == 0:
-            forward, upward = c[k] * form.arm_x[k] - s[k] * form.arm_y[k], s[k] * form.arm_x[k] + c[k] * form.arm_y[k]
-            J[row, k] += form.gravity_down * upward - form.gravity_along * forward
-        for l in range(n):
-            omega = y[half + p + l]
-            A, B = form.A[k, l], form.B[k, l]
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            between = omega * omega * (A * cos_d + B * sin_d) + alpha[l] * (A * sin_d - B * cos_d)
-            J[row, p + l] += between
-            J[row, p + k] -= between
-            J[row, half + p + l] += 2.0 * omega * (A * sin_d - B * cos_d)
+    if p == 0:
+        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        add_gravity_gradient(form, n, F, U, by_angle)
+    add_stop_gradients(system, y, by_angle, by_rate)
+    add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 
 @jacobian.case(OnGround)
@@ -171,8 +157,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     sines_cosines(form, y, s, c)
-    all_forces(system, s, c, y, alpha)
-    tree_equations(form, s, c, y, M, alpha)
+    all_forces(system, s, c, y, M, alpha)
     links = Counted(form.E, form.arm_x[:n])
     factor_linked(links, 0, M, alpha)
     solve_linked(links, 0, M, alpha)
@@ -184,8 +169,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     for foot in range(2):
         if system.has_ground[foot] != 0:
             add_ground_gradients(system, foot, s, c, y, J)
-    add_stop_gradients(system, y, J)
-    add_tree_gradients(form, s, c, y, alpha, J)
+    add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])
     for j in range(2 * half):
         for k in range(n):
             alpha[k] = J[half + p + k, j]

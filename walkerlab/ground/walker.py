@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.kernels import by_reference, inlined, vector
-from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.kernels import by_reference, inlined, vector, woven
+from walkerlab.mechanics import tree
+from walkerlab.mechanics.tree import lever_motion
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
@@ -189,27 +190,22 @@ def half_size(form: Form) -> int:
 @inlined
 def sines_cosines(form: Form, y: Any, s: Any, c: Any) -> None:
     """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
-    for k in range(form.bodies):
-        s[k], c[k] = sine_cosine(y[form.places + k] + form.slope)
+    tree.sines_cosines(form, form.bodies, y[form.places : half_size(form)], s, c)
 
 
 @inlined
 def foot_motion(form: Form, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
-    half = half_size(form)
+    n, half = form.bodies, half_size(form)
     along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
     if form.places > 0:
         along, height, slip, vertical_velocity = y[0], y[1], y[half], y[half + 1]
-    height -= form.radius[foot]
-    for k in range(form.bodies):
-        omega = y[half + form.places + k]
-        forward = c[k] * form.foot_x[foot, k] - s[k] * form.foot_y[foot, k]
-        upward = s[k] * form.foot_x[foot, k] + c[k] * form.foot_y[foot, k]
-        along += forward
-        height += upward
-        slip += omega * (form.rolling[foot, k] - upward)
-        vertical_velocity += omega * forward
-    return FootMotion(along, height, slip, vertical_velocity)
+    omega = y[half + form.places : 2 * half]
+    ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
+    for k in range(n):
+        slip += omega[k] * form.rolling[foot, k]
+    height += above - form.radius[foot]
+    return FootMotion(along + ahead, height, slip + ahead_rate, vertical_velocity + above_rate)
 
 
 @inlined
@@ -277,15 +273,11 @@ def store_whole(form: Form, y: Any, whole: Any) -> None:
     if p > 0:
         whole[0], whole[1], whole[middle], whole[middle + 1] = y[0], y[1], y[half], y[half + 1]
         return
-    along, height, speed, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
-    for k in range(n):
-        s, c = sine_cosine(y[k] + form.slope)
-        forward, upward = c * form.arm_x[k] - s * form.arm_y[k], s * form.arm_x[k] + c * form.arm_y[k]
-        along += forward / form.mass
-        height += upward / form.mass
-        speed -= y[half + k] * upward / form.mass
-        vertical_velocity += y[half + k] * forward / form.mass
-    whole[0], whole[1], whole[middle], whole[middle + 1] = along, height, speed, vertical_velocity
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
+    whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass
+    whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
 
 
 def floating_state(form: Form, y: Any, size: int) -> State:

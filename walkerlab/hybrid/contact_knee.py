@@ -7,10 +7,20 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.knees import knee_energy, lock
 from walkerlab.ground.motion import motion_gradient
-from walkerlab.ground.walker import OF_BODIES, STOPPING, ContactWalker, Form, OnGround, folded, sines_cosines, unfolded
+from walkerlab.ground.walker import (
+    OF_BODIES,
+    STOPPING,
+    ContactWalker,
+    Form,
+    OnGround,
+    folded,
+    sines_cosines,
+    unfolded,
+)
 from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT
 from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
 from walkerlab.kernels import vector
+from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.scipy_methods import right_hand_side
 
 Floats = NDArray[np.float64]
@@ -62,7 +72,8 @@ def event_gradient(whole: Form, event: int, x: Floats) -> Floats:
         knee = (event - EXTENSION) % 2
         gradient[first + whole.shanks[knee]], gradient[first + whole.thighs[knee]] = 1.0, -1.0
         return gradient
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
-    sines_cosines(whole, x, s, c)
     foot, row = event // PER_FOOT, 0 if event % PER_FOOT == HEIGHT else 1
-    return -np.array([motion_gradient(whole, foot, s, c, x, j)[row] for j in range(x.size)])
+    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(whole, x, s, c)
+    projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
+    return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

@@ -49,11 +49,10 @@ class TwoLegs(NamedTuple):
     model: Standing
     A: tuple[float, ...]  # (4,) constants of standing.py, row by row
     B: tuple[float, ...]
-    A_centrifugal: tuple[float, ...]
-    B_centrifugal: tuple[float, ...]
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
-    mass: float  # kg; numbers of the model by value, which loops need not load again
+    misprint: float  # kg m^2; numbers of the model by value, which loops need not load again
+    mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
     gravity_down: float
@@ -78,10 +77,9 @@ def two_legs(model: Standing) -> TwoLegs | None:
         model,
         numbers(model.A),
         numbers(model.B),
-        numbers(model.A_centrifugal),
-        numbers(model.B_centrifugal),
         numbers(model.arm_x),
         numbers(model.arm_y),
+        float(model.misprint),
         float(model.mass),
         float(model.radius),
         float(model.gravity_along),
@@ -110,8 +108,9 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
         pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
         r_2 = r_2 - R * pulled
         M_12, M_22 = M_12 + R * U_1, M_22 + 2.0 * R * U_2 + system.mass * R * R
-    r_2 = r_2 + squared_1 * (system.A_centrifugal[2] * sin_d - system.B_centrifugal[2] * cos_d)
-    r_1 = r_1 - squared_2 * (system.A_centrifugal[1] * sin_d + system.B_centrifugal[1] * cos_d)
+    turning = system.A[2] * sin_d - system.B[2] * cos_d
+    r_2 = r_2 + squared_1 * (turning + system.misprint * sin_d)
+    r_1 = r_1 - squared_2 * turning
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
     alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)

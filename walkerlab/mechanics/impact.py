@@ -11,15 +11,8 @@ from typing import Any
 
 from walkerlab.kernels import inlined, matrix, vector, woven
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
-from walkerlab.mechanics.standing import (
-    AT_STRIKE,
-    STANCE,
-    STRAIGHT,
-    Standing,
-    equations,
-    projections,
-    sines_cosines,
-)
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, Standing, equations
+from walkerlab.mechanics.tree import projections, sines_cosines
 
 
 @inlined
@@ -49,8 +42,8 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like), matrix(like),
     )  # fmt: skip
     foot_F, foot_U = vector(like), vector(like)
-    sines_cosines(model, y, s, c)
-    projections(model.foot_x, model.foot_y, s, c, foot_F, foot_U)
+    sines_cosines(model, n, y, s, c)
+    projections(model.foot_x, model.foot_y, n, s, c, foot_F, foot_U)
     # velocity of the centre of the foot that stands afterwards, along the slope and normal to it
     along, upward = -R * y[n + STANCE], 0.0
     if other_foot:
@@ -116,7 +109,7 @@ def mass_change(model: Standing, s: Any, c: Any, turn: Any, jump: Any, along: fl
     """
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
-    projections(model.arm_x, model.arm_y, s, c, F, U)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
     pulled = 0.0
     for k in range(n):
         turn_k = turn[k]

@@ -61,8 +61,6 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
         n,
         A=A,
         B=B,
-        A_centrifugal=A,
-        B_centrifugal=B,
         arm_x=tree.arm_x @ members,
         arm_y=tree.arm_y @ members,
         foot_x=to_foot[:, 0],

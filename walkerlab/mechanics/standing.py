@@ -1,16 +1,13 @@
 """A walker standing on one foot that is pinned to the ground or rolls on it without slip.
 
 The centre of the foot's arc is the tree's root; it moves along the slope by -R times the stance leg's angle, and R = 0
-is a hinge. With Delta = theta_l - theta_k, the projections of the first moments c_k on the slope and its normal,
-F_k = (R(psi_k) c_k)_x and U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and s the stance leg:
+is a hinge. With M, r, F and U of tree.py and s the stance leg:
 
-    M_kl = A_kl cos Delta + B_kl sin Delta
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
-    r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
-          - d_ks R (sum over l of omega_l^2 F_l + m g_along)
+    r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
 
 Bodies that follow others (a locked shank its thigh, a torso the bisector of the legs) are a reduction theta = E z with
-a constant E, which turns M' alpha = r into E' M' E dz' = E' r.
+a constant E, which turns M' alpha = r' into E' M' E dz' = E' r'.
 
 Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then what
 belongs to both legs.
@@ -24,7 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.kernels import inlined, matrix, vector, woven, zeros
+from walkerlab.mechanics import tree
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
+from walkerlab.mechanics.tree import (
+    add_gravity,
+    add_gravity_gradient,
+    add_inertia,
+    add_inertia_gradients,
+    lever_motion,
+    projections,
+    sines_cosines,
+)
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import block, derivative, jacobian
 
@@ -41,8 +48,6 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
 
     A: Floats  # (n, n) kg m^2
     B: Floats
-    A_centrifugal: Floats  # (n, n) those of the centrifugal terms: the same, unless somebody misprinted them
-    B_centrifugal: Floats
     arm_x: Floats  # (n,) c, kg m: first moments about the root
     arm_y: Floats
     foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
@@ -53,6 +58,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     coordinates: int  # [d] of the section
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
+    misprint: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_misprint`
     mass: float  # kg
     radius: float  # [R] m, of either foot; 0 is a point
     hip_x: float  # m, to the hip, which belongs to the stance leg
@@ -103,7 +109,7 @@ def new_standing(n: int, **fields: Any) -> Standing:
     """The rigid model of n bodies with these fields; the others are zero."""
     square, each = (n, n), (n,)
     shapes = {
-        **dict.fromkeys(("A", "B", "A_centrifugal", "B_centrifugal"), square),
+        **dict.fromkeys(("A", "B"), square),
         **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
         "E": (3, n, n),
         "blank": (2 * n,),
@@ -140,48 +146,46 @@ def state_or_column(system: Mode) -> Any:
 
 
 @woven
-def projections(lever_x: Any, lever_y: Any, s: Any, c: Any, F: Any, U: Any) -> None:
-    """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
-    for k in range(len(lever_x)):
-        F[k] = c[k] * lever_x[k] - s[k] * lever_y[k]
-        U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
-
-
-@woven
-def sines_cosines(model: Standing, y: Any, s: Any, c: Any) -> None:
-    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
-    for k in range(len(model.arm_x)):
-        s[k], c[k] = sine_cosine(y[k] + model.slope)
-
-
-@woven
 def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
-    """M' (n, n) in kg m^2 and r (n,) in N m at the state y, with all that they are made of."""
+    """M' (n, n) in kg m^2 and r' (n,) in N m at the state y, with all that they are made of."""
     n, R = len(model.arm_x), model.radius
-    sines_cosines(model, y, s, c)
-    projections(model.arm_x, model.arm_y, s, c, F, U)
+    omega = y[n : 2 * n]
+    sines_cosines(model, n, y, s, c)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
-        r[k] = -model.gravity_along * U[k] - model.gravity_down * F[k]
-        M[k, k] = model.A[k, k]
+        r[k] = 0.0
+    add_gravity(model, n, F, U, r)
+    add_inertia(model, n, s, c, omega, M, r)
+    add_misprint(model, s, c, omega, r)
     if R != 0.0:
         pulled = model.mass * model.gravity_along
         for k in range(n):
-            pulled += y[n + k] * y[n + k] * F[k]
-        r[STANCE] -= R * pulled
-    for k in range(n):
-        for l in range(k):
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            M[k, l] = model.A[k, l] * cos_d + model.B[k, l] * sin_d
-            M[l, k] = M[k, l]
-            of_l = model.A_centrifugal[k, l] * sin_d - model.B_centrifugal[k, l] * cos_d
-            of_k = model.A_centrifugal[l, k] * sin_d + model.B_centrifugal[l, k] * cos_d
-            r[k] += y[n + l] * y[n + l] * of_l
-            r[l] -= y[n + k] * y[n + k] * of_k
-    if R != 0.0:
-        for k in range(n):
+            pulled += omega[k] * omega[k] * F[k]
             M[STANCE, k] += R * U[k]
             M[k, STANCE] += R * U[k]
+        r[STANCE] -= R * pulled
         M[STANCE, STANCE] += model.mass * R * R
+
+
+@woven
+def add_misprint(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
+    """Add the torque (N m) on the stance leg by which printed equations differ from Lagrange's; none has no misprint.
+
+    It is that of a centrifugal term with another factor: of the swing leg's angular velocity squared.
+    """
+    if model.misprint != 0.0:
+        r[STANCE] += model.misprint * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
+
+
+@woven
+def add_misprint_gradients(model: Standing, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add its derivatives by the angles and by their velocities."""
+    if model.misprint != 0.0:
+        cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
+        turning = model.misprint * omega[SWING] * omega[SWING] * cos_d
+        by_angle[STANCE, SWING] += turning
+        by_angle[STANCE, STANCE] -= turning
+        by_rate[STANCE, SWING] += 2.0 * model.misprint * omega[SWING] * sin_d
 
 
 @derivative.case(Mode)
@@ -214,26 +218,21 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
 
 @woven
 def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
-    """Derivatives (n, n) of r - M' alpha at fixed alpha with respect to the angles and to their velocities."""
+    """Derivatives (n, n) of r' - M' alpha at fixed alpha with respect to the angles and to their velocities."""
     n, R = len(model.arm_x), model.radius
-    F, U = vector(model.arm_x), vector(model.arm_x)
-    projections(model.arm_x, model.arm_y, s, c, F, U)
+    omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
-        own = model.gravity_down * U[k] - model.gravity_along * F[k] - R * F[k] * alpha[STANCE]
         for l in range(n):
-            omega = y[n + l]
-            A_c, B_c = model.A_centrifugal[k, l], model.B_centrifugal[k, l]
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
-            between = omega * omega * (A_c * cos_d + B_c * sin_d)
-            between += alpha[l] * (model.A[k, l] * sin_d - model.B[k, l] * cos_d)
-            own -= between
-            by_angle[k, l] = between
-            by_rate[k, l] = 2.0 * omega * (A_c * sin_d - B_c * cos_d)
-        by_angle[k, k] += own
-    for l in range(n):
-        omega = y[n + l]
-        by_angle[STANCE, l] -= R * (F[l] * alpha[l] - omega * omega * U[l])
-        by_rate[STANCE, l] -= 2.0 * R * omega * F[l]
+            by_angle[k, l], by_rate[k, l] = 0.0, 0.0
+        by_angle[k, k] = -R * F[k] * alpha[STANCE]
+    add_gravity_gradient(model, n, F, U, by_angle)
+    add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
+    add_misprint_gradients(model, s, c, omega, by_angle, by_rate)
+    if R != 0.0:
+        for l in range(n):
+            by_angle[STANCE, l] -= R * (F[l] * alpha[l] - omega[l] * omega[l] * U[l])
+            by_rate[STANCE, l] -= 2.0 * R * omega[l] * F[l]
 
 
 @jacobian.case(Mode)
@@ -270,8 +269,8 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
         vector(model.arm_x),
         vector(model.blank),
     )
-    sines_cosines(model, y, s, c)
-    projections(model.arm_x, model.arm_y, s, c, F, U)
+    sines_cosines(model, n, y, s, c)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
     derivative(system, 0.0, y, f)
     along = -model.mass * (model.radius * f[n + STANCE] + model.gravity_along)
     normal = model.mass * model.gravity_down
@@ -294,14 +293,8 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
         matrix(model.arm_x),
     )  # fmt: skip
     equations(model, y, s, c, F, U, M, r)
-    kinetic = 0.0
     rolled = -model.radius * (y[STANCE] + model.slope)
-    potential = model.mass * (model.gravity_down * model.radius - model.gravity_along * rolled)
-    for k in range(n):
-        potential += model.gravity_down * U[k] - model.gravity_along * F[k]
-        for l in range(n):
-            kinetic += M[k, l] * y[n + k] * y[n + l]
-    return 0.5 * kinetic, potential
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), tree.potential_energy(model, n, rolled, model.radius, F, U)
 
 
 @inlined
@@ -315,14 +308,9 @@ def swing_foot(model: Standing, y: Any) -> tuple[float, float]:
 def swing_foot_motion(model: Standing, y: Any) -> tuple[float, float, float, float]:
     """`swing_foot` and its rates (m/s)."""
     n = len(model.arm_x)
-    height, ahead, upward, apart = 0.0, 0.0, 0.0, 0.0
-    for k in range(n):
-        s, c = sine_cosine(y[k] + model.slope)
-        F, U = c * model.foot_x[k] - s * model.foot_y[k], s * model.foot_x[k] + c * model.foot_y[k]
-        height += U
-        ahead += F
-        upward += F * y[n + k]
-        apart -= U * y[n + k]
+    s, c = vector(model.arm_x), vector(model.arm_x)
+    sines_cosines(model, n, y, s, c)
+    ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, y[n : 2 * n])
     return height, ahead, upward, apart
 
 

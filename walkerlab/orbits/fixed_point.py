@@ -153,8 +153,7 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
 
     seed  of the random starting values
     """
-    misprinted = (walker.A_centrifugal != walker.A).any() or (walker.B_centrifugal != walker.B).any()
-    if walker.slope <= 0.0 and not misprinted:
+    if walker.slope <= 0.0 and walker.misprint == 0.0:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker, settings)
     generator = np.random.default_rng(seed)

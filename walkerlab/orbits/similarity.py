@@ -32,7 +32,7 @@ def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     length, mass = float(walker.leg_length), float(walker.mass)
     inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
     scales = {
-        **dict.fromkeys(("A", "B", "A_centrifugal", "B_centrifugal"), inertia),
+        **dict.fromkeys(("A", "B", "misprint"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
         **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
     }

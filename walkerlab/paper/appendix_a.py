@@ -182,9 +182,7 @@ def impact_jacobian(
 
 def as_printed(model: Standing) -> Standing:
     """A compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign that (A.5) prints."""
-    A = model.A.copy()
-    A[STANCE, SWING] *= -1.0
-    return model.changed(A_centrifugal=A)
+    return model.changed(misprint=-2.0 * model.A[STANCE, SWING])
 
 
 def assembled(walker: RigidWalker) -> Standing:

@@ -1,0 +1,47 @@
+"""Torques at hinges, for both models: what acts between two bodies by the angle between them and its rate.
+
+A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
+one forward; what it loses is (torque - elastic part) times the rate.
+"""
+
+from typing import Any, NamedTuple
+
+from walkerlab.kernels import by_type_or_default, inlined
+
+
+class HingeTorque(NamedTuple):
+    """Torque against the angle by which a body is ahead of another, and its derivatives."""
+
+    torque: float  # N m
+    elastic: float  # N m, the part that stores energy
+    by_angle: float  # N m
+    by_rate: float  # N m s
+
+
+@by_type_or_default
+def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
+    """Torque of a law at an angle (rad) and its rate: none of a law that acts in no time, such as an ideal lock."""
+    return HingeTorque(0.0, 0.0, 0.0, 0.0)
+
+
+@by_type_or_default
+def hinge_energy(law: Any, angle: float) -> float:
+    """Elastic energy (J) of a law at an angle (rad)."""
+    return 0.0
+
+
+@inlined
+def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
+    """Add a hinge's torques (N m) on both bodies to r (n,)."""
+    r[body] -= now.torque
+    r[other] += now.torque
+
+
+@inlined
+def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives of those torques by the angles and by their velocities to by_angle and by_rate (n, n)."""
+    for row, sign in ((other, 1.0), (body, -1.0)):
+        by_angle[row, body] += sign * now.by_angle
+        by_angle[row, other] -= sign * now.by_angle
+        by_rate[row, body] += sign * now.by_rate
+        by_rate[row, other] -= sign * now.by_rate

@@ -1,0 +1,113 @@
+"""The equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
+
+With the projections of the first moments c_k on the slope and its normal, F_k = (R(psi_k) c_k)_x and
+U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = theta_l - theta_k,
+
+    M_kl = A_kl cos Delta + B_kl sin Delta
+    r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
+
+the latter two terms about a root at rest. What the root's own motion adds is each model's: a rolling foot's in
+standing.py, Newton's law for the centre of mass in ground/motion.py.
+
+`tree` is the rigid model's Standing or a Form on compliant ground; n is how many bodies it has, known while compiling
+where the tree's type tells.
+"""
+
+from typing import Any
+
+from walkerlab.kernels import woven
+from walkerlab.mechanics.trigonometry import sine_cosine
+
+
+@woven
+def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
+    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""
+    for k in range(n):
+        s[k], c[k] = sine_cosine(theta[k] + tree.slope)
+
+
+@woven
+def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: Any) -> None:
+    """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
+    for k in range(n):
+        F[k] = c[k] * lever_x[k] - s[k] * lever_y[k]
+        U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
+
+
+@woven
+def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
+    """Where a point is from the root along the slope and over it (m), by its levers, and its rates (m/s)."""
+    along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]
+        along += forward
+        height += upward
+        along_rate -= upward * omega[k]
+        height_rate += forward * omega[k]
+    return along, height, along_rate, height_rate
+
+
+@woven
+def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
+    """Add the torques of gravity (N m) about a root at rest to r (n,); F and U of the first moments."""
+    for k in range(n):
+        r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
+
+
+@woven
+def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
+    """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
+    for k in range(n):
+        M[k, k] = tree.A[k, k]
+        for l in range(k):
+            A, B = tree.A[k, l], tree.B[k, l]
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            M[k, l] = A * cos_d + B * sin_d
+            M[l, k] = M[k, l]
+            turning = A * sin_d - B * cos_d
+            r[k] += omega[l] * omega[l] * turning
+            r[l] -= omega[k] * omega[k] * turning
+
+
+@woven
+def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> None:
+    """Add the derivatives of the torques of gravity with respect to the angles to by_angle (n, n)."""
+    for k in range(n):
+        by_angle[k, k] += tree.gravity_down * U[k] - tree.gravity_along * F[k]
+
+
+@woven
+def add_inertia_gradients(
+    tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
+) -> None:
+    """Add the derivatives of (centrifugal terms - M alpha) at fixed alpha by the angles and their velocities (n, n)."""
+    for k in range(n):
+        own = 0.0
+        for l in range(n):
+            A, B = tree.A[k, l], tree.B[k, l]
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            turning = A * sin_d - B * cos_d
+            between = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
+            own -= between
+            by_angle[k, l] += between
+            by_rate[k, l] += 2.0 * omega[l] * turning
+        by_angle[k, k] += own
+
+
+@woven
+def kinetic_energy(n: int, M: Any, omega: Any) -> float:
+    """Kinetic energy (J) of the bodies' turning, with a mass matrix M (n, n)."""
+    total = 0.0
+    for k in range(n):
+        for l in range(n):
+            total += M[k, l] * omega[k] * omega[l]
+    return 0.5 * total
+
+
+@woven
+def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: Any) -> float:
+    """Potential energy of gravity (J) with the root at a place along the slope and a height over it (m)."""
+    total = tree.mass * (tree.gravity_down * height - tree.gravity_along * along)
+    for k in range(n):
+        total += tree.gravity_down * U[k] - tree.gravity_along * F[k]
+    return total
