@@ -70,13 +70,13 @@ class WalkState(NamedTuple):
     sides: Any  # (event functions,) on which side of zero each event function is known to be
     at_zero: Any  # (event functions,) which event functions the last event left at zero
     times: Any  # (3,) see the indices below
-    feet: Any  # (2,) see the indices below
+    feet: Any  # (3,) see the indices below
 
 
 # indices into WalkState.times
 LAST_TOUCH, AIRBORNE_SINCE, NOW = 0, 1, 2
 # indices into WalkState.feet
-STANCE, STEPS = 0, 1
+STANCE, STEPS, PASSES_SWITCHING = 0, 1, 2  # the last: whether the step at hand may go past switching points
 
 
 @inlined
@@ -182,13 +182,10 @@ def earliest_crossing(
         if foot == system.form.hinged:
             continue
         first = foot * PER_FOOT
-        # a foot that an event left on the surface is inside or outside by rounding there
-        lowest = finder.values[first + HEIGHT, 0] if at_zero[first + HEIGHT] == 0 else 0.0
-        for j in range(1, finder.nodes.size):
-            lowest = min(lowest, finder.values[first + HEIGHT, j])
-        inside = has_ground[foot] != 0 and lowest < 0.0
+        # above the ground there is no force to switch: what a foot's law does after its touch is the next step's
+        inside = has_ground[foot] != 0 and sides[first + HEIGHT] < 0
         last = RELEASE
-        if inside and ground.frame.locate_switching:
+        if inside and ground.frame.locate_switching and walk_state.feet[PASSES_SWITCHING] == 0:
             last = FRICTION_SWITCHES + switching_count(system.friction)
         for index in range(first, first + last):
             if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):

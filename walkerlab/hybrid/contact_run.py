@@ -177,7 +177,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
         sides=sides,
         at_zero=at_zero,
         times=np.zeros(3),
-        feet=np.array([stance, 0]),
+        feet=np.array([stance, 0, 0]),
     )
 
 

@@ -9,6 +9,7 @@ from walkerlab.ground.walker import OF_STATES, OnGround, locked_knees
 from walkerlab.hybrid.contact_events import (
     AIRBORNE_SINCE,
     LAST_TOUCH,
+    PASSES_SWITCHING,
     PASSING,
     STEPS,
     Frame,
@@ -144,6 +145,12 @@ def walk_in_form(
                 rewinds += 1
                 rewind(method, system)
                 continue
+            if early and is_switching(found):
+                # its event function is not smooth there: the step may pass it over, but nothing else that is in it
+                walk_state.feet[PASSES_SWITCHING] = 1
+                arriving, refinements, rewinds, target = False, 0, 0, method.clock[T]
+                rewind(method, system)
+                continue
         elif arriving and method.clock[T] >= target:
             wait = time_to_zero(method, finder, event)
             happens = abs(wait) <= EVENT_TIME
@@ -155,6 +162,7 @@ def walk_in_form(
                 rewind(method, system)
                 continue
         rewinds = 0
+        walk_state.feet[PASSES_SWITCHING] = 0
         observe(observer, method, system, finder, walk_state)
         note_flexion(system.form, walk_state, method.y)
         outcome = judge(system, ground.frame, method.clock[T], walk_state)
