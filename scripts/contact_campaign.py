@@ -3,6 +3,7 @@
     python scripts/contact_campaign.py                 # 200 walks, seeds 0 to 199
     python scripts/contact_campaign.py --walks 6 --seed 3
     python scripts/contact_campaign.py --walker kneed  # every third of the 200 is
+    python scripts/contact_campaign.py --walker light  # feet that bounce: 0.02 to 0.4 times critical damping
 
 Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a hinged (`pinned`) first
 stance; ground into which the weight sinks by 1 um to 1 mm, with exponents from 1 to 3 and 0.05 to 3 times critical
@@ -17,7 +18,7 @@ of the plain integration (tests/hybrid/plain_walk.py), which is what halving its
 at the config's tolerances, and at a hundred and ten thousand times tighter ones. The error of the first is its change
 to the second. Of the others it is the smallest change between any two of the three: otherwise a fault that comes and
 goes with the tolerance would vouch for itself. Prints a table in Markdown (of the tightest walks), how much the default
-tolerances err, and how well the energy balances; exits 1 if a walk differs.
+tolerances err, how well the energy balances, and which walk took most work; exits 1 if a walk differs.
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ TERRAINS = {
     "after-mid-swing": plain_walk.AFTER_MID_SWING,
     "plane": plain_walk.PLANE,
 }
+RATIOS = (0.05, 0.3, 1.0, 3.0)  # of damping to critical damping
+LIGHT = (0.02, 0.04, 0.07, 0.12, 0.2, 0.3, 0.4)  # of feet that bounce
 SINKS_MM = (0.001, 0.01, 0.06, 0.06, 0.2, 1.0)  # static penetrations
 # of every nine seeds: knees on ground that is damped far above critically from the first touch on, and so lets a foot
 # go while it is still inside; the instant of its lift is hard to hit there
@@ -113,6 +116,7 @@ class Compared:
     judged: tuple[Judged, ...]
     kept: float  # how much the steps' times and the end change from the default tolerance to the next, s
     residuals: tuple[float, ...]  # of our walks' energy balances, over rtol times energy and work exchanged
+    evaluations: int  # of the right-hand side, at the default tolerances
 
     @property
     def wrong(self) -> list[str]:
@@ -121,7 +125,7 @@ class Compared:
         return ends + [f"{name} at {one.tighter:g}" for one in self.judged for name in one.wrong]
 
 
-def compass(seed: int) -> Drawn:
+def compass(seed: int, ratios: tuple[float, ...] = RATIOS) -> Drawn:
     """The paper's walker, changed."""
     die = random.Random(seed)
     slope = die.choice((0.3, 0.7, 1.0, 1.0, 2.0, 2.8, 4.0))
@@ -129,7 +133,7 @@ def compass(seed: int) -> Drawn:
     # by how much a foot sinks in, so that every exponent gets a ground to walk on
     depth_mm = die.choice(SINKS_MM)
     stiffness = 196.0 / depth_mm**exponent
-    ratio = die.choice((0.05, 0.3, 1.0, 3.0))
+    ratio = die.choice(ratios)
     damping = 2.0 * ratio * (exponent * 196.0 / depth_mm * 20.0 / 1000.0) ** 0.5
     static = die.choice((0.9, 0.9, 0.9, 0.3, 0.05, 3.0))
     stiction = die.choice((20.0, 100.0, 100.0, 500.0))
@@ -159,14 +163,14 @@ def compass(seed: int) -> Drawn:
     return Drawn("paper", sets, start)
 
 
-def kneed(seed: int) -> Drawn:
+def kneed(seed: int, ratios: tuple[float, ...] = RATIOS[1:]) -> Drawn:
     """A walker with knees of drawn limbs, on ground that carries its weight alike."""
     die = random.Random(seed)
     thigh, shank, hip = die.uniform(0.3, 0.8), die.uniform(0.03, 0.2), die.uniform(0.2, 1.0)
     weight = 9.81 * (2.0 * (thigh + shank) + hip)
-    exponent, depth_mm, ratio = die.choice((1.0, 1.5, 2.2, 2.2)), die.choice(SINKS_MM[1:]), die.choice((0.3, 1.0, 3.0))
+    exponent, depth_mm, ratio = die.choice((1.0, 1.5, 2.2, 2.2)), die.choice(SINKS_MM[1:]), die.choice(ratios)
     full = depth_mm
-    if seed % 9 in LOSSY:
+    if seed % 9 in LOSSY and ratios is not LIGHT:
         ratio, depth_mm, full = 7.0, 0.3, 0.05
     damping = 2.0 * ratio * (exponent * weight / depth_mm * weight / 9.81 / 1000.0) ** 0.5
     static, stiction = die.choice((0.9, 0.9, 0.9, 0.3)), die.choice((10.0, 10.0, 100.0))
@@ -203,7 +207,12 @@ def both(seed: int) -> Drawn:
     return kneed(seed) if seed % 3 == 2 else compass(seed)
 
 
-WALKERS = {"both": both, "compass": compass, "kneed": kneed}
+def light(seed: int) -> Drawn:
+    """The same on ground that is lightly damped, where feet bounce and the clipped force lets go again and again."""
+    return kneed(seed, LIGHT) if seed % 3 == 2 else compass(seed, LIGHT)
+
+
+WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light}
 
 
 def plain_scene(config: Config, pitch_m: float) -> plain_walk.Plain:
@@ -317,7 +326,15 @@ def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
         error = {name: own[name] + plain_error[name] + floor[name] for name in UNITS}
         judged.append(Judged(tighter, walk.outcome.label, apart(one, expected), error))
     residuals = tuple(UNEXPLAINED * walk.energy_balance_residual_J / walk.explained_residual_J for walk in walks)
-    return Compared(drawn, Outcome(fine.outcome).label, fine.times.size, tuple(judged), first["times (s)"], residuals)
+    return Compared(
+        drawn,
+        Outcome(fine.outcome).label,
+        fine.times.size,
+        tuple(judged),
+        first["times (s)"],
+        residuals,
+        walks[0].work[0],
+    )
 
 
 def apart(one: Quantities, other: Quantities) -> dict[str, float]:
@@ -374,6 +391,8 @@ def main() -> None:
     print(f"\n{len(found)} walks: {ends}; {len(wrong)} differ")
     grounds = Counter(one.drawn.ground for one in found)
     print("; ".join(f"{count} {ground}" for ground, count in sorted(grounds.items())))
+    (seed, _), most = max(zip(walks_of(chosen), found, strict=True), key=lambda pair: pair[1].evaluations)
+    print(f"most work: seed {seed}, {most.evaluations} right-hand sides in {most.steps} steps and how it ended")
     right = [one for one in found if not one.wrong]
     if right:
         tell_spreads(right)

@@ -35,12 +35,47 @@ LETS_GO = (
 )  # fmt: skip
 
 
-def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE):
+# lightly damped feet that bounce, and how and when their walks end by a plain integration
+STICKING_STRAIGHT = {
+    "leg_length_m": 0.54769, "leg_mass_kg": 1.8689, "leg_mass_below_hip_m": 0.27905, "leg_inertia_kg_m2": 0.0056486,
+    "hip_mass_kg": 0.0, "foot_radius_m": 0.18666,
+}  # fmt: skip
+BOUNCING_FEET = {
+    "compass": (
+        None,
+        ("slope_deg=1", "contact.terrain=plane", "contact.stiffness=1e7", "contact.damping=5",
+         "contact.full_damping_penetration=.35", "contact.stiction_velocity=30", "contact.friction_velocity=220"),
+        ("fell", 0, 1.124423),
+    ),
+    "kneed": (
+        Path("kneed"), ("contact.stiffness=1e6", "contact.damping=0.3"), ("lifted-off", 1, 0.645038607),
+    ),
+    "straight-legs": (
+        None,
+        (f"walker={{type: straight-legs, {', '.join(f'{key}: {value}' for key, value in STICKING_STRAIGHT.items())}}}",
+         "slope_deg=1.1808", "gravity_m_s2=11.607", "contact.stiffness=3010400", "contact.exponent=2.0068",
+         "contact.damping=0.99795", "contact.full_damping_penetration=0.093905", "contact.static_friction=0.92471",
+         "contact.dynamic_friction=0.90164", "contact.stiction_velocity=39.249", "contact.friction_velocity=620.59",
+         "contact.terrain=plane"),
+        ("fell", 0, 0.669021),
+    ),
+}  # fmt: skip
+# a foot whose law's force lets go, grips again just below the surface and lifts, on an exponent below two
+GRIPS_AGAIN = (
+    "walker={type: straight-legs, leg_length_m: 1.0341, leg_mass_kg: 6.7135, leg_mass_below_hip_m: 0.32298, "
+    "leg_inertia_kg_m2: 0.017306, hip_mass_kg: 0.0, foot_radius_m: 0.44521}",
+    "slope_deg=1.6438", "gravity_m_s2=9.268", "contact.stiffness=133000", "contact.exponent=1.9076",
+    "contact.damping=2.254", "contact.full_damping_penetration=0.077053", "contact.static_friction=1.1527",
+    "contact.dynamic_friction=1.0395", "contact.stiction_velocity=26.758", "contact.friction_velocity=229.6",
+)  # fmt: skip
+GRIPS_AGAIN_START = (-0.3128194902392747, 0.2554400457507091, -0.8426534582609259, -1.284466381888272)
+
+
+def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE, method="radau5", start=None):
     config = load(base, sets).config
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     scene = contact_scene(config, gait.step_length)
-    start = start_state(scene, gait.state)
-    return scene.walk(start, steps, settings(tolerance))
+    return scene.walk(start_state(scene, start or gait.state), steps, settings(tolerance, method))
 
 
 @pytest.mark.parametrize(
@@ -79,6 +114,25 @@ def test_a_lift_at_the_instant_at_which_the_force_law_lets_go_is_noticed_at_once
         walk = from_the_gait(*LETS_GO, steps=8, base=Path("kneed"), tolerance=tolerance)
         # a solver's error of some times the tolerance, at the velocities of some m/s
         np.testing.assert_allclose(walk.slip_m, exact.slip_m, atol=10.0 * tolerance)
+
+
+@pytest.mark.parametrize("method", ["radau5", "dop853"])
+@pytest.mark.parametrize("name", BOUNCING_FEET)
+def test_feet_that_bounce_do_not_stick_where_the_force_law_lets_go(name, method):
+    base, sets, expected = BOUNCING_FEET[name]
+    for tolerance in (1e-6, 1e-9):
+        walk = from_the_gait(*sets, steps=6, base=base, tolerance=tolerance, method=method)
+        assert (walk.outcome.label, walk.steps) == expected[:2]
+        assert walk.end_time_s == pytest.approx(
+            expected[2], abs=max(500.0 * tolerance, 1e-6)
+        )  # each bounce magnifies what came before
+        assert walk.work.rhs_evaluations < 400_000
+
+
+def test_a_lift_behind_a_switching_point_that_cannot_be_located_is_noticed_at_once():
+    for method, tolerance in (("radau5", 1e-7), ("radau5", 1e-8), ("dop853", 1e-8)):
+        walk = from_the_gait(*GRIPS_AGAIN, steps=8, tolerance=tolerance, method=method, start=GRIPS_AGAIN_START)
+        assert walk.slip_m == pytest.approx([0.0008590980], abs=2e-9)
 
 
 def test_a_signal_that_starts_on_its_zero_leaves_its_side_at_once():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.kernels import by_reference, inlined, vector, woven
+from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.tree import lever_motion
 from walkerlab.solvers.system import State

@@ -59,6 +59,9 @@ USUAL = "a hundred times tighter tolerances"
 ERRORS = {
     "step_period_s": ("in a period", "s"),
     "step_length_m": ("in a length", "m"),
+    "slip_m": ("in a slip", "m"),
+    "rolling_m": ("in a rolling", "m"),
+    "knee_strike_time_s": ("in the time of a knee strike", "s"),
     "end_time_s": ("at the end", "s"),
 }
 """What `numerical_error` is of, in words, and its unit."""

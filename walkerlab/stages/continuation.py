@@ -54,7 +54,7 @@ from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
-from walkerlab.stages.numerical_error import OF_EACH_STEP, SAMPLE, USUAL, evenly_spread, tightened
+from walkerlab.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import trajectory_group
 from walkerlab.stages.walk import only_at
@@ -82,6 +82,7 @@ TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 EVERY = 3  # which samples are kept beside those at heel strikes
 
+OF_A_GAIT = ("step_period_s", "step_length_m")  # what a family's numerical error is told of
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
 STANCE = Label("rad", "stance leg just after each heel strike", name="stance_angle")
@@ -562,7 +563,7 @@ def sample_again(followed: Followed) -> dict[str, Any] | None:
         if steps is not None
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
-    largest = dict(zip(OF_EACH_STEP, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
+    largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
     return {**counts, **largest, **({} if by == USUAL else {"by": by})}
 
 

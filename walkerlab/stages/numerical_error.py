@@ -14,7 +14,13 @@ MORE_WORK: Final = 10  # that tighter tolerances may take
 SAMPLE: Final = 16  # of many walks, so many are taken again
 USUAL: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # of a tolerance that was divided
-OF_EACH_STEP: Final = {"step_period_s": "step_periods_s", "step_length_m": "step_lengths_m"}
+OF_EACH_STEP: Final = {
+    "step_period_s": "step_periods_s",
+    "step_length_m": "step_lengths_m",
+    "slip_m": "slips_m",
+    "rolling_m": "rolling_m",
+    "knee_strike_time_s": "knee_strike_times_s",
+}
 """Largest change of a number of the steps: its key, and the key of that number in a walk's summary."""
 
 Summary = Mapping[str, Any]
@@ -23,12 +29,12 @@ Summary = Mapping[str, Any]
 def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
     """How much a walk's numbers change when it is walked again, at a hundred times tighter tolerances if there are any.
 
-    walked      summary of the walk: its `outcome`, `steps`, `step_periods_s`, `step_lengths_m` and `end_time_s`
+    walked      summary of the walk: its `outcome`, `steps`, `end_time_s`, and what its steps have of `OF_EACH_STEP`
     tolerances  that it was walked with
     walk        the same walk with others, as its summary
 
-    Returns the largest changes `step_period_s` (s) and `step_length_m` (m) if it took a step, and `end_time_s` (s);
-    `by` tells what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
+    Returns the largest changes of what its steps have, by the keys of `OF_EACH_STEP`, and `end_time_s` (s); `by` tells
+    what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
     """
     tighter, by = tightened(tolerances)
     return change(walked, walk(tighter), by)
@@ -53,11 +59,12 @@ def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     if (walked["outcome"], walked["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
-    changes = {
-        name: float(np.max(np.abs(np.subtract(walked[key], again[key]))))
-        for name, key in OF_EACH_STEP.items()
-        if walked["steps"]
-    }
+    changes = {}
+    for name, key in OF_EACH_STEP.items():
+        both = zip(walked.get(key) or (), again.get(key) or (), strict=False)  # a last foot may not have lifted in one
+        apart = [abs(one - other) for one, other in both if one is not None and other is not None]
+        if apart and any(walked[key]):  # points do not roll
+            changes[name] = max(apart)
     changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
     return changes if by == USUAL else {**changes, "by": by}
 

@@ -128,12 +128,14 @@ def steps(results: Results) -> Section | None:
     return Section("steps", "Step by step", tuple(blocks), words("walks.periods", periods))
 
 
-NUMBERS_OF_STEPS = {"step_periods_s": "step_period_s", "step_lengths_m": "step_length_m"}
-"""Numbers of each step, and under which key of `numerical_error` their error is."""
+NUMBERS_OF_STEPS = {
+    "step_periods_s": ("step_period_s", 1.0), "step_lengths_m": ("step_length_m", 1.0), "slips_m": ("slip_m", 1e3)
+}  # fmt: skip
+"""Numbers of each step: under which key of `numerical_error` their error is, and the factor that shows them in mm."""
 
 
 def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
     """A number of a step with the decimals that its numerical error leaves; a slip in mm."""
-    if key not in NUMBERS_OF_STEPS:
-        return fixed(None if value is None else 1e3 * value, 3)
-    return fixed(value, decimals_left((summary.get("numerical_error") or {}).get(NUMBERS_OF_STEPS[key])))
+    name, factor = NUMBERS_OF_STEPS[key]
+    error = (summary.get("numerical_error") or {}).get(name)
+    return fixed(value and factor * value, decimals_left(error and factor * error))
