@@ -79,6 +79,44 @@ def test_theta_1_is_replaced_so_that_both_feet_stand_on_the_slope(loaded: Loaded
     assert re.search(r"mine\.yaml:2:8: start: theta_1 moved from 0\.5 to -0\.2398", result.warnings[0])
 
 
+def test_what_follows_others_in_a_start_follows_them_at_their_rates_and_this_is_said(loaded: Loaded) -> None:
+    result = loaded("extends: torso\nslope_deg: 1\nstart: [0.5, 0.17, -0.2, -0.6, -0.8, 0.4]\n")
+    swing = -2 * math.radians(1) - 0.17
+    assert list(result.config.start) == pytest.approx([swing, 0.17, -math.radians(1), -0.6, -0.8, -0.7], abs=1e-15)
+    said = [re.search(r"start: (\w+) moved from \S+ to \S+ (\S+),", line) for line in result.warnings]
+    assert [one.groups() for one in said if one] == [
+        ("theta_1", "rad"), ("theta_torso", "rad"), ("dtheta_torso", "rad/s")
+    ]  # fmt: skip
+
+
+def test_a_start_with_knees_has_its_swing_leg_straight_and_this_is_said(loaded: Loaded) -> None:
+    result = loaded("extends: kneed\nstart: [-0.28, 0.19, -0.4, -0.05, -1.1, -0.3]\n")
+    assert result.config.start[2] == result.config.start[0]
+    assert result.config.start[5] == -0.3  # the knee is free
+    assert "theta_1_shank moved from -0.4" in result.warnings[-1]
+
+
+PARTS = """walker:
+  type: parts
+  leg_length_m: 1
+  bodies:
+    - {name: leg 1, mass_kg: 5, centre_m: [0, -0.5]}
+    - {name: leg 2, mass_kg: 5, centre_m: [0, -0.5]}
+    - {name: trunk, mass_kg: 10, centre_m: [0, 0.3]}
+  hinges:
+    - {parent: leg 2, parent_point_m: [0, 0], child: leg 1, child_point_m: [0, 0]}
+    - {parent: leg 2, parent_point_m: [0, 0], child: trunk, child_point_m: [0, 0]}
+  feet: [{body: leg 1, centre_m: [0, -1]}, {body: leg 2, centre_m: [0, -1]}]
+  couplings: [{body: trunk, of: [leg 1, leg 2], weights: [0.25, 0.75]}]
+  legs: [[leg 1], [leg 2]]
+"""
+
+
+def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> None:
+    start = loaded(PARTS + "start: [-0.2, 0.2, 0.5, -0.4, -0.8, 0.5]\n").config.start
+    assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
+
+
 def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Loaded) -> None:
     assert loaded("start: [-0.2022, 0.1674, -0.60, -0.84]\n").warnings == ()
 

@@ -16,7 +16,7 @@ from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_va
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
-from walkerlab.config.walkers import Kneed, PartsWalker
+from walkerlab.config.walkers import Kneed, PartsWalker, followers
 
 Location: TypeAlias = tuple[int | str, ...]
 
@@ -72,25 +72,32 @@ def typed(tree: Mapping) -> Config:
 
 
 def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
-    """`config` with theta_1 of its start such that both feet stand on the slope, theta_1 + theta_2 = -2 phi.
+    """`config` with a start that its constraints allow, and what was moved for that, in words.
 
-    A start of legs with knees has both straight; a torso is on their bisector. With it what was moved, in words.
+    Both feet stand on the slope, theta_1 + theta_2 = -2 phi; legs with knees are straight; what follows other bodies,
+    such as a torso on the legs' bisector, does so at their rates, too. Of parts only the latter is known here.
     """
-    if isinstance(config.start, str) or isinstance(config.walker, PartsWalker):
+    if isinstance(config.start, str):
         return config, ()
-    given, stance, *others = config.start
-    swing = -2 * (config.slope_rad + config.walker.lean_rad) - stance
-    bodies = len(config.start) // 2
-    shank = (swing,) if isinstance(config.walker, Kneed) else ()
-    torso = (0.5 * (swing + stance),) if config.walker.torso is not None else ()
-    placed = config.model_copy(update={"start": (swing, stance, *shank, *torso, *others[bodies - 2 :])})
-    if abs(swing - given) <= MOVED_RAD:
-        return placed, ()
-    moved = (
-        f"{tree.entries['start'].position}: start: theta_1 moved from {short(given)} to {short(swing)} rad, "
-        f"so that both feet stand on the slope of {short(config.slope_rad)} rad"
-    )
-    return placed, (moved,)
+    walker, start = config.walker, list(config.start)
+    bodies, why = len(start) // 2, {}
+    if not isinstance(walker, PartsWalker):
+        start[0] = -2 * (config.slope_rad + walker.lean_rad) - start[1]
+        why[0] = "theta_1", f"so that both feet stand on the slope of {short(config.slope_rad)} rad"
+    if isinstance(walker, Kneed):
+        start[2] = start[0]
+        why[2] = "theta_1_shank", "so that the leg is straight"
+    for place, (name, of) in followers(walker).items():
+        for first, theta in ((0, "theta"), (bodies, "dtheta")):
+            start[first + place] = sum(weight * start[first + other] for other, weight in of.items())
+            why[first + place] = f"{theta}_{name.split()[0]}", f"as the {name} follows other bodies"
+    moved = [
+        f"{tree.entries['start'].position}: start: {name} moved from {short(config.start[place])} to "
+        f"{short(start[place])} {'rad' if place < bodies else 'rad/s'}, {because}"
+        for place, (name, because) in why.items()
+        if abs(start[place] - config.start[place]) > MOVED_RAD
+    ]
+    return config.model_copy(update={"start": tuple(start)}), tuple(moved)
 
 
 def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:

@@ -368,6 +368,21 @@ def rigid_bodies(walker: Any) -> int:
     return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
+def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
+    """Angles of the rigid model's state that others give: by place, the body's name and the others' weights by place."""
+    found = {}
+    if isinstance(walker, PartsWalker):
+        swinging, stance = walker.legs
+        shared = [body.name for body in walker.bodies if body.name not in (*swinging, *stance)]
+        place = {name: k for k, name in enumerate((swinging[0], stance[0], *swinging[1:], *shared))}
+        place |= dict.fromkeys(stance, 1)
+        for one in walker.couplings:
+            found[place[one.body]] = one.body, {place[of]: w for of, w in zip(one.of, one.weights, strict=True)}
+    if walker.torso is not None:
+        found[rigid_bodies(walker) - 1] = "torso", {0: 0.5, 1: 0.5}
+    return found
+
+
 def is_plain_compass(walker: Any) -> bool:
     """Whether this is the walker of Appendix A."""
     return bool(walker.type == "compass" and walker.torso is None)
