@@ -73,7 +73,7 @@ def rule_for(name: str) -> Near | AsLarge | None:
 
 def of_values(old: Any, new: Any, name: str, looser: float = 1.0) -> Iterator[Difference]:
     """Between what JSON can hold; `looser` multiplies every tolerance."""
-    if rule_for(name) is None:
+    if rule_for(name) is None or (old is None and new is None):
         return
     if isinstance(old, dict) and isinstance(new, dict):
         yield from of_names(old, new, name)
@@ -142,7 +142,7 @@ def of_numbers(old: Any, new: Any, name: str, looser: float) -> Iterator[Differe
     rule, scale = rule_for(name), float(np.max(np.abs(old)))
     if isinstance(rule, AsLarge):
         sizes = [max(rule.floor, float(np.max(np.abs(values)))) for values in (old, new)]
-        share = math.log(max(sizes) / min(sizes)) / math.log(rule.factor * looser)
+        share = math.log(max(sizes) / min(sizes)) / math.log(rule.factor * max(1.0, looser))
         yield Difference(name, share, f"{np.max(np.abs(old)):.2g} and {np.max(np.abs(new)):.2g} at most")
     elif rule is not None:
         share = off / ((rule.absolute + rule.relative * scale) * looser)
