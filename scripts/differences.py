@@ -37,7 +37,7 @@ RULES: tuple[tuple[str, Near | AsLarge | None], ...] = (
     (r".*/(ordinary\[\d+\]|measures\[\d+\]/(value|limit)).*", None),
     # counts of work follow rounding where a step is only just accepted
     (r"rejected.*", Near(0.1, 20.0)),
-    (r".*(evaluations|accepted|jacobians|newton|solves|iterations).*|steps_tried|work", Near(0.02, 10.0)),
+    (r".*(evaluations|accepted|jacobians|newton|solves|iterations).*|steps_tried|work", Near(0.04, 10.0)),
     (r".*residual.*|.*drift.*|.*rounding.*|.*(step_)?error|.*numerical.*|.*agreement.*", AsLarge(30.0, 1e-8)),
     (r".*lyapunov.*|exponent|.*uncertainty.*|.*attractor.*|.*chaotic.*", Near(0.2, 0.05)),
     # a ratio to a force that goes through zero in a fall

@@ -126,15 +126,15 @@ def warm_work() -> dict[str, Callable[[], Callable[[], Any]]]:
 
     def contact_walk() -> Callable[[], Any]:
         trial = benchmark.contact_trial_of(benchmark.ONE_DEGREE)
-        return trial.prepare("radau5", 1e-7, benchmark.BUDGET)
+        return trial.prepare("radau5", 1e-5, benchmark.BUDGET)
 
     def ten_steps() -> Callable[[], Any]:
-        return benchmark.printed_trial().prepare("dop853", 1e-11, benchmark.BUDGET)
+        return benchmark.printed_trial().prepare("dop853", 1e-8, benchmark.BUDGET)
 
     ground = walkerlab.contact()
     return {
-        "ten rigid steps, dop853 at 1e-11": ten_steps,
-        "contact walk of 7 s, radau5 at 1e-7": contact_walk,
+        "ten rigid steps, dop853 at 1e-8": ten_steps,
+        "contact walk of 7 s, radau5 at 1e-5": contact_walk,
         "seed to gait": seed_to_gait,
         "find_gait, from Python": lambda: lambda: walkerlab.find_gait(slope_deg=1),
         "simulate, from Python": lambda: lambda: walkerlab.simulate(slope_deg=1),
