@@ -63,7 +63,9 @@ class Version:
     def sources_digest(self) -> str:
         """Digest (hex) of the package's sources and built-in configs, wherever they are installed."""
         asked = "import walkerlab, pathlib; print(pathlib.Path(walkerlab.__file__).parent)"
-        package = Path(subprocess.check_output([self.python, "-c", asked], text=True, env=self.environment()).strip())
+        # where no package lies: Python looks there first
+        there = {"cwd": tempfile.gettempdir(), "env": self.environment()}
+        package = Path(subprocess.check_output([self.python, "-c", asked], text=True, **there).strip())
         files = [*package.rglob("*.py"), *package.rglob("*.yaml"), *(package.parent / "configs").glob("*.yaml")]
         told = hashlib.sha256()
         for file in sorted(files):
