@@ -1,237 +1,343 @@
-"""Results of two versions of the package, held against each other: what a change of how it computes must not change.
+"""Hold this checkout against another version of the package: its answers, or with --speed what they take.
 
-    python scripts/compare_versions.py hold FOLDER              # with the version that this Python imports
-    python scripts/compare_versions.py compare OLD NEW          # two such folders; exits 1 if a number differs
+    python scripts/compare_versions.py --other CHECKOUT [--only PATTERN] [--jobs N] [--text] [--reference-results DIR]
+    python scripts/compare_versions.py --other CHECKOUT --speed [--rounds N]
 
-Some seventy commands are run, each as a process of its own: every built-in config and type of walker, terrain, law of
-friction, hinged and free stance, every outcome, gaits with multipliers, families, basins, adjustments. Kept are what
-`--json` prints, the exit code, and all stored numbers. Counts of work, drift and residuals at rounding, timings and
-chaotic values are exempt; every other quantity has its tolerance.
+The other version is a checkout beside this one (--other), or what another Python has installed (--python). Some ninety
+cases are asked of both, each command as a process of its own, each version with its own compiled code: every built-in
+config and type of walker, terrain, law of friction, hinged and free stance, many methods, every outcome, families,
+basins, adjustments, sweeps, and configs that are refused. Compared are exit codes, what `--json` prints, and every
+stored result: names, shapes, units, and values within the tolerances of scripts/differences.py. Left out are times,
+digests, versions and paths. It exits 1 if anything differs. With --reference-results the other version's answers are
+kept in a folder, and asked for once.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
-import numpy as np
+from differences import NEW, Difference, of_artifacts, of_names, of_values
+from version_speed import print_speed
 
+CHECKOUT = Path(__file__).resolve().parent.parent
 BUILT_IN = (
     "paper", "paper-as-printed", "slope-3deg", "contact-si", "sliding-feet", "rigid-only", "simplest", "round-feet",
     "kneed", "kneed-round-feet", "torso", "parts",
 )  # fmt: skip
-WITH_CONTACT = tuple(name for name in BUILT_IN if name not in ("rigid-only", "simplest"))
-SMALL_BASIN = ("basin.cells=[24, 24]",)
+WALKS = ("fixedpoint", "simulate", "contact-sim")
+RIGID = ("fixedpoint", "simulate")
+CONTACT = ("contact-sim",)
+RIGID_ALLOWED = 0.01  # of the tolerances: the rigid model is not stiff, and solved a thousand times more exactly
+SHOWN = 12  # differences of a case that are printed
 
-# command, config, keys that are set
-Case = tuple[str, str, tuple[str, ...]]
+
+@dataclass(frozen=True)
+class Version:
+    """A version of the package and how it is called."""
+
+    name: str
+    python: str
+    checkout: Path | None  # None: what its Python has installed
+    cache: Path
+
+    def environment(self) -> dict[str, str]:
+        """Of its processes."""
+        given = {**os.environ, "WALKERLAB_CACHE": str(self.cache), "COLUMNS": "100"}
+        return given | ({"PYTHONPATH": str(self.checkout)} if self.checkout else {})
+
+    def sources_digest(self) -> str:
+        """Digest (hex) of the package's sources and built-in configs, wherever they are installed."""
+        asked = "import walkerlab, pathlib; print(pathlib.Path(walkerlab.__file__).parent)"
+        # where no package lies: Python looks there first
+        there = {"cwd": tempfile.gettempdir(), "env": self.environment()}
+        package = Path(subprocess.check_output([self.python, "-c", asked], text=True, **there).strip())
+        files = [*package.rglob("*.py"), *package.rglob("*.yaml"), *(package.parent / "configs").glob("*.yaml")]
+        told = hashlib.sha256()
+        for file in sorted(files):
+            told.update(str(file.relative_to(package.parent)).encode() + b"\0" + file.read_bytes())
+        return told.hexdigest()
+
+
+@dataclass(frozen=True)
+class Case:
+    """A config with changes, and the commands that it is given in turn, in a folder of its own."""
+
+    commands: tuple[str, ...]
+    config: str
+    changes: tuple[str, ...] = ()
+    looser: float = 1.0  # factor on all tolerances
+
+    @property
+    def name(self) -> str:
+        """Its name, which a folder can have."""
+        changes = (re.sub(r"^[\w.]+\.", "", change) for change in self.changes)
+        return re.sub(r"[^\w.=@+-]+", "_", "@".join((self.commands[-1], self.config, *changes)))
+
+    def lines(self) -> Iterator[list[str]]:
+        """The commands as they are typed."""
+        changes = [part for change in self.changes for part in ("--set", change)]
+        for command in self.commands:
+            yield [*command.split(), "-c", self.config, *changes]
 
 
 def cases() -> Iterator[Case]:
-    """All that is compared."""
+    """All that is compared, what takes longest first."""
+    yield from long_cases()
     for name in BUILT_IN:
-        yield "fixedpoint", name, ()
-        yield "simulate", name, ()
-    for name in WITH_CONTACT:
-        yield "contact-sim", name, ()
-    for slope in (0.2, 3.0, 4.5, 8.0):
-        yield "fixedpoint", "paper", (f"slope_deg={slope}",)
-        yield "simulate", "paper", (f"slope_deg={slope}",)
-    yield "simulate", "paper", ("start=[-0.2, 0.165, -0.3, -0.3]",)
-    yield "simulate", "paper", ("start=[-0.2022, 0.1674, -0.6, -0.84]", "solver.rigid.method=radau5")
-    yield "simulate", "kneed", ("solver.rigid.method=scipy-dop853",)
-    yield "simulate", "simplest", ("slope_rad=0.0186", "strides=20")
+        yield Case((*WALKS, "compare"), name)
+    yield from rigid_cases()
+    yield from contact_cases()
+    yield from refused_cases()
+
+
+def long_cases() -> Iterator[Case]:
+    """Families, adjustments, basins, sweeps, extreme cases."""
+    yield Case(("stability",), "paper", (), 20.0)
+    yield Case(("tune",), "paper", ("tune.cells=15",))
+    yield Case(("tune",), "kneed", ("tune.cells=5",), 10.0)
+    yield family("paper", "slope_deg", 0.5, 4.6, "continuation.periods=2")
+    yield family("paper-as-printed", "slope_deg", 1.0, 3.0, "continuation.periods=1")
+    yield family("simplest", "slope_rad", 0.004, 0.0165, "continuation.periods=2")
+    yield family("kneed", "walker.hip_mass_kg", 0.4, 0.7, "continuation.periods=1")
+    yield family("torso", "walker.torso.mass_kg", 3.0, 8.0, "continuation.periods=1")
+    yield family("round-feet", "walker.foot_radius_m", 0.1, 0.14, "continuation.periods=1")
+    yield family("parts", "slope_rad", 0.04, 0.06, "continuation.periods=1")
+    yield family("slope-3deg", "slope_deg", 2.5, 3.5, "continuation.periods=1", "continuation.model=both")
+    yield family("paper", "contact.stiffness", 8e4, 1.2e5, "continuation.periods=1", "continuation.model=contact")
+    second = ("continuation.second={over: walker.hip_mass_kg, from: 9.0, to: 11.0}", "continuation.periods=1")
+    yield family("paper", "slope_deg", 4.0, 5.0, *second)
+    for name in ("paper", "simplest", "kneed", "round-feet"):
+        yield Case(("basin",), name, ("basin.cells=[60, 60]", "basin.refine=2"))
+    yield Case(("basin",), "paper", ("basin.plane=[theta_2, dtheta_1, dtheta_2]", "basin.cells=[10, 10, 10]"))
+    yield Case(("basin",), "slope-3deg", ("basin.model=contact", "basin.cells=[6, 6]", "basin.refine=1"))
+    yield Case(("sweep --over slope_deg=0.5:3:4 --stage fixedpoint",), "paper")
+    yield Case(("sweep --over contact.stiction_velocity=[50,100] --stage contact-sim",), "paper")
+
+
+def family(config: str, over: str, first: float, last: float, *changes: str) -> Case:
+    """A family of gaits over a span of a key."""
+    span = (f"continuation.over={over}", f"continuation.from={first}", f"continuation.to={last}")
+    return Case(("continuation",), config, (*span, "continuation.points=60", *changes))
+
+
+def rigid_cases() -> Iterator[Case]:
+    """Gaits and walks of the rigid model; steep slopes, starts that fall, walkers and methods of all kinds."""
+    for slope in (0.2, 4.5, 8.0, 40.0):
+        yield Case(RIGID, "paper", (f"slope_deg={slope}",))
+    yield Case(("fixedpoint",), "kneed", ("slope_deg=12",))
+    yield Case(RIGID, "torso", ("equations=as-printed",))
+    yield Case(RIGID, "paper", ("equations=as-printed", "seed=3", "outputs=[states]"))
+    for start in ("[-0.2, 0.165, -0.3, -0.3]", "[-0.2, 0.165, -3.0, -3.0]", "[-0.3, 0.27, -0.6, -5.0]"):
+        yield Case(("simulate", "contact-sim"), "paper", (f"start={start}",))
+    bent = "start=[-0.289, 0.1882, -0.289, -0.0457, -0.8877, -0.0457]"
+    yield Case(("simulate", "contact-sim"), "kneed", (bent,))
+    for method in ("radau5", "scipy-dop853", "scipy-lsoda"):
+        yield Case(("simulate",), "paper", (f"solver.rigid.method={method}", "strides=2"))
+    yield Case(("simulate",), "kneed", ("solver.rigid.method=radau5",))
+    yield Case(("simulate",), "paper", ("solver.rigid.rtol=1e-6", "solver.rigid.atol=1e-8", "strides=30"))
+    yield Case(("simulate",), "simplest", ("slope_rad=0.0186", "strides=8"), 1e4)  # chaotic
+
+
+def contact_cases() -> Iterator[Case]:
+    """Walks of the contact model: walkers, knees, terrains, stances, laws, methods, outcomes."""
     for terrain in ("checkerboard", "after-mid-swing", "plane"):
         for stance in ("free", "pinned"):
-            yield "contact-sim", "paper", (f"contact.terrain={terrain}", f"contact.stance={stance}")
-            yield "contact-sim", "slope-3deg", (f"contact.terrain={terrain}", f"contact.stance={stance}")
-    yield "contact-sim", "kneed", ("contact.stance=pinned",)
-    yield "contact-sim", "kneed", ("walker.knee.release=touch",)
-    yield "contact-sim", "kneed", ("walker.knee.lock=compliant",)
-    yield "contact-sim", "kneed", ("contact.terrain=after-mid-swing",)
-    yield "contact-sim", "round-feet", ("contact.terrain=after-mid-swing", "contact.friction=none")
-    yield "contact-sim", "paper", ("contact.friction=none",)
-    yield "contact-sim", "paper", ("contact.pad_pitch=own", "strides=10")
-    yield "contact-sim", "paper", ("strides=8",)
-    yield "contact-sim", "paper", ("contact.static_friction=0.3", "contact.dynamic_friction=0.2")
-    yield "contact-sim", "paper", ("start=[-0.2021, 0.1670, -1.02, -3.20]",)
-    yield "contact-sim", "paper", ("contact.stiffness=1.0e7", "contact.damping=9000", "strides=2")
-    yield "contact-sim", "paper", ("solver.contact.method=dop853", "strides=2")
-    yield "contact-sim", "paper", ("solver.contact.method=scipy-radau", "strides=1")
-    yield "compare", "paper", ()
-    yield "tune", "paper", ()
-    yield "tune", "kneed", ()
-    yield "continuation", "paper", span("slope_deg", 0.5, 5.0)
-    yield "continuation", "simplest", span("slope_rad", 0.004, 0.0185)
-    yield "continuation", "kneed", span("walker.hip_mass_kg", 0.4, 0.7)
-    yield "basin", "paper", SMALL_BASIN
-    yield "basin", "slope-3deg", SMALL_BASIN
-    yield "basin", "simplest", SMALL_BASIN
+            yield Case(CONTACT, "slope-3deg", (f"contact.terrain={terrain}", f"contact.stance={stance}"))
+    for changes in (
+        ("contact.friction=none",),
+        ("contact.pad_pitch=own", "strides=10"),
+        ("contact.static_friction=0.3", "contact.dynamic_friction=0.2"),
+        ("contact.static_friction=0.1", "contact.dynamic_friction=0.1"),
+        ("contact.stiffness=1.0e7", "contact.damping=9000", "strides=2"),
+        ("walker.foot_radius_m=0", "walker.leg_inertia_kg_m2=0.2"),
+        ("solver.contact.method=scipy-radau", "strides=1"),
+        ("slope_deg=8",),
+    ):
+        yield Case(CONTACT, "paper", changes)
+    # at its limit of stability an explicit method is as exact as its tolerance, not better
+    yield Case(CONTACT, "paper", ("solver.contact.method=dop853", "strides=1"), 100.0)
+    yield Case(CONTACT, "paper", ("solver.contact.rtol=1e-4", "solver.contact.atol=1e-6"), 100.0)
+    for knee in ("lock=compliant", "at_heel_strike=free", "release=touch"):
+        yield Case(WALKS, "kneed", (f"walker.knee.{knee}",))
+    yield Case(CONTACT, "kneed", ("walker.knee.lock=compliant", "contact.stance=pinned"), 10.0)
+    yield Case(CONTACT, "kneed", ("contact.stance=pinned", "contact.terrain=after-mid-swing"))
+    yield Case(WALKS, "kneed", ("walker.torso={mass_kg: 0.2, above_hip_m: 0.1}",))
+    yield Case(WALKS, "kneed", ("slope_rad=0.07", "walker.shank.mass_ahead_m=0.002"))
+    yield Case(CONTACT, "contact-si", ("contact.exponent=1.3", "contact.stiffness=1.0e6", "contact.damping=3000"))
+    yield Case(WALKS, "parts", ("walker.knee={lock: compliant}", "slope_rad=0.055"))
+    yield Case(CONTACT, "round-feet", ("contact.terrain=after-mid-swing", "contact.friction=none"))
+    yield Case(WALKS, "round-feet", ("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}",))
+    yield Case(WALKS, "round-feet", ("walker.leg_mass_ahead_m=0.001", "walker.foot_centre_ahead_m=0.005"))
 
 
-def span(over: str, first: float, last: float) -> tuple[str, ...]:
-    """A family's parameter and its values."""
-    return (f"continuation.over={over}", f"continuation.from={first}", f"continuation.to={last}")
+def refused_cases() -> Iterator[Case]:
+    """Questions without an answer: refused configs, walkers without a gait."""
+    for changes in (
+        ("walker.leg_masss_kg=3",), ("walker.leg_mass_kg=-3",), ("slope_deg=1", "slope_rad=0.1"),
+        ("contact.terrain=grass",), ("start=[1, 2]",), ("solver.contact.method=radau6",), ("strides=0",),
+    ):  # fmt: skip
+        yield Case(("simulate",), "paper", changes)
+    yield Case((*WALKS, "tune", "compare"), "paper", ("slope_deg=0",))
+    yield Case(RIGID, "paper", ("slope_deg=-1",))
+    yield Case(("fixedpoint",), "no-such-config")
+    yield Case(("tune",), "simplest")
+    yield Case(("continuation",), "paper", ("continuation.over=walker.knees",))
+    yield Case(("basin",), "paper", ("slope_deg=40", "basin.cells=[4, 4]"))
+    yield Case(("sweep --over slope_deg=0:1:2 --stage simulate",), "paper")
 
 
-# What a name's last part is compared by: the first row that fits. None: exempt.
-TOLERANCES: tuple[tuple[str, tuple[float, float] | None], ...] = (
-    # counts of work, and what is rounding or wall clock by nature
-    (r".*(evaluations|accepted|rejected|jacobians|newton|solves).*|work|steps_tried|trajectories_per_s", None),
-    (r".*residual.*|.*drift.*|.*wall.*|.*(_per_s|seconds)$|.*cpu.*|iterations|rounding|spent.*|.*saves.*", None),
-    (r"lyapunov.*|exponent_uncertainty|uncertainty|.*attractor.*|chaotic.*", None),
-    (r"numerical_error.*|.*step_error.*|.*objective.*", None),
-    # multipliers come of a derivative: a digit or two fewer than the gait
-    (r".*multiplier.*|.*radius.*|.*eigen.*|stable_range|value", (1e-6, 1e-7)),
-    (r".*force.*|.*dissipat.*|.*power.*|.*work_J", (1e-4, 1e-4)),
-    (r".*slip.*|.*rolling.*|.*penetration.*|.*velocity.*|.*rate.*", (1e-5, 1e-6)),
-    (r".*", (1e-6, 2e-7)),
-)
-NOT_COMPARED = {
-    "run_dir", "artifact", "reused", "wall_s", "stages", "left_out", "command", "created", "versions", "platform",
-    "commit",
-}  # fmt: skip
+def answers_of(version: Version, case: Case, folder: Path, text: bool) -> dict[str, Any]:
+    """What a version answers to each command of a case, asked in a folder unless the answers are there already."""
+    asked, kept = [*case.lines(), str(text)], folder / "answers.json"
+    if kept.exists():
+        told: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+        if told["asked"] == asked:
+            return dict(told["answers"])
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    answers = {}
+    for line in case.lines():
+        command = [version.python, "-m", "walkerlab", *line, "--runs", "runs", "--jobs", "1", "-q"]
+        answers[line[0]] = answer(version, [*command, "--json"], folder)
+        if text:
+            answers[as_text(line[0])] = answer(version, command, folder)
+    kept.write_text(json.dumps({"asked": asked, "answers": answers}), encoding="utf-8")
+    return answers
 
 
-def tolerance(name: str) -> tuple[float, float] | None:
-    """Relative and absolute tolerance of a quantity; None if it is exempt."""
-    return next(allowed for pattern, allowed in TOLERANCES if re.fullmatch(pattern, name))
+def answer(version: Version, command: list[str], folder: Path) -> dict[str, Any]:
+    """The exit code and what is printed, without the folder's name; JSON is taken apart."""
+    done = subprocess.run(command, capture_output=True, text=True, env=version.environment(), cwd=folder)
+    said = [text.replace(str(folder), "FOLDER") for text in (done.stdout, done.stderr)]
+    if "--json" in command and said[0].startswith("{"):
+        return {"exit": done.returncode, "json": json.loads(said[0])}
+    if version.checkout:
+        said = [text.replace(str(version.checkout), "CHECKOUT") for text in said]
+    return {"exit": done.returncode, "stdout": said[0], "stderr": said[1]}
 
 
-def folder_of(case: Case) -> str:
-    """A name for a case that a folder can have."""
-    stage, config, sets = case
-    return re.sub(r"[^\w.=@+-]+", "_", "@".join((stage, config, *sets)))
+def as_text(command: str) -> str:
+    """What the answer of a command without `--json` is called."""
+    return f"{command}, as text"
 
 
-def hold(folder: Path, wanted: str) -> None:
-    """Run all cases and keep what they say."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for case in cases():
-        stage, config, sets = case
-        kept = folder / f"{folder_of(case)}.json"
-        if kept.exists() or not re.search(wanted, kept.stem):
-            continue
-        options = [part for each in sets for part in ("--set", each)]
-        command = [sys.executable, "-m", "walkerlab", stage, "-c", config, *options, "--runs", str(folder / "runs")]
-        done = subprocess.run([*command, "--json", "-q"], capture_output=True, text=True, env=dict(os.environ))
-        answer = json.loads(done.stdout) if done.stdout.strip() else {}
-        stored = numbers_in(Path(answer["artifact"])) if answer.get("artifact") else {}
-        kept.write_text(json.dumps({"exit": done.returncode, "json": answer, "stored": stored, "said": done.stderr}))
-        print(f"{kept.stem}: exit {done.returncode}, {len(stored)} datasets", flush=True)
+def artifacts_in(folder: Path) -> dict[str, Path]:
+    """Stored results by their names, without the digests in these; pieces that results are merged of are none."""
+    files = sorted((folder / "runs").rglob("*.h5"))
+    named = {re.sub(r"-[0-9a-f]{8}\b", "", str(file.relative_to(folder / "runs"))): file for file in files}
+    return {name: file for name, file in named.items() if "sweep-chunks" not in name}
 
 
-def numbers_in(artifact: Path) -> dict[str, Any]:
-    """Every numeric dataset of an artifact, by its path."""
-    found: dict[str, Any] = {}
-    if not artifact.is_file():
-        return found
-    with h5py.File(artifact) as file:
-
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub":
-                found[name] = np.asarray(item).tolist()
-
-        file.visititems(visit)
-    return found
+def differences_in(case: Case, answers: Sequence[dict[str, Any]], folders: Sequence[Path]) -> Iterator[Difference]:
+    """All that is not the same in two versions' answers to a case, however little."""
+    for command in case.lines():
+        allowed = case.looser * (RIGID_ALLOWED if command[0] in RIGID else 1.0)
+        for asked in (command[0], as_text(command[0])):
+            yield from of_values(answers[0].get(asked), answers[1].get(asked), asked, allowed)
+    stored = [artifacts_in(folder) for folder in folders]
+    yield from of_names(*stored, "stored")
+    for name in stored[0].keys() & stored[1].keys():
+        allowed = case.looser * (RIGID_ALLOWED if Path(name).stem in RIGID else 1.0)
+        yield from of_artifacts(stored[0][name], stored[1][name], name, allowed)
 
 
-def differences(old: Any, new: Any, name: str) -> Iterator[str]:
-    """Where two answers differ by more than they may; what only the new one has is no difference."""
-    last = name.rsplit("/", 1)[-1]
-    if last in NOT_COMPARED:
-        return
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key, value in old.items():
-            if key in NOT_COMPARED or tolerance(key) is None:
-                continue
-            if key not in new:
-                yield f"{name}/{key}: is gone"
-            else:
-                yield from differences(value, new[key], f"{name}/{key}")
-    elif isinstance(old, list) and isinstance(new, list):
-        if is_numeric(old) and is_numeric(new):
-            yield from apart(np.asarray(old, float), np.asarray(new, float), name)
-        elif len(old) != len(new):
-            yield f"{name}: {len(old)} and {len(new)} items"
-        else:
-            for i, (one, other) in enumerate(zip(old, new, strict=True)):
-                yield from differences(one, other, f"{name}[{i}]")
-    elif isinstance(old, int | float) and isinstance(new, int | float) and not isinstance(old, bool):
-        yield from apart(np.asarray([old], float), np.asarray([new], float), name)
-    elif old != new and tolerance(last) is not None and not isinstance(old, str):
-        yield f"{name}: {old!r} and {new!r}"
-    elif isinstance(old, str) and last == "outcome" and old != new:
-        yield f"{name}: {old} and {new}"
+def verdict(case: Case, found: list[Difference], allow_new: bool) -> bool:
+    """Print how a case compares; whether it differs."""
+    found.sort(key=lambda one: (-one.share, one.name))
+    wrong = [one for one in found if one.share > 1.0 and not (allow_new and one.words == NEW)]
+    nearest = f", nearest {found[0].name}: {found[0].share:.1g} of what is allowed" if found and not wrong else ""
+    print(f"{case.name}: {f'{len(wrong)} DIFFERENCES' if wrong else 'same'}{nearest}", flush=True)
+    for one in wrong[:SHOWN]:
+        print(f"    {one.name}: {one.words}" + (f" ({one.share:.3g} x allowed)" if one.share < math.inf else ""))
+    if len(wrong) > SHOWN:
+        print(f"    and {len(wrong) - SHOWN} more")
+    return bool(wrong)
 
 
-def is_numeric(values: list[Any]) -> bool:
-    """Whether nested lists hold numbers alone, in rows of one length."""
-    try:
-        return np.asarray(values).dtype.kind in "fiu"
-    except ValueError:
-        return False
+def compare(versions: Sequence[Version], chosen: Sequence[Case], places: Sequence[Path], options: Any) -> int:
+    """Ask both versions all cases, and print what differs; in how many cases something does."""
+    with ThreadPoolExecutor(options.jobs) as pool:
 
+        def ask(case: Case) -> list[Future[dict[str, Any]]]:
+            both = zip(versions, places, strict=True)
+            return [pool.submit(answers_of, each, case, place / case.name, options.text) for each, place in both]
 
-def apart(old: Any, new: Any, name: str) -> Iterator[str]:
-    """How far two arrays are apart, if too far."""
-    allowed = tolerance(re.sub(r"\[\d+\]$", "", name.rsplit("/", 1)[-1]))
-    if allowed is None:
-        return
-    if old.shape != new.shape:
-        yield f"{name}: shapes {old.shape} and {new.shape}"
-        return
-    relative, absolute = allowed
-    scale = float(np.max(np.abs(old), initial=0.0))
-    off = float(np.max(np.abs(old - new), initial=0.0))
-    if not math.isfinite(off) or off > absolute + relative * scale:
-        yield f"{name}: {off:.2e} apart, of at most {scale:.4g}"
-
-
-def compare(old: Path, new: Path) -> int:
-    """Print what differs; the number of cases that do."""
-    wrong = 0
-    for case in cases():
-        kept = f"{folder_of(case)}.json"
-        if not (old / kept).exists() or not (new / kept).exists():
-            print(f"{kept}: not in both")
-            wrong += 1
-            continue
-        one, other = (json.loads((folder / kept).read_text()) for folder in (old, new))
-        found = [] if one["exit"] == other["exit"] else [f"exit codes {one['exit']} and {other['exit']}"]
-        found += differences(one["json"], other["json"], "json")
-        found += differences(one["stored"], other["stored"], "stored")
-        wrong += bool(found)
-        for line in found[:20]:
-            print(f"{Path(kept).stem}: {line}")
-    print(f"{wrong} of {len(list(cases()))} cases differ")
+        asked = [ask(case) for case in chosen]
+        wrong = 0
+        for case, pair in zip(chosen, asked, strict=True):
+            answers = [each.result() for each in pair]
+            folders = [place / case.name for place in places]
+            wrong += verdict(case, list(differences_in(case, answers, folders)), options.allow_new)
     return wrong
 
 
+def reference_folder(folder: Path, version: Version) -> Path:
+    """The folder of a version's answers; refused if it holds another's."""
+    mark, digest = folder / "sources-digest", version.sources_digest()
+    if mark.exists() and mark.read_text() != digest:
+        sys.exit(f"{folder} holds the answers of other sources than {version.name}: remove it, or name another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    mark.write_text(digest)
+    return folder
+
+
+def two_versions(options: Any) -> tuple[Version, Version]:
+    """The other version, and this checkout."""
+    kept = Path(tempfile.gettempdir()) / "walkerlab-versions"
+    other = options.other.resolve() if options.other else None
+    called = f"{other or options.python}"
+    cache = kept / hashlib.sha256(called.encode()).hexdigest()[:12]
+    own = kept / hashlib.sha256(str(CHECKOUT).encode()).hexdigest()[:12]
+    return Version(called, options.python, other, cache), Version(str(CHECKOUT), sys.executable, CHECKOUT, own)
+
+
 def main() -> None:
-    """Hold or compare."""
+    """Compare two versions, their answers or their speed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(required=True, dest="command")
-    holding = commands.add_parser("hold")
-    holding.add_argument("folder", type=Path)
-    holding.add_argument("--only", default="", help="regular expression that a case's name must contain")
-    comparing = commands.add_parser("compare")
-    comparing.add_argument("old", type=Path)
-    comparing.add_argument("new", type=Path)
-    chosen = parser.parse_args()
-    if chosen.command == "hold":
-        hold(chosen.folder, chosen.only)
-    else:
-        sys.exit(1 if compare(chosen.old, chosen.new) else 0)
+    parser.add_argument("--other", type=Path, help="its checkout; default: what --python has installed")
+    parser.add_argument("--python", default=sys.executable, help="the other version's Python; default: this one")
+    parser.add_argument("--only", default="", help="regular expression that the name of a case or figure contains")
+    parser.add_argument("--jobs", type=int, default=2, help="commands at once; default: 2")
+    parser.add_argument("--text", action="store_true", help="compare what the terminal shows too")
+    parser.add_argument("--allow-new", action="store_true", help="what only this checkout has is no difference")
+    parser.add_argument("--reference-results", type=Path, metavar="DIR", help="where the other's answers are kept")
+    parser.add_argument("--list", action="store_true", help="print the cases, and ask nothing")
+    parser.add_argument("--speed", action="store_true", help="compare what it takes instead, one command at a time")
+    parser.add_argument("--rounds", type=int, default=3, help="with --speed: measurements of each; default: 3")
+    options = parser.parse_args()
+    chosen = [case for case in cases() if re.search(options.only, case.name)]
+    if options.list:
+        print(*(case.name for case in chosen), sep="\n")
+        return
+    if not options.other and options.python == sys.executable:
+        parser.error("--other or --python says which version to compare with")
+    versions = two_versions(options)
+    if options.speed:
+        print_speed(versions, options.only, options.rounds)
+        return
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="walkerlab-answers-") as scratch:
+        old, new = Path(scratch) / "other", Path(scratch) / "this"
+        if options.reference_results:
+            old = reference_folder(options.reference_results.resolve(), versions[0])
+        wrong = compare(versions, chosen, (old, new), options)
+    print(f"{wrong} of {len(chosen)} cases differ; {time.perf_counter() - began:.0f} s")
+    sys.exit(1 if wrong else 0)
 
 
 if __name__ == "__main__":
