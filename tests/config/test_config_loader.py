@@ -104,8 +104,8 @@ PARTS = """walker:
     - {name: leg 2, mass_kg: 5, centre_m: [0, -0.5]}
     - {name: trunk, mass_kg: 10, centre_m: [0, 0.3]}
   hinges:
-    - {parent: leg 2, parent_point_m: [0, 0], child: leg 1, child_point_m: [0, 0]}
-    - {parent: leg 2, parent_point_m: [0, 0], child: trunk, child_point_m: [0, 0]}
+    - {name: hip, parent: leg 2, parent_point_m: [0, 0], child: leg 1, child_point_m: [0, 0]}
+    - {name: neck, parent: leg 2, parent_point_m: [0, 0], child: trunk, child_point_m: [0, 0]}
   feet: [{body: leg 1, centre_m: [0, -1]}, {body: leg 2, centre_m: [0, -1]}]
   couplings: [{body: trunk, of: [leg 1, leg 2], weights: [0.25, 0.75]}]
   legs: [[leg 1], [leg 2]]

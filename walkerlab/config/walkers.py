@@ -369,7 +369,7 @@ def rigid_bodies(walker: Any) -> int:
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Angles of the rigid model's state that others give: by place, the body's name and the others' weights by place."""
+    """Angles of the rigid model's state that others give: by place, the body's name and weights of others by place."""
     found = {}
     if isinstance(walker, PartsWalker):
         swinging, stance = walker.legs

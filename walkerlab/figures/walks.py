@@ -348,8 +348,8 @@ def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
 
 ENERGIES_IN_TIME = (
     ("kinetic_J", "energy", None, "(a) kinetic energy"),
-    ("potential_J", "energy", None, "(b) potential energy, from the current stance foot"),
-    ("mechanical_J", "energy", None, "(c) mechanical energy, the sum of both"),
+    ("potential_J", "energy", None, "(b) potential energy, zero at the step's foothold"),
+    ("mechanical_J", "energy", None, "(c) mechanical energy"),
 )
 SMALLEST_SPAN = 0.005
 """Of the axis of the mechanical energy, in parts of it: a constant must look constant."""

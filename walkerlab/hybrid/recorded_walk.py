@@ -27,7 +27,17 @@ from walkerlab.hybrid.rigid_observer import (
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
 from walkerlab.hybrid.walk_record import Array, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, Mode, Standing, linked, rolled_distance, swing_foot
+from walkerlab.mechanics.standing import (
+    AT_STRIKE,
+    BENT,
+    STANCE,
+    Mode,
+    Standing,
+    energy_at_touch,
+    linked,
+    rolled_distance,
+    swing_foot,
+)
 from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
 from walkerlab.solvers.system import State
@@ -59,7 +69,7 @@ class RigidWalkResult(WalkRecord):
     max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
     max_scuff_depth: float  # m, of the swing foot below the slope
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
-    mean_energy: float  # J, time mean, from the stance foot
+    mean_energy: float  # J, time mean; potential from the contact point at each step's touch
     samples: Samples | None
 
     @property
@@ -157,6 +167,14 @@ class Recorder:
             self.state, self.time = as_state(after[-1]), float(strikes[-1])
         return Outcome(status)
 
+    def _mean_energy(self, strikes: Array, after: Array) -> float:
+        """Time mean of the energy (J), in each step from the contact point at its touch."""
+        zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
+        if self.duration == 0.0:
+            return float(self.energy_at_start - zeros[0])
+        durations = np.diff(strikes, prepend=0.0, append=max(self.duration, self.time))
+        return float((self.energy_integral - zeros @ durations) / self.duration)
+
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
         found = int(observer.recorded[0])
@@ -198,7 +216,7 @@ class Recorder:
             max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
             max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
-            mean_energy=self.energy_integral / self.duration if self.duration > 0.0 else self.energy_at_start,
+            mean_energy=self._mean_energy(strikes, after),
             samples=joined(self.pieces) if self.pieces else None,
         )
 

@@ -283,10 +283,7 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
 
 @inlined
 def energies(model: Standing, y: Any) -> tuple[float, float]:
-    """Kinetic and potential energy (J).
-
-    The latter is that from the current foothold: where the foot touches with its leg normal to the slope.
-    """
+    """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope."""
     n = len(model.arm_x)
     s, c, F, U, r, M = (
         vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
@@ -295,6 +292,14 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
     return tree.kinetic_energy(n, M, y[n : 2 * n]), tree.potential_energy(model, n, rolled, model.radius, F, U)
+
+
+def energy_at_touch(model: Standing, touched: Any) -> Any:
+    """Potential energy (J), as `energies` counts it, of the walker's mass at the contact point of a step's touch.
+
+    touched  rad, angle of the stance leg at the touch; or (...,) of several
+    """
+    return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
 @inlined

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.compliant import hinge_of
+from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
@@ -146,7 +146,7 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
     if scene.terrain.has_pads:
         stored["terrain"] = pads_group(scene.terrain.stride_measure, walk.end_state[0])
     if walk.samples is not None:
-        stored["trajectory"] = trajectory_group(config, scene, walk.samples)
+        stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
     return stored
 
 
@@ -163,7 +163,9 @@ def pads_group(pitch: float, end: float) -> Group:
     )
 
 
-def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: ContactSamples) -> Group:
+def trajectory_group(
+    config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
+) -> Group:
     """Samples of the walk: what `outputs` asks for."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance), **legs()}
     feet = np.zeros((samples.time_s.size, 2, 5))
@@ -172,7 +174,9 @@ def trajectory_group(config: ContactSimConfig, scene: ContactScene, samples: Con
         variables |= state_variables(scene, samples.states)
         variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1])
     if "energies" in config.outputs:
-        variables |= energy_variables(scene, samples, feet)
+        footholds = np.append(feet[:1, STANCE_FOOT, 0], walk.touch_along_m)
+        step = np.searchsorted(walk.touch_time_s, samples.time_s, side="right")
+        variables |= energy_variables(scene, samples, footholds[step])
     if "forces" in config.outputs:
         depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
         variables |= over_time(
@@ -212,19 +216,20 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     return found
 
 
-def energy_variables(scene: ContactScene, samples: ContactSamples, feet: Any) -> dict[str, Variable]:
-    """Energies as the paper plots them, from the current stance foot, and the energy balance from a fixed origin."""
+def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats) -> dict[str, Variable]:
+    """Energies as the paper plots them, from the current foothold, and the energy balance from a fixed origin.
+
+    foothold  (samples,) m, where along the slope the stance foot touched
+    """
     energies = np.zeros((samples.time_s.size, 3))
     system = on_ground(scene.walker, (False, False))
     sampled_energies(system, samples.states, samples.has_ground, samples.knees, energies)
     kinetic, potential, total = energies.T
-    walker, row, lost = scene.walker, np.arange(samples.time_s.size), samples.dissipated_J
-    foot_along, foot_height = feet[row, samples.stance, 0], feet[row, samples.stance, 1]
-    of_foot = walker.mass * (walker.gravity_down * foot_height - walker.gravity_along * foot_along)
+    lost, at_foothold = samples.dissipated_J, -scene.walker.mass * scene.walker.gravity_along * foothold
     return over_time(
         kinetic_J=kinetic,
-        potential_J=potential - of_foot,
-        mechanical_J=kinetic + (potential - of_foot),
+        potential_J=potential - at_foothold,
+        mechanical_J=total - at_foothold,
         book_mechanical_J=total,
         dissipated_damping_J=lost[:, 0],
         dissipated_friction_J=lost[:, 1],

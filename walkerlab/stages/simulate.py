@@ -9,7 +9,7 @@ import numpy as np
 from walkerlab.config.reads import SimulateConfig
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
-from walkerlab.mechanics.standing import STANCE
+from walkerlab.mechanics.standing import STANCE, energy_at_touch
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.registry import Tolerances
@@ -84,6 +84,8 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
         variables |= place_variables(scene, walk, samples, stance)
     if "energies" in scene.outputs:
         kinetic, potential = energies(scene.walker, samples.state).T
+        touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
+        potential -= energy_at_touch(scene.walker, touched)[samples.step]
         variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if "forces" in scene.outputs:
         friction, normal = (
