@@ -117,6 +117,11 @@ def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> Non
     assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
 
 
+def test_legs_as_long_as_towers_are_doubted(loaded: Loaded) -> None:
+    (said,) = loaded("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n").warnings
+    assert said.endswith("mine.yaml:1:10: the walker's legs are 1000 m long; lengths are in m, not in mm")
+
+
 def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Loaded) -> None:
     assert loaded("start: [-0.2022, 0.1674, -0.60, -0.84]\n").warnings == ()
 
@@ -134,7 +139,17 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
             "walker:\n  leg_lenght_m: 1\n",
             r"mine.yaml:2:3: walker.leg_lenght_m: unknown key \(1\); did you mean walker.leg_length_m\?",
         ),
-        ("slope: 3\n", r"1:1: slope: unknown key \(3\); did you mean slope_rad\?"),
+        ("slope: 3\n", r"1:1: slope: unknown key \(3\); did you mean slope_deg\?"),
+        (
+            "extends: paper\ncontact:\n  static_friction: 0.5\n",
+            r"mine.yaml:3:20: contact.static_friction: contact.dynamic_friction stays 0.7, as built-in paper.yaml has "
+            r"it, and must not exceed static_friction, 0.5; allowed: dynamic_friction set as well",
+        ),
+        (
+            "extends: paper\ncontact:\n  stiction_velocity: 2000\n",
+            r"mine.yaml:3:22: contact.stiction_velocity: contact.friction_velocity stays 1000, as built-in",
+        ),
+        ("slope_rads: 0.1\n", r"did you mean slope_rad\?"),
         ("leg_mass: 3\n", r"did you mean walker.leg_mass_kg\?"),
         ("contact.stiffness: 1e6\n", r"did you mean contact: \{stiffness: …\}\?"),
         ("Strides: 3\n", r"did you mean strides\?"),

@@ -1,6 +1,7 @@
 """Each reduced scene gives the numbers of the full one with the part set to nothing."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -200,3 +201,16 @@ def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
     before = execute(found.config, "contact-sim", folder, Options(dry=True)).left_out
     assert execute(found.config, "contact-sim", folder).left_out == before
     assert any(entry.saves for entry in before)
+
+
+@pytest.mark.parametrize(
+    ("name", "sets", "angles"),
+    [("paper", (), 2), ("torso", (), 3), ("kneed", (), 3), ("kneed", ("walker.knee.lock=compliant",), 4)],
+)
+def test_the_angles_of_a_hinged_step_are_those_that_it_is_integrated_in(name, sets, angles):
+    config = load(Path(name), (*sets, "contact.stance=pinned")).config
+    scene = contact_scene(config, 0.4)
+    assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles  # the stance knee is locked
+    said = next(one for one in left_out.of_contact_walk(config) if "pinned" in one["why"])
+    assert f"{angles} angles suffice" in said["why"]
+    assert said["saves"].startswith(f"4 of {2 * angles + 4} equations")

@@ -27,7 +27,7 @@ def write_config(file: Path, walker: str) -> str:
         raise StorageError(f"{file} exists already.", "Choose another name; nothing was overwritten.")
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
-    named = config.model_copy(update={"name": safe_name(file.stem)})
+    named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
     text = f"# yaml-language-server: $schema={SCHEMA}\n{commented(named, untouched)}"
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,8 @@ from walkerlab.config.walkers import CompassWalker
 
 STEEP_RAD: Final = 0.5
 """No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""
+LONG_M: Final = 20.0
+"""Nobody builds longer legs; a number above it is perhaps in millimetres."""
 HEAVY_KG_M3: Final = 1000.0
 """A mass above that of a cube of water as wide as the legs are long is perhaps in grams."""
 
@@ -96,7 +98,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a leg whose mass is left behind, a slope in degrees, masses in grams."""
+    """What is perhaps meant otherwise: a leg whose mass is left behind, lengths in mm, degrees, masses in grams."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -107,6 +109,9 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short(stays)} m, "
                 f"as {mass} has it: the mass is not in the middle of the leg"
             )
+    if walker.leg_length_m > LONG_M:
+        given = places.get("leg_length_m", tree.position)
+        yield f"{given}: the walker's legs are {length} m long; lengths are in m, not in mm"
     slope = tree.keys.get("slope_rad")
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
         degrees = short(round(math.degrees(config.slope_rad), 1))

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from walkerlab.config.contact import BOUNDS_SI
 from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
 from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
 from walkerlab.config.layers import stacked
@@ -45,6 +46,13 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
+BY_UNITS: Final = {"units": "si with the numbers of the block set as well"}
+JUDGED_BY: Final = {
+    **dict.fromkeys(BOUNDS_SI, BY_UNITS),
+    "dynamic_friction": {"static_friction": "dynamic_friction set as well"},
+    "friction_velocity": {"stiction_velocity": "friction_velocity set as well", **BY_UNITS},
+}
+"""Other keys of the contact block that its keys are judged by, and what to do where one of those was changed alone."""
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -164,19 +172,20 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         return Problem(position, f"{key}: is missing", allowed(field))
     value = shown_value(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
-    units = _node_at(tree, ("contact", "units"))[1]
-    if (
-        what not in _REASONS
-        and path[0] == "contact"
-        and units.source.startswith("--")
-        and units.source != position.source
-    ):
-        text = f"contact.units: {key} stays {value}, as {position.source} has it, and {reason}"
-        return Problem(units, text, "si with the numbers of the block set as well")
+    for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
+        given, where = _node_at(tree, ("contact", judge))
+        if given is not None and where.source != position.source and _is_later(where, position):
+            text = f"contact.{judge}: {key} stays {value}, as {position.source} has it, and {reason}"
+            return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field.annotation)) if word else ""
     right = allowed(field) if what in _REASONS else ""
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
+
+
+def _is_later(one: Position, other: Position) -> bool:
+    """Whether a place is one's own and the other is what it changes: an option's, or a file's over a built-in one."""
+    return one.source.startswith("--") or (bool(one) and other.source.startswith("built-in"))
 
 
 def _along(
@@ -215,6 +224,8 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
         return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
     beside = nearest(name, siblings) if "." not in name else ""
+    if beside == "slope_rad" and "rad" not in name:
+        beside = "slope_deg"
     meant = ".".join((*above, beside)) if beside else _elsewhere(name, exactly=bool(above))
     text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
     return Problem(parent.keys[name], text, ", ".join(siblings), meant)

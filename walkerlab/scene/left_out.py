@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SimulateConfig,
     )
     from walkerlab.config.schema import Output
+    from walkerlab.config.walkers import Walker
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,10 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
         saved = "4 of the 9 event functions that a foot is watched by, and the friction law"
         found.append(left_out("tangential velocity and friction force", "contact.friction is none", saved))
     if contact is not None and contact.stance == "pinned":
-        what, why = "floating base and stance contact in the first step", "contact.stance is pinned: two angles suffice"
-        found.append(left_out(what, why, "4 of 8 equations and both force laws in that step"))
+        angles = angles_of_a_step(config.walker)
+        what, why = "floating base and stance contact in the first step", "contact.stance is pinned"
+        saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
+        found.append(left_out(what, f"{why}: {angles} angles suffice", saved))
     if config.walker.foot_radius_m == 0.0:
         saved = "nothing: a zero in their place takes no longer"
         found.append(left_out("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
@@ -100,6 +103,13 @@ def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entr
         ),
         left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
     )
+
+
+def angles_of_a_step(walker: Walker) -> int:
+    """How many angles a step's motion has; a stop that has latched keeps the stance shank's."""
+    from walkerlab.config.walkers import rigid_bodies  # not for the help of the command line
+
+    return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
 
 
 def of_the_compass(walker: object) -> bool:
