@@ -72,14 +72,19 @@ def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
     return {tag: block for tag, block in found.items() if issubclass(block, Block)}
 
 
-def leaves(block: type[Block], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Path and field of every value in `block`, in the order of the schema; of several kinds of a block the first's."""
+def leaves(
+    block: type[Block], prefix: tuple[str, ...] = (), held: Any = None
+) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
+    """Path and field of every value in `block`, in the order of the schema.
+
+    held  a config's own block of that type: of several kinds of a block it has those of its own, else the first's
+    """
     for name, field in block.model_fields.items():
-        inner = block_of(field)
+        inner, own = block_of(field), getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
-            yield from leaves(inner, (*prefix, name))
+            yield from leaves(type(own) if isinstance(own, Block) else inner, (*prefix, name), own)
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:

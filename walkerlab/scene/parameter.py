@@ -1,12 +1,14 @@
 """A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, block_of, extra, kind, leaves
+from walkerlab.config.fields import Block, block_of, extra, kind, leaves, leaves_of_other_kinds
 from walkerlab.config.problems import nearest, shown
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
@@ -41,7 +43,7 @@ class Parameter:
         data = {name: _as_given(getattr(config, name)) for name in PHYSICAL}
         block = data
         for name in self.path[:-1]:
-            block = block[name]
+            block = block.setdefault(name, {})
         block[self.path[-1]] = math.radians(value) if self.key == SLOPE_DEG else value
         try:
             return Config.model_validate(data)
@@ -58,31 +60,52 @@ def _as_given(value: Any) -> Any:
 
 
 def parameter_of(key: str, config: ContactConfig) -> Parameter:
-    """The parameter of a key; ConfigError if it is no number that a walker is made of."""
+    """The parameter of a key of the config's own walker; ConfigError if it is no number that a model is made of."""
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
-    path = tuple(key.split("."))
-    known = {".".join(path): field for path, field in leaves(Config) if path[0] in PHYSICAL}
-    if key not in known:
-        every = {".".join(path) for path, _ in leaves(Config)}
-        if key in every:
-            raise ConfigError(f"continuation.over: {shown(key)} touches no model", _ADVICE)
-        blocks = {".".join(path[:depth]) for path in map(tuple, (one.split(".") for one in every)) for depth in (1, 2)}
-        if key in blocks:
-            raise ConfigError(f"continuation.over: {shown(key)} is a block of keys, not a number", _ADVICE)
-        meant = nearest(key, [*numbers_among(known), SLOPE_DEG])
-        guess = f"; did you mean {meant}?" if meant else ""
-        raise ConfigError(f"continuation.over: {shown(key)} is not a key of the config{guess}", _ADVICE)
-    if config.contact is None and path[0] == "contact":
-        raise ConfigError(f"continuation.over: {key} belongs to the contact block, and the config has none", _ADVICE)
-    if "number" not in kind(known[key].annotation):
-        raise ConfigError(f"continuation.over: {key} is not a number", _ADVICE)
-    return Parameter(key, extra(known[key], "unit") or "1", path)
+    own = {".".join(path): field for path, field in leaves(Config, held=config)}
+    why = why_no_parameter(key, config, own)
+    if why:
+        raise ConfigError(f"{shown(key)} {why}", _ADVICE)
+    return Parameter(key, extra(own[key], "unit") or "1", tuple(key.split(".")))
 
 
 _ADVICE = "Name a number that the walker, its slope or its ground is made of; `walkerlab schema` lists every key."
 
 
-def numbers_among(known: dict[str, Any]) -> list[str]:
-    """The keys whose values are numbers."""
-    return [name for name, field in known.items() if block_of(field) is None and "number" in kind(field.annotation)]
+def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
+    """Why a key is no number that a model of the config is made of; empty if it is.
+
+    own  the keys of the config, of its own walker's type
+    """
+    if key not in own:
+        if any(name.startswith(f"{key}.") for name in own):
+            return "is a block of keys, not a number"
+        others = {".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)}
+        if key in others | {".".join(path) for path, _ in leaves(Config)}:
+            return f"is not a key of this walker, whose type is {config.walker.type}{likely(key, own)}"
+        return f"is not a key of the config{likely(key, own)}"
+    path = key.split(".")
+    if path[0] not in PHYSICAL:
+        return "touches no model"
+    if "number" not in kind(own[key].annotation):
+        return "is not a number"
+    held: Any = config
+    for depth, name in enumerate(path, 1):
+        held = getattr(held, name)
+        if held is None:
+            return f"is not there: the config has no {'.'.join(path[:depth])}; give it one first"
+        if isinstance(held, tuple):
+            return f"is a number of each of the {'.'.join(path[:depth])}, not one number"
+    return "" if isinstance(held, int | float) else f"is {held!r} in the config, not a number"
+
+
+def likely(key: str, own: Mapping[str, FieldInfo]) -> str:
+    """A guess at the key that is meant, in words."""
+    numbers = [
+        name
+        for name, field in own.items()
+        if name.split(".")[0] in PHYSICAL and block_of(field) is None and "number" in kind(field.annotation)
+    ]
+    meant = nearest(key, [*numbers, SLOPE_DEG])
+    return f"; did you mean {meant}?" if meant else ""

@@ -1,0 +1,115 @@
+"""Every number of the schema, on every type of walker, is a parameter or is refused in words."""
+
+from pathlib import Path
+
+import pytest
+
+from walkerlab.config.fields import kind, leaves, leaves_of_other_kinds
+from walkerlab.config.loader import load
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.scene.contact import contact_scene
+from walkerlab.scene.parameter import PHYSICAL, parameter_of
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.sweeps.question import axis, described
+
+TORSO = "walker.torso={mass_kg: 3, above_hip_m: 0.3}"
+WALKERS = {
+    "paper": (),
+    "rigid-only": (),
+    "torso": (),
+    "round-feet": (),
+    "kneed": (),
+    "kneed with torso": (TORSO,),
+    "kneed with compliant stops": ("walker.knee.lock=compliant",),
+    "parts": (),
+    "paper, own pitch": ("contact.pad_pitch=own",),
+}
+EVERY = sorted({
+    *(".".join(path) for path, _ in leaves(Config)),
+    *(".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)),
+    "slope_deg", "walker", "walker.torso", "walker.thigh", "contact", "walker.leg_mas_kg", "no.such.key",
+    "walker.bodies",
+})  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=WALKERS)
+def config(request):
+    return load(Path(request.param.split(",")[0].split(" ")[0]), WALKERS[request.param]).config
+
+
+def numbers_of(config):
+    """The keys of the config's own walker that hold a number in it."""
+    for path, field in leaves(Config, held=config):
+        held = config
+        for name in path:
+            held = getattr(held, name, None)
+        if path[0] in PHYSICAL and "number" in kind(field.annotation) and isinstance(held, int | float):
+            yield ".".join(path)
+
+
+def test_every_number_that_the_walker_has_is_a_parameter_and_no_other_key_is(config):
+    own = {*numbers_of(config), "slope_deg"}
+    for key in EVERY:
+        if key in own:
+            assert parameter_of(key, config).key == key
+        else:
+            with pytest.raises(ConfigError) as caught:
+                parameter_of(key, config)
+            assert str(caught.value).startswith(key)
+            assert caught.value.advice
+
+
+def test_models_are_made_at_a_value_nearby(config):
+    for key in (*numbers_of(config), "slope_deg"):
+        parameter = parameter_of(key, config)
+        value = parameter.value_in(config)
+        changed = parameter.config_at(config, 1.001 * value if value else 1e-3)
+        if changed is None:  # two numbers that bound each other
+            changed = parameter.config_at(config, 0.999 * value)
+        if (config.walker.type, key) == ("parts", "walker.leg_length_m"):
+            assert changed is None  # it is what the parts have
+            continue
+        assert changed is not None, key
+        assert parameter.value_in(changed) != value
+        rigid_walker(changed, changed.equations)
+        if changed.contact is not None:
+            contact_scene(changed, 0.4, 0.4)
+
+
+def test_at_its_own_value_the_config_is_itself(config):
+    for key in (*numbers_of(config), "slope_deg"):
+        parameter = parameter_of(key, config)
+        again = parameter.config_at(config, parameter.value_in(config))
+        assert rigid_walker(again, again.equations) == rigid_walker(config, config.equations)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "said"),
+    [
+        ("paper", "walker.torso.mass_kg", "is not there: the config has no walker.torso; give it one first"),
+        (
+            "paper",
+            "walker.thigh.mass_kg",
+            "is not a key of this walker, whose type is compass; did you mean walker.hip_mass_kg",
+        ),
+        ("kneed", "walker.foot_to_mass_m", "is not a key of this walker, whose type is kneed"),
+        ("parts", "walker.bodies.mass_kg", "is a number of each of the walker.bodies, not one number"),
+        ("rigid-only", "contact.stiffness", "is not there: the config has no contact; give it one first"),
+        ("paper", "walker.torso", "is a block of keys, not a number"),
+        ("paper", "strides", "touches no model"),
+        ("paper", "contact.terrain", "is not a number"),
+    ],
+)
+def test_a_key_that_cannot_be_followed_is_refused_with_the_reason(name, key, said):
+    with pytest.raises(ConfigError) as caught:
+        parameter_of(key, load(Path(name)).config)
+    assert f"{key} {said}" in str(caught.value)
+
+
+def test_a_sweep_takes_every_number_that_a_walker_has(config):
+    for key in numbers_of(config):
+        value = parameter_of(key, config).value_in(config)
+        one = axis(key, f"{value}:{value + 1e-3}:2", f"--over {key}")
+        assert one.values == pytest.approx((value, value + 1e-3))
+        assert described(config, key)[1] != key, "its meaning is known"
