@@ -190,7 +190,7 @@ class BranchFollower:
         for branch in branches:  # grows on the way
             if 2 * branch.period <= periods and branch not in known:
                 branches.extend(self.doubled(branch, branches))
-        return tuple(branches)
+        return tuple(closed_on(branch, branches) for branch in branches)
 
     def equations(self, period: int) -> GaitEquations:
         """Of gaits of so many steps."""
@@ -268,7 +268,7 @@ class BranchFollower:
                 break
             solved, step = following
             end, solved = self.within(equations, last, solved)
-            if period % 2 == 0 and apart(last, period) @ apart(solved, period) < 0.0:  # the halves changed places
+            if period % 2 == 0 and halves_meet(last, solved, period):
                 end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
                 break
             segment = Segment(equations, last, solved, self.control.tolerance)
@@ -340,14 +340,34 @@ def apart(solved: Solved[IteratedMap], period: int) -> Floats:
     return np.asarray(solved.evaluated.data.steps[period // 2 - 1].z - solved.x[:-1])
 
 
+def halves_meet(last: Solved[IteratedMap], solved: Solved[IteratedMap], period: int) -> bool:
+    """Whether a branch has come to the gait of half as many steps: its cycle's halves are one, or changed places."""
+    parted = apart(solved, period)
+    return bool(np.abs(parted).max() < SAME or apart(last, period) @ parted < 0.0)
+
+
+def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
+    """The branch with ends that close on another's flip put there."""
+    flips = [one for parent in branches for one in parent.bifurcations if 2 * parent.period == branch.period]
+    ends = []
+    for end, values in zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True):
+        near = [flip.value for flip in flips if closes_on(flip, end, values)]
+        ends.append(replace(end, value=min(near, key=lambda value: abs(value - end.value))) if near else end)
+    return replace(branch, ends=(ends[0], ends[1]))
+
+
+def closes_on(flip: Bifurcation, end: BranchEnd, values: Floats) -> bool:
+    """Whether a branch's end is this flip; `values` are its last two."""
+    near = abs(end.value - flip.value) <= 2.0 * np.ptp(values) + 1e-12
+    return flip.kind == "flip" and end.reason.startswith("closes") and bool(near)
+
+
 def ends_at(branch: GaitBranch, flip: Bifurcation, period: int) -> bool:
     """Whether a branch of this period closes on this flip, at either end."""
     if branch.period != period:
         return False
-    for end, values in zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True):
-        if end.reason.startswith("closes") and abs(end.value - flip.value) <= 2.0 * np.ptp(values) + 1e-12:
-            return True
-    return False
+    ends = zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True)
+    return any(closes_on(flip, end, values) for end, values in ends)
 
 
 def why_lost(lost: NotConverged) -> str:
