@@ -12,10 +12,12 @@ from walkerlab.orbits.attractors import (
     Lyapunov,
     close_returns,
     feigenbaum_ratios,
+    independent_blocks,
     largest_exponent,
     may_part,
     period_of,
     settled,
+    standard_error,
     swept,
 )
 from walkerlab.orbits.bifurcations import on_pairs
@@ -272,6 +274,18 @@ def test_a_gait_just_beyond_a_flip_is_on_the_branch_that_begins_there():
     assert follower.family([seed], 2, known) == known
 
 
+def test_a_branch_that_was_entered_elsewhere_begins_at_its_flip_and_has_no_gait_of_half_as_many_steps():
+    follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.07, 0.08))
+    one, doubled = follower.family([seeds_at(paper_walker, 0.072)[-1]], 2)
+    (flip,) = (each for each in one.bifurcations if each.kind == "flip")
+    middle = doubled.points[len(doubled.points) // 2]
+    (again,) = follower.family([Seed(middle.z, middle.value, 2)], 1, (one,))[1:]
+    begin = min(again.ends, key=lambda end: end.value)
+    assert begin.reason == "closes on the gait of 1 step"
+    assert begin.value == flip.value
+    assert min(np.abs(apart(point.solved, 2)).max() for point in again.points) > 1e-6
+
+
 def test_no_branch_is_followed_from_a_flip_that_another_one_has_closed_on():
     follower, seed = between_the_first_flip_and_the_branch_beyond_it()
     branches = follower.family([seed, *seeds_at(paper_walker, 0.07)], 2)
@@ -300,6 +314,28 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
     assert chaotic.period == 0
     wild = largest_exponent(step_map, chaotic.last, chaotic.value, 50, 600)
     assert wild.exponent > 5.0 * wild.uncertainty > 0.0
+
+
+@pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
+def test_a_standard_error_covers_the_error_whether_or_not_steps_are_correlated(lasting):
+    """Of means of normal noise whose correlation falls e-fold in so many steps: the mean is 0."""
+    kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
+    for step in range(1, noise.shape[1]):
+        noise[:, step] += kept * noise[:, step - 1]
+    blocks = [min(64, independent_blocks(walk)) for walk in noise]
+    off = [abs(walk.mean()) / standard_error(walk, count) for walk, count in zip(noise, blocks, strict=True)]
+    assert min(blocks) >= 10
+    # of normal noise by ten blocks (Student's distribution) 0.077, and twice the standard error of 400 walks
+    assert np.mean(np.array(off) > 2.0) < 0.077 + 2.0 * np.sqrt(0.077 * 0.923 / 400)
+
+
+def test_the_exponent_of_chaos_agrees_with_that_of_a_walk_fifty_times_as_long():
+    follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.0, 0.1))
+    start = seeds_at(paper_walker, 0.07)[-1].z  # the longer gait, stable there
+    attractor = swept(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
+    short, long = (largest_exponent(follower.step_map, attractor.last, attractor.value, 96, n) for n in (1500, 75_000))
+    assert abs(short.exponent - long.exponent) < 2.5 * short.uncertainty
+    assert long.uncertainty < 0.3 * short.uncertainty
 
 
 @pytest.mark.parametrize("beyond", [2e-6, 1.6e-5])

@@ -1,8 +1,9 @@
 """Where walks settle: the attractor of a step map over a parameter, and how fast neighbours on it part.
 
 The largest Lyapunov exponent is the mean growth of a tangent vector led along by the step map's exact derivative, per
-step. Its uncertainty is the standard error of the means of blocks, each much longer than the walk's memory; where
-walks do not settle on a gait at least one over their steps, since they cannot tell slower growth from none.
+step. Its uncertainty is the standard error of the means of blocks, each several times as long as correlations last; a
+walk with too few of these is walked again, twice as long. It is at least one over the walk's steps, which cannot tell
+slower growth from none.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -24,7 +25,7 @@ LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
 NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how much so from first to last third
 ASIDE = 1e-2  # of a start from the unstable gait that it is to leave, as a share of the largest coordinate
-BLOCKS = 10
+BLOCKS, LEAST_BLOCKS, LENGTH_OF_BLOCKS = 64, 10, 5.0  # of a walk at most, at least; in times that correlations last
 MAX_WALKS = 8  # for an exponent
 DRIFT = 4.0  # of halves of a walk, in standard errors of the whole: two of their own
 SMALLER_STEPS = 8
@@ -155,17 +156,37 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
         if walk.outcome is not Outcome.WALKED:
             return None
         growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
-        means = np.array([block.mean() for block in np.array_split(growth, BLOCKS)])
-        exponent, error = float(growth.mean()), float(means.std(ddof=1) / math.sqrt(BLOCKS))
-        drift = abs(float(means[: BLOCKS // 2].mean() - means[BLOCKS // 2 :].mean()))
         repeats = period_of(walk.points[transient:]) > 0
+        blocks = LEAST_BLOCKS if repeats else min(BLOCKS, independent_blocks(growth))
+        exponent, error = float(growth.mean()), standard_error(growth, max(LEAST_BLOCKS, blocks))
+        drift = abs(float(growth[: steps // 2].mean() - growth[steps // 2 :].mean()))
         if repeats and exponent <= 0.0 and drift < 1.0 / steps:
             break
         error = max(error, 1.0 / steps)
-        if not repeats and drift < DRIFT * error:
+        if not repeats and drift < DRIFT * error and blocks >= LEAST_BLOCKS:
             break
+        steps *= 1 + (blocks < LEAST_BLOCKS)
         z = (1.0 + ASIDE * (repeats and exponent > 0.0)) * walk.points[-1]
     return Lyapunov(value, exponent, error)
+
+
+def independent_blocks(series: Floats) -> int:
+    """How many blocks a series (n,) has that are several times as long as its correlations last.
+
+    These last for the sum of the autocorrelation over all lags, up to the first one at which it is not positive.
+    """
+    off = series - series.mean()
+    spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2
+    correlation = np.fft.irfft(spectrum)[: off.size]
+    lags = int(np.argmax(correlation <= 0.0)) or off.size
+    lasting = 2.0 * correlation[:lags].sum() / correlation[0] - 1.0
+    return int(series.size / (LENGTH_OF_BLOCKS * lasting))
+
+
+def standard_error(series: Floats, blocks: int) -> float:
+    """Standard error of the mean of a series, by the means of so many blocks of it."""
+    means = np.array([block.mean() for block in np.array_split(series, blocks)])
+    return float(means.std(ddof=1)) / math.sqrt(blocks)
 
 
 def feigenbaum_ratios(flips: list[float]) -> list[float]:

@@ -353,7 +353,7 @@ def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
     for end, values in zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True):
         near = [flip.value for flip in flips if closes_on(flip, end, values)]
         ends.append(replace(end, value=min(near, key=lambda value: abs(value - end.value))) if near else end)
-    return replace(branch, ends=(ends[0], ends[1]))
+    return branch if tuple(ends) == branch.ends else replace(branch, ends=(ends[0], ends[1]))
 
 
 def closes_on(flip: Bifurcation, end: BranchEnd, values: Floats) -> bool:
