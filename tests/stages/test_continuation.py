@@ -12,9 +12,11 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import plane as plane_of_gaits
 from walkerlab.orbits.families import ValueSpan
+from walkerlab.orbits.step_map import gait_near
+from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
-from walkerlab.stages.continuation import FamilyQuestion, attractor_summary, ending_rows, first_doubling
+from walkerlab.stages.continuation import FamilyQuestion, attractor_summary, ending_rows, first_doubling, sample_again
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent
 
@@ -70,6 +72,21 @@ def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
     assert 0.0 < error["step_period_s"] < 1e-11
     assert 0.0 < error["step_length_m"] < 1e-11
     assert error["by"] == "ten times tighter tolerances"
+
+
+def test_what_newtons_method_leaves_over_is_part_of_the_numerical_error():
+    """A gait whose start is off: its own step has another period than the gait, whatever the tolerances."""
+    step_map = rigid_map(config(), parameter_of("slope_deg", config()), 1.0)
+    gait = gait_near(step_map, np.array([0.22, -0.12, -0.35]), 3.0, 1, 1e-13)
+    z = gait.z + np.array([1e-8, 0.0, 0.0])
+    off = step_map.step(z, 3.0)
+    lengths = np.array([off.length_m])
+    point = SimpleNamespace(z=z, value=3.0, periods_s=np.array([off.period_s]), lengths_m=lengths)
+    branch = SimpleNamespace(period=1, points=(point,))
+    told = sample_again(SimpleNamespace(step_map=step_map, branches=(branch,)))
+    assert told["step_period_s"] == pytest.approx(abs(off.period_s - gait.period_s), rel=1e-3)
+    assert told["step_length_m"] == pytest.approx(abs(off.length_m - gait.steps[0].length_m), rel=1e-3)
+    assert told["step_period_s"] > 1e-9
 
 
 def test_the_end_of_a_branch_that_the_walker_makes_is_told_in_words():

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.newton import Evaluated, NotConverged, newton
 from walkerlab.solvers.registry import Tolerances
 
 Floats = NDArray[np.float64]
@@ -120,18 +121,6 @@ class StepMap(Protocol):
         )
 
 
-def cycle_of(step_map: StepMap, z: Floats, p: float, n: int) -> tuple[MappedStep, ...] | None:
-    """n steps in a row from z (d,) at p, without derivatives; None if the walk ends."""
-    steps: list[MappedStep] = []
-    for _ in range(n):
-        step = step_map.step(z, p, derived=False)
-        if step.outcome is not Outcome.WALKED:
-            return None
-        z = step.z
-        steps.append(step)
-    return tuple(steps)
-
-
 def strike_to_strike(steps: Sequence[MappedStep]) -> Floats:
     """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
     waits = [step.period_s - step.strike_s for step in steps]
@@ -182,20 +171,36 @@ class IteratedMap:
         return math.fsum(step.period_s for step in self.steps)
 
 
-def walk_steps(step_map: StepMap, z: Floats, p: float, n: int) -> IteratedMap:
-    """n steps from z (d,) at p, by the chain rule."""
+def walk_steps(step_map: StepMap, z: Floats, p: float, n: int, by_parameter: bool = True) -> IteratedMap:
+    """n steps from z (d,) at p, by the chain rule; with how they change with p, where that is wanted."""
     steps: list[MappedStep] = []
     DP, Dp = np.eye(z.size), np.zeros(z.size)
     outcome = Outcome.WALKED
     for _ in range(n):
         step = step_map.step(z, p)
-        outcome, beside = (step.outcome, z) if step.outcome is not Outcome.WALKED else along_parameter(step_map, z, p)
+        outcome, beside = step.outcome, 0.0 * z
+        if outcome is Outcome.WALKED and by_parameter:
+            outcome, beside = along_parameter(step_map, z, p)
         if outcome is not Outcome.WALKED:
             break
         DP, Dp = step.DP @ DP, step.DP @ Dp + beside
         z = step.z
         steps.append(step)
     return IteratedMap(outcome, tuple(steps), z, DP, Dp)
+
+
+def gait_near(step_map: StepMap, z: Floats, p: float, n: int, tolerance: float) -> IteratedMap | None:
+    """The cycle of the gait of n steps near z (d,) at p; None if Newton's method finds none.
+
+    tolerance  on where it leads, less z
+    """
+
+    def residual(z: Floats) -> Evaluated[IteratedMap]:
+        cycle = walk_steps(step_map, z, p, n, by_parameter=False)
+        return Evaluated(cycle.outcome, cycle.z - z, cycle.DP - np.eye(z.size), cycle)
+
+    solved = newton(residual, z, tolerance)
+    return None if isinstance(solved, NotConverged) else solved.evaluated.data
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:

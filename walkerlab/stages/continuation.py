@@ -47,7 +47,7 @@ from walkerlab.orbits.plane import CONTROL as CURVE_CONTROL
 from walkerlab.orbits.plane import BifurcationCurve, Regions, curve_through, regions_of
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, cycle_of, strike_to_strike
+from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, gait_near, strike_to_strike
 from walkerlab.scene.endings import WHAT, causes, without_pads
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
@@ -82,6 +82,7 @@ TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 EVERY = 3  # which samples are kept beside those at heel strikes
 
+TIGHTEST = 1e-13  # what gaits are solved to whose numerical error is told
 OF_A_GAIT = ("step_period_s", "step_length_m")  # what a family's numerical error is told of
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -544,23 +545,26 @@ def limit_rows(followed: Followed) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(followed: Followed) -> dict[str, Any] | None:
-    """What tighter tolerances change in the steps of some gaits, spread evenly over all branches; None without any."""
+    """What tighter tolerances change in some gaits, spread evenly over all branches; None without any.
+
+    They are solved for again, so that what Newton's method left over counts, too.
+    """
     step_map, every = followed.step_map, [(branch, point) for branch in followed.branches for point in branch.points]
     if step_map is None or not every:
         return None
     tighter, by = tightened(step_map.tolerances)
     otherwise = step_map.at(tighter)
     again = [
-        (point, cycle_of(otherwise, point.z, point.value, branch.period))
+        (point, gait_near(otherwise, point.z, point.value, branch.period, TIGHTEST))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [
         (
-            np.max(np.abs(strike_to_strike(steps) - point.periods_s)),
-            np.max(np.abs([step.length_m for step in steps] - point.lengths_m)),
+            np.max(np.abs(strike_to_strike(cycle.steps) - point.periods_s)),
+            np.max(np.abs([step.length_m for step in cycle.steps] - point.lengths_m)),
         )
-        for point, steps in again
-        if steps is not None
+        for point, cycle in again
+        if cycle is not None
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
     largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
