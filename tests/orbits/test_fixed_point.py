@@ -1,11 +1,18 @@
 """Gaits against numbers known from elsewhere, and what every search must hold to."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigid_physics import momentum_of_masses
 
+from walkerlab.config.loader import load
+from walkerlab.config.walkers import StraightLegs, Torso
 from walkerlab.hybrid.outcome import Outcome
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.rigid import standing
 from walkerlab.orbits.fixed_point import (
     RANDOM_START,
     SHORTEST_MOVE,
@@ -21,6 +28,7 @@ from walkerlab.orbits.newton import NotConverged, newton
 from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, StepEquations, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
+from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import RHS
 
@@ -169,6 +177,42 @@ def test_no_gait_where_the_ground_would_have_to_pull():
     assert all(gait.objections for gait in search.gaits)
 
 
+PULLED = StraightLegs(
+    type="straight-legs", leg_length_m=1.0174, leg_mass_kg=4.9709, leg_mass_below_hip_m=0.43864,
+    leg_inertia_kg_m2=0.26881, foot_radius_m=0.32168, foot_centre_ahead_m=0.036211,
+    torso=Torso(mass_kg=5.5663, above_hip_m=0.21971, inertia_kg_m2=0.17558),
+)  # fmt: skip
+PAPER_WALKER, ROUND, KNEED = (load(Path(name)).config.walker for name in ("paper", "round-feet", "kneed"))
+
+
+@pytest.mark.parametrize(
+    ("walker", "gravity", "degrees"),
+    [(PULLED, 11.514, 0.44654), (PAPER_WALKER, 9.81, 1.0), (ROUND, 9.81, 0.57), (KNEED, 9.81, 2.9)],
+    ids=["torso", "compass", "round-feet", "kneed"],
+)
+def test_the_impulse_of_a_strike_is_the_change_of_the_masses_momentum(walker, gravity, degrees):
+    assembly, slope = assembly_of(walker, rigid=True), np.radians(degrees)
+    model = standing(assembly, gravity, slope)
+    for gait in find_gaits_of_model(model).gaits:
+        step = take_walk(model, TIGHT, gait.state, 1)
+        changes = np.subtract(*(momentum_of_masses(assembly, slope, y) for y in (step.after[0], step.before[0])))
+        if gait.knee_strike is None:
+            assert gait.min_normal_impulse == pytest.approx(changes[1], abs=1e-9)
+            ratio = abs(changes[0]) / changes[1] if changes[1] > 0.0 else None
+            assert gait.max_impulse_ratio == (None if ratio is None else pytest.approx(ratio, rel=1e-9))
+        else:  # or that of the knee's strike
+            assert gait.min_normal_impulse <= changes[1] + 1e-9
+        assert any("in a strike" in one for one in gait.objections) == (gait.min_normal_impulse < 0.0)
+
+
+def test_a_gait_whose_strike_would_have_to_pull_is_not_walked():
+    search = find_gaits_of_model(standing(assembly_of(PULLED, rigid=True), 11.514, np.radians(0.44654)))
+    (pulled,) = (gait for gait in search.gaits if gait.objections)
+    assert pulled.spectral_radius == pytest.approx(2.391, abs=1e-3)
+    assert pulled.min_normal_impulse == pytest.approx(-0.0055, abs=5e-5)
+    assert search.gait is not pulled
+
+
 def test_however_unstable_a_gait_is_it_can_be_walked():
     search = find_gaits(on_slope(15.0))
     assert search.gait is not None
@@ -232,7 +276,20 @@ def test_a_slope_with_unstable_gaits_only_says_so():
 
 def gait_with(radius, pull=0.0):
     return Gait(
-        (0.0, 0.0, -1.0, -1.0), 1.0, 0.4, (radius, 0.0, 0.0), 0.0, 150.0, 0.0, 100.0 - pull, 0.2, 0.0, True, None
+        (0.0, 0.0, -1.0, -1.0),
+        1.0,
+        0.4,
+        (radius, 0.0, 0.0),
+        0.0,
+        150.0,
+        0.0,
+        100.0 - pull,
+        0.2,
+        0.0,
+        6.0,
+        0.2,
+        True,
+        None,
     )
 
 

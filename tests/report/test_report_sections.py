@@ -292,7 +292,7 @@ def test_assumptions_are_judged():
 
 def test_steps_of_both_models_stand_side_by_side_with_dashes_behind_the_shorter():
     found = rows(sections(**{"contact-sim": contact_sim("fell", 2)})["steps"])
-    assert found["2"] == ["0.7000", "0.7000", "0.3700", "0.3700", "0.930"]
+    assert found["2"] == ["0.7000", "0.7000", "0.3700", "0.3700", "0.9300"]
     assert found["4"] == ["0.7000", "–", "0.3700", "–", "–"]
 
 

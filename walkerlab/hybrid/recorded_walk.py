@@ -18,7 +18,9 @@ from walkerlab.hybrid.rigid_observer import (
     INTEGRAL,
     LATEST,
     MAX_FRICTION_RATIO,
+    MAX_IMPULSE_RATIO,
     MAX_SCUFF_DEPTH,
+    MIN_IMPULSE,
     MIN_NORMAL_FORCE,
     Observer,
     new_observer,
@@ -68,6 +70,8 @@ class RigidWalkResult(WalkRecord):
     min_normal_force: float  # N, of the ground on the stance foot
     max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
     max_scuff_depth: float  # m, of the swing foot below the slope
+    min_normal_impulse: float | None  # N s, of the ground in a strike of knee or heel; None without a step
+    max_impulse_ratio: float  # tangential over normal impulse, where the ground pushes; 0 if nowhere
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean; potential from the contact point at each step's touch
     samples: Samples | None
@@ -149,8 +153,9 @@ class Recorder:
         )
         self.counts += self.method.counts
         worst = self.extremes
-        worst[MIN_NORMAL_FORCE] = min(worst[MIN_NORMAL_FORCE], observer.extremes[MIN_NORMAL_FORCE])
-        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT):
+        for index in (MIN_NORMAL_FORCE, MIN_IMPULSE):
+            worst[index] = min(worst[index], observer.extremes[index])
+        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MAX_IMPULSE_RATIO):
             worst[index] = max(worst[index], observer.extremes[index])
         self.energy_integral += float(observer.energy[INTEGRAL])
         self.duration += float(observer.energy[DURATION])
@@ -215,6 +220,8 @@ class Recorder:
             min_normal_force=float(self.extremes[MIN_NORMAL_FORCE]),
             max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
             max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
+            min_normal_impulse=float(self.extremes[MIN_IMPULSE]) if self.steps else None,
+            max_impulse_ratio=float(self.extremes[MAX_IMPULSE_RATIO]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self._mean_energy(strikes, after),
             samples=joined(self.pieces) if self.pieces else None,

@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import by_reference, inlined, vector
-from walkerlab.mechanics.standing import Mode, energies, ground_reaction, swing_foot
+from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
 NO_FORCE = 1e300  # above any normal force
 # indices into Observer.extremes
-MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT = 0, 1, 2, 3
+MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MIN_IMPULSE, MAX_IMPULSE_RATIO = range(6)
 # indices into Observer.energy
 LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
 CLOSER = 3  # parabolas to an extremum
@@ -27,13 +27,15 @@ class Observer(NamedTuple):
     states: Any  # (samples, 2 n)
     steps: Any  # (samples,) which step a sample belongs to
     recorded: Any  # (1,) samples recorded so far
-    extremes: Any  # (4,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J
+    # (6,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J; of the strikes'
+    # impulses the least normal one N s, and the largest ratio of tangential to normal
+    extremes: Any
     energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
 
 
 def new_observer(times: Any, numbers: int) -> Observer:
     """An observer with memory for samples of a state of some `numbers` at `times` (s, rising)."""
-    extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0])
+    extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0, NO_FORCE, 0.0])
     steps = np.zeros(times.size, np.int64)
     return Observer(True, times, np.zeros((times.size, numbers)), steps, np.zeros(1, np.int64), extremes, np.zeros(5))
 
@@ -50,6 +52,18 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
         kinetic, potential = energies(mode.model, y)
         observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
         record_extremes(observer, mode, y)
+
+
+@inlined
+def observe_strike(observer: Observer, mode: Mode, before: Any, after: Any) -> None:
+    """Take note of the ground's impulse in a strike of knee or heel: all of the change of momentum."""
+    if observer.watching:
+        along, normal = momentum(mode.model, before)
+        along_after, normal_after = momentum(mode.model, after)
+        extremes, impulse = observer.extremes, normal_after - normal
+        extremes[MIN_IMPULSE] = min(extremes[MIN_IMPULSE], impulse)
+        if impulse > 0.0:
+            extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(along_after - along) / impulse)
 
 
 @inlined

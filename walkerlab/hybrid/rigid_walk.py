@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start
+from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start, observe_strike
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
 from walkerlab.mechanics.standing import (
@@ -190,6 +190,7 @@ def take_step(
         if status != WALKED and status != KNEE_STRUCK:
             return status, method.clock[T]
         t = pass_event(method, Mode(model, phase), y)
+        observe_strike(observer, Mode(model, phase), method.y, y)
         if status == WALKED:
             return WALKED, t
         knee_time[step] = t

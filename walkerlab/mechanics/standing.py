@@ -282,6 +282,16 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
 
 
 @inlined
+def momentum(model: Standing, y: Any) -> tuple[float, float]:
+    """Linear momentum (kg m/s): along the slope and normal to it."""
+    n = len(model.arm_x)
+    s, c = vector(model.arm_x), vector(model.arm_x)
+    sines_cosines(model, n, y, s, c)
+    _, _, along, normal = lever_motion(model.arm_x, model.arm_y, n, s, c, y[n : 2 * n])
+    return along - model.mass * model.radius * y[n + STANCE], normal
+
+
+@inlined
 def energies(model: Standing, y: Any) -> tuple[float, float]:
     """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope."""
     n = len(model.arm_x)

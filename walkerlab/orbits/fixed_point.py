@@ -52,6 +52,8 @@ class Gait:
     min_normal_force: float  # N
     max_friction_ratio: float | None  # None if the ground pushes nowhere
     max_scuff_depth: float  # m
+    min_normal_impulse: float  # N s, of the ground in the strikes of heel and knee
+    max_impulse_ratio: float | None  # None if the ground pushes in neither
     trailing_foot_rises: bool  # after the heel strike
     knee_strike: float | None  # s; None for legs without knees
     found_by: tuple[str, ...] = ()  # the searches that led here
@@ -72,6 +74,8 @@ class Gait:
         found = []
         if self.min_normal_force < 0.0:
             found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.min_normal_impulse < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
         if not self.trailing_foot_rises:
             found.append("the foot behind would have to leave through the ground")
         return tuple(found)
@@ -99,6 +103,8 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
         min_normal_force=step.min_normal_force * units.force,
         max_friction_ratio=step.max_friction_ratio or None,
         max_scuff_depth=step.max_scuff_depth * units.length,
+        min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
+        max_impulse_ratio=step.max_impulse_ratio or None,
         trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )

@@ -25,6 +25,10 @@ NUMBERS = {
     "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
     "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
     "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
+    "min_normal_impulse": Label(
+        "N s", "least normal impulse of the ground in a strike of heel or knee", name="min_normal_impulse_N_s"
+    ),
+    "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
 """What is stored and printed of a gait, each a field of `Gait`."""

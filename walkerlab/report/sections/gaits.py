@@ -58,6 +58,8 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
         measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
         Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
+        measured("least normal impulse", "min_normal_impulse_N_s", partial(number, digits=4)),
+        Column("largest impulse ratio", "max_impulse_ratio", partial(fixed, decimals=4)),
         measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(told_apart(depth), 4)),
         Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
     ]
