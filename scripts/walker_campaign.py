@@ -5,28 +5,37 @@
 
 Every search has to end in a gait or in words. Where it finds none, SciPy's `root` tries the step map from the first
 40 that walk of other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
-to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps these
-walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the multipliers'
-k-th powers. `light-hips` are the compasses whose gaits are hardest to follow from a vanishing slope: without any start
-drawn at random both ordinary gaits must be found by name, and each repeat itself in one step of SciPy's DOP853.
+to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps
+these walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the
+multipliers' k-th powers. Every gait's heel strike needs the impulse that the masses' momentum, summed one by one,
+says; one that would have to pull is objected to. `light-hips` are the compasses whose gaits are hardest to follow
+from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
+itself in one step of SciPy's DOP853.
 Prints a table in Markdown, then what went wrong; exits 1 if anything did.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from rigid_physics import momentum_of_masses
+
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.fixed_point import LEAST_START, MOST_START, Gait, GaitSearch, Search, SearchSettings, find_gaits
@@ -41,6 +50,7 @@ STEPS = 10
 ASIDE = 1e-6  # of starts from the gait, in units of leg length and gravity
 STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
 AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE, and what is left of curvature
+IMPULSES = 1e-8  # N s, of a walker of some kilograms
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
@@ -192,7 +202,8 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
     for index in range(walkers):
         light = name == "light-hips"
         described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(*((-3.5, -1.3) if light else (-2.3, -1.0))))
-        walker = standing(assembly_of(described, rigid=True), 9.81, slope, knee_locked_at_strike(described))
+        assembly = assembly_of(described, rigid=True)
+        walker = standing(assembly, 9.81, slope, knee_locked_at_strike(described))
         start = time.process_time()
         search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
         # the first of a type compiles
@@ -200,6 +211,7 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         found.slowest_s = max(found.slowest_s, spent)
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
         found.steps_seen += steps
+        faults += impulse_faults(assembly, walker, search)
         if spent > LONGEST_SEARCH_S:
             faults.append(f"the search took {spent:.0f} s")
         found.ends[end_of(search)] += 1
@@ -250,6 +262,20 @@ def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
     if steps < STEPS and search.gait.stable and not faults:
         faults.append(f"the stable gait is walked for {steps} steps only")
     return faults, steps
+
+
+def impulse_faults(assembly: Assembly, walker: Standing, search: GaitSearch) -> list[str]:
+    """Gaits whose heel strike needs another impulse than the masses' momentum says, or a pull without an objection."""
+    faults = []
+    for gait in search.gaits:
+        step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
+        before, after = (momentum_of_masses(assembly, walker.slope, y[0])[1] for y in (step.before, step.after))
+        told, said = gait.min_normal_impulse, any("in a strike" in one for one in gait.objections)
+        # of knees the other strike may need the lesser impulse
+        off = told - (after - before)
+        if off > IMPULSES or (off < -IMPULSES and gait.knee_strike is None) or said != (told < 0.0):
+            faults.append(f"a heel strike's impulse is {after - before:.6g} N s, told is {told:.6g}")
+    return faults
 
 
 def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
