@@ -1,12 +1,10 @@
 """The fixedpoint stage: what it stores and says, for slopes with and without a gait."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
@@ -86,19 +84,14 @@ def test_another_seed_finds_the_same_gait(paper):
     assert other.summary["random_hits"] != paper.summary["random_hits"]
 
 
-@pytest.mark.parametrize(("slope", "advised"), [(0.009, "Try a steeper slope"), (0.3, "Try a gentler slope")])
-def test_a_walker_with_knees_is_told_on_which_side_of_its_gaits_the_slope_is(slope, advised):
-    assert fixedpoint.advice(load(Path("kneed"), [f"slope_rad={slope}"]).config).startswith(advised)
-
-
 @pytest.mark.parametrize(
     ("slope", "begins", "said", "advised"),
     [
         (0.0, "no gait at", "standing still is no gait", "slope_deg above 0"),
         (-0.05, "no gait at", "does not descend", "slope_deg above 0"),
-        (0.5, "no gait at", "the ground would have to pull", "gentler slope"),
-        (1.5, "no gait was found at", "none of 1100 random starting values", "gentler slope"),
-        (1.5, "no gait was found at", "long-period seed is lost at a slope of", "gentler slope"),
+        (0.5, "no gait at", "the ground would have to pull", "walkerlab continuation"),
+        (1.5, "no gait was found at", "none of 1100 random starting values", "walkerlab continuation"),
+        (1.5, "no gait was found at", "long-period seed is lost at a slope of", "walkerlab continuation"),
     ],
 )
 def test_a_slope_without_a_gait_has_no_answer_in_words(slope, begins, said, advised):

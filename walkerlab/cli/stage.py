@@ -1,7 +1,7 @@
 """A stage's command: run it, or say what would happen; then print the result."""
 
 import shlex
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import typer
@@ -9,10 +9,13 @@ import typer
 from walkerlab.cli.answers import answer, verdict
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
+from walkerlab.errors import NoAnswer
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.runner import Options, StageReport, execute, told_once
 
+SEARCHING = ("fixedpoint", "report")
+"""Stages that look for gaits nearby where there is none."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
@@ -24,13 +27,25 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
         report = execute(config, stage.name, folder, options, graph=graph)
         show(request, as_json(report) | {"dry_run": True}, planned(report))
         return
-    report = execute(config, stage.name, folder, options, request.console, graph)
+    report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
     show(request, as_json(report), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
     if report.no_answer is not None:
         say(report.no_answer, request.typed)
         raise typer.Exit(report.no_answer.exit_code)
+
+
+def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
+    """The report of a slope without a gait, its advice led by where gaits are met."""
+    said = report.no_answer
+    if said is None or report.stage not in SEARCHING or "no gait" not in said.message:
+        return report
+    # Imported here: most commands find their gait.
+    from walkerlab.scene.nearby import nearby
+
+    met = nearby(request.resolved, request.typed)
+    return replace(report, no_answer=NoAnswer(said.message, f"{met} {said.advice}".strip()))
 
 
 def show(request: Request, value: dict[str, Any], text: str) -> None:

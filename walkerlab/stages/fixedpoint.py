@@ -33,8 +33,6 @@ NUMBERS = {
 }
 """What is stored and printed of a gait, each a field of `Gait`."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
-KNEE = "theta_1_shank"
-KNEES_LOCK_AT = 0.05  # rad: where the built-in walkers with knees walk
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
@@ -65,11 +63,7 @@ def advice(config: RigidConfig) -> str:
     )
     if config.slope_rad <= 0.0:
         return f"Let the slope descend in walking direction (slope_deg above 0); {walk_anyway}."
-    if KNEE in coordinates(config):
-        steeper = config.slope_rad < KNEES_LOCK_AT
-        why = "so that the knees lock before the foot comes down" if steeper else "on which the legs swing less far"
-        return f"Try a {'steeper' if steeper else 'gentler'} slope, {why}; {walk_anyway}."
-    return f"Try a gentler slope, or a walker with more of its mass at the hip; {walk_anyway}."
+    return f"Gaits on other slopes are followed by `walkerlab continuation`; {walk_anyway}."
 
 
 def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
