@@ -65,7 +65,8 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
         if "state" in one and [fixed(value, 6) for value in one["state"]] != shown
     }
     found = gaits.gait_table({summary["equations"]: summary, **others}, summary.get("state_names", gaits.STATE))
-    return [head, found, f"{count(summary['gaits_found'], 'gait')} of one step found."]
+    many, sought = f"{count(summary['gaits_found'], 'gait')} of one step found.", summary.get("sought")
+    return [head, found, f"{many} Sought: {sought}; very unstable ones may be missed." if sought else many]
 
 
 def told(title: str, key: str, digits: int = 4) -> Column:

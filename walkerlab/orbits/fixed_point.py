@@ -12,6 +12,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.rigid_walk import LONGEST_SWING
 from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
 from walkerlab.orbits.newton import Floats, NotConverged, newton
@@ -147,6 +148,15 @@ class GaitSearch:
     random_hits: tuple[int, ...] = ()
     random_starts: int = 0
     lost: tuple[str, ...] = ()
+
+    @property
+    def sought(self) -> str:
+        """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
+        return (
+            f"followed from a vanishing slope, and by Newton's method from {self.random_starts} random starts (legs up "
+            f"to {MOST_START[0]:g} rad apart, rates up to {MOST_START[1]:g} sqrt(g/L), steps of at most "
+            f"{LONGEST_SWING:g} sqrt(L/g))"
+        )
 
     @property
     def gait(self) -> Gait | None:

@@ -81,6 +81,7 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
             "gaits_found": len(gaits),
             "gaits": gaits,
             "reason": search.reason,
+            "sought": search.sought,
             "random_starts": search.random_starts,
             "random_hits": list(search.random_hits),
             "lost": list(search.lost),
