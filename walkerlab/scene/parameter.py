@@ -77,7 +77,8 @@ def parameter_of(key: str, config: ContactConfig) -> Parameter:
         raise ConfigError(f"continuation.over: {key} belongs to the contact block, and the config has none", _ADVICE)
     if "number" not in kind(known[key].annotation):
         raise ConfigError(f"continuation.over: {key} is not a number", _ADVICE)
-    return Parameter(key, extra(known[key], "unit") or "1", path)
+    unit = extra(known[key], "unit") or "1"
+    return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, path)
 
 
 _ADVICE = "Name a number that the walker, its slope or its ground is made of; `walkerlab schema` lists every key."
