@@ -24,11 +24,8 @@ def starts():
     outcome = np.resize([int(one) for one in Outcome], (FACTORS.size, FACTORS.size))
     cells = {"outcome": outcome, "steps": np.where(outcome == Outcome.WALKED, STEPS, 1)}
     axes = {f"{name}_factor": Variable(FACTORS, (name,), "1", name) for name in both}
-    maps = {
-        f"{model}{name}": Variable(values, both, "1", name)
-        for model in ("", "rigid_")
-        for name, values in cells.items()
-    }
+    cells |= {f"rigid_{name}": values for name, values in cells.items()}
+    maps = {name: Variable(values, both, "1", name) for name, values in cells.items()}
     marks = {f"{name}_{one}_factor": 1.1 for name in ("adjusted", "gait") for one in both}
     return Group(axes | maps, {**marks, "steps_wanted": STEPS})
 

@@ -48,7 +48,7 @@ CASES = [
     for width in COLUMNS.values()
 ]
 WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m\$\^\{2\.2\}\$|SI)\)")
-PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*|walker.*")
+PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*")
 SMALLEST = 5.0
 """Of letters that are read, pt."""
 TOLD_APART = 15
@@ -82,9 +82,7 @@ def texts_drawn(figure):
     return seen
 
 
-for_all = pytest.mark.parametrize(
-    "drawn", [param.values[0] for param in CASES], ids=[p.id for p in CASES], indirect=True
-)
+for_all = pytest.mark.parametrize("drawn", CASES, indirect=True)
 
 
 @for_all
