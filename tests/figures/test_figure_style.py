@@ -4,6 +4,7 @@ import itertools
 import re
 
 import pytest
+from drawn_texts import texts_drawn
 from howto_figure import FIGURE as OF_THE_DOCS
 from matplotlib.colors import to_hex
 from matplotlib.mathtext import MathTextParser
@@ -65,21 +66,6 @@ def drawn(request):
         settle(made)
         made.texts_drawn = texts_drawn(made)
     return made
-
-
-def texts_drawn(figure):
-    """Every text that the renderer is given, with its box."""
-    seen, draw = [], Text.draw
-
-    def noted(text, renderer):
-        if text.get_visible() and text.get_text().strip():
-            seen.append((text, Text.get_window_extent(text, renderer)))
-        draw(text, renderer)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Text, "draw", noted)
-        figure.draw_without_rendering()
-    return seen
 
 
 for_all = pytest.mark.parametrize("drawn", CASES, indirect=True)

@@ -112,16 +112,18 @@ def break_lines(figure: Figure) -> None:
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 
-def as_file(figure: Figure, kind: str, name: str, title: str) -> bytes:
-    """The figure as SVG with text kept as text, PNG or PDF; `name` makes an SVG's ids differ from other figures'."""
+def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
+    """The figure in a format, an SVG with text kept as text; `name` makes its ids differ from other figures'."""
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
-        "png": {"metadata": {"Software": None, "Title": title}, "dpi": PNG_DPI},
+        "png": {"metadata": {"Software": None, "Title": title}},
         "pdf": {"metadata": {"CreationDate": None, "Title": title}},
+        "eps": {},
+        "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
     }
     file = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi, **undated[kind])
     return file.getvalue()
 
 
@@ -135,7 +137,9 @@ class Drawing:
     caption: str
 
 
-def files_of(figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png")) -> list[bytes]:
+def files_of(
+    figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
+) -> list[bytes]:
     """A figure, plotted within the style, laid out, as a file of each kind."""
     settle(figure)
-    return [as_file(figure, kind, name, title) for kind in kinds]
+    return [as_file(figure, kind, name, title, dpi) for kind in kinds]

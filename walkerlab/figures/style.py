@@ -51,6 +51,7 @@ RC: Final = {
     "lines.dash_capstyle": "butt",
     "mathtext.fontset": "dejavusans",
     "pdf.fonttype": 42,
+    "ps.fonttype": 42,
     "svg.fonttype": "none",
     "xtick.labelsize": 8.0,
     "xtick.major.width": 0.7,
