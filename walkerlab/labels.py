@@ -51,6 +51,12 @@ def unit_by_name(name: str) -> str:
     return UNITS.get(unit_ending(name), "1")
 
 
+def in_words(key: str) -> str:
+    """A key or a name without its unit, as an axis says it: thigh mass of walker.thigh.mass_kg."""
+    ending = unit_ending(key)
+    return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")
+
+
 def with_unit(words: str, unit: str) -> str:
     """Words with a unit in brackets; a pure number, and text, have none."""
     return words if unit in ("", "1") else f"{words} ({unit})"

@@ -1,6 +1,5 @@
 """Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
 
-import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -11,9 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, styled
+from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, label_of, styled
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
+from walkerlab.labels import in_words
 from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
@@ -30,7 +30,7 @@ PREFERRED: Final[tuple[str, ...]] = (
     "min_normal_force_N", "energy_drift_J", "end_time_s",
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
-LABELS: Final = {RADIUS: "largest multiplier (1)"}
+LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
@@ -85,10 +85,7 @@ def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], name
 
 def label(group: Group, name: str) -> str:
     """A variable's axis: its name in words, and its unit."""
-    unit = group.variables[name].units or "1"
-    ending = re.sub(r"[^A-Za-z0-9]+", "_", unit.replace("^", ""))
-    spoken = name.rpartition(".")[2].removesuffix(f"_{ending}").replace("_", " ")
-    return LABELS.get(name, f"{spoken} ({unit})")
+    return label_of(LABELS.get(name, in_words(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
@@ -157,12 +154,11 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
         finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
         one.set_ylabel(label(group, name))
     axes[-1].set_xlabel(label(group, across))
-    spoken, _, unit = label(group, few).rstrip(")").rpartition(" (")
-    unit = "" if unit == "1" else f" {unit}"
+    unit = group.variables[few].units
     key = []
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
-        key.append(entry(f"{spoken} {said}{unit}", **look))
+        key.append(entry(f"{in_words(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
     add_legend(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
     return figure
 

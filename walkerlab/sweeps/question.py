@@ -260,7 +260,4 @@ def described(config: Config, key: str) -> tuple[str, str]:
     if field is None:
         return "1", key
     unit = extra(field, "unit")
-    if " or " in unit:
-        contact: Contact | None = config.contact
-        unit = unit.split(" or ")[0 if contact is None or contact.units == "adams" else 1]
-    return unit, field.description or key
+    return (config.contact or Contact()).unit_of(unit), field.description or key
