@@ -18,12 +18,12 @@ from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
-MOST_PANELS: Final = 4
-MOST_LINES: Final = 5
+MAX_PANELS: Final = 4
+MAX_LINES: Final = 5
 """Values of a second parameter, each of which is a line; of more, there is a map."""
 DASHES: Final = ("-", "--", "-.")
 ONE: Final = "largest multiplier 1"
-MOST_SCATTERED: Final = 20_000
+MAX_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "spectral_radius", "step_length_m", "steps", "slip_per_step_m", "max_penetration_m",
@@ -42,7 +42,7 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
             if np.unique(values[np.isfinite(values)]).size > 1:
                 varying.append(name)
     known = [name for name in PREFERRED if name in varying]
-    return (known or [name for name in varying if "." not in name] or varying)[:MOST_PANELS]
+    return (known or [name for name in varying if "." not in name] or varying)[:MAX_PANELS]
 
 
 def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
@@ -90,12 +90,12 @@ def label(group: Group, name: str) -> str:
 
 def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
     """A row for each number, a column for each parameter; lines where the parameter orders the points."""
-    shown = list(parameters)[:MOST_PANELS]
+    shown = list(parameters)[:MAX_PANELS]
     figure = blank(0.5 + PANEL_HEIGHT * len(names))
     axes = figure.subplots(len(names), len(shown), sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
         x = spread(group, parameter, dims)
-        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_SCATTERED)).astype(int))
+        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
         ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
         for one, name in zip(axes[:, column], names, strict=True):
             y = group[name].astype(float).ravel()
@@ -135,7 +135,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
     """Whether one of two parameters has so few values that each is a line over the other one."""
-    return min(group["outcome"].shape) <= MOST_LINES and len(dims) == 2
+    return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:

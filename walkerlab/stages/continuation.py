@@ -332,7 +332,7 @@ def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed,
     for value in asked.looked_at():
         walker = walker_at(value)
         if walker is not None:
-            section, (_, units) = list(walker.picked), unit_walker(walker)
+            section, (_, units) = list(walker.section_indices), unit_walker(walker)
             in_units = [1.0] + [units.time] * (len(section) - 1)
             gaits = find_gaits(walker, config.seed).gaits
             seeds += [Seed(np.array(gait.state)[section] * in_units, value) for gait in gaits]
