@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import count, cycle, pairwise
@@ -141,12 +141,6 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
     return ((model, group) for model, group in found if group is not None)
 
 
-def model_entries(drawn: Sequence[DrawnBranch], **look: Any) -> list[Artist]:
-    """What the legend has of the models whose branches are drawn."""
-    models = {branch.model for branch in drawn}
-    return [entry(f"{model} model", color=colour, **look) for model, colour in MODELS.items() if model in models]
-
-
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
@@ -179,7 +173,8 @@ def draw_branches(results: Results) -> Drawn:
             axes.set_ylim(*bounds(results, name, shown))
     for axes, title in zip(panels[0], parts, strict=True):
         axes.set_title(title if close else "")
-    key = model_entries(branches, linewidth=1.5)
+    models = {branch.model: MODELS[branch.model] for branch in branches}
+    key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
     if any(branch.colour == OTHER for branch in branches):
         key.append(entry("other gaits", color=OTHER, linewidth=1.0))
     key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
@@ -245,12 +240,6 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
 
 
-def gait_label(branch: DrawnBranch) -> str:
-    """A branch by how long its steps take."""
-    period = branch.group["step_period"]
-    return f"{branch.model} model, steps of {period.min():.3g} to {period.max():.3g} s"
-
-
 GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
     "rigid": (
         {"color": BLUE},
@@ -282,7 +271,8 @@ def draw_multipliers(results: Results) -> Drawn:
         last = multipliers[int(np.argmax(value))]
         left.plot(last.real, last.imag, linestyle="none", marker=">", markersize=4, color=look["color"])
         right.plot(value, np.abs(multipliers), linewidth=1.2, **look)
-        key.append(entry(gait_label(branch), linewidth=1.2, **look))
+        least, most = np.quantile(branch.group["step_period"], (0.0, 1.0))
+        key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", linewidth=1.2, **look))
         largest = max(largest, float(np.abs(multipliers).max()))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
     left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")

@@ -132,17 +132,7 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     length, centre = leg.joints[0][1], leg.centre
     # the joints, and where the leg's line meets its sole's arc
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
-    labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
-    lanes: list[list[Length]] = []
-    for one in (one for one in leg.lengths if one.value):
-        if one.start[1] == one.end[1]:
-            labels.append((said(one.key, one.value), VERMILLION, one.end))
-        elif one.value <= SMALL_ARC * length:
-            labels.append((said(one.key, one.value), BLUE, one.end))
-        elif free := [lane for lane in lanes if all(clear(one, other, length) for other in lane)]:
-            free[0].append(one)
-        else:
-            lanes.append([one])
+    labels, lanes = arranged(leg)
     # letters keep their size, so that they take parts of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
     ahead = [letters([said(one.key, one.value) for one in lane]) for lane in lanes]
@@ -182,6 +172,21 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     if leg.radius > SMALL_ARC * length:
         axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
     return figure
+
+
+def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
+    """What is named behind the leg, with its colour and place, and the measures of height in lanes ahead of it."""
+    length, lanes = leg.joints[0][1], list[list[Length]]()
+    labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
+    for one in (one for one in leg.lengths if one.value):
+        level = one.start[1] == one.end[1]
+        if level or one.value <= SMALL_ARC * length:
+            labels.append((said(one.key, one.value), VERMILLION if level else BLUE, one.end))
+        elif free := [lane for lane in lanes if all(clear(one, other, length) for other in lane)]:
+            free[0].append(one)
+        else:
+            lanes.append([one])
+    return labels, lanes
 
 
 def letters(texts: Sequence[str]) -> int:

@@ -13,7 +13,7 @@ from walkerlab.store.content import Content, Group
 ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
     ("angle", 0, "angle of leg 1 (rad)"),
     ("angle", 1, "angle of leg 2 (rad)"),
-    ("mechanical_J", ..., "energy (J)"),
+    ("mechanical_J", slice(None), "energy (J)"),
 )
 LOOKS: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "linewidth": 1.3},
