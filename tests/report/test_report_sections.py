@@ -193,20 +193,21 @@ def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
 
 
 def test_the_papers_numbers_are_counted_by_verdict():
-    verdict = sections()["verdict"]
-    (shares,) = blocks(verdict, Shares)
+    printed = sections()["printed"]
+    (shares,) = blocks(printed, Shares)
+    assert printed.finding == "Of 4 numbers, 1 reproduced, 2 refuted and 1 explained."
     assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("refuted", 2, "bad"))
     assert sum(count for _, count, _ in shares.parts) == len(PAPER_ROWS)
 
 
 def test_the_verdict_says_which_numbers_fared_how():
-    said = {finding.about: finding.text for finding in blocks(sections()["verdict"], Statements)[1].items}
+    said = {finding.about: finding.text for finding in blocks(sections()["printed"], Statements)[0].items}
     assert list(said) == ["Reproduced:", "Explained:", "Refuted:"]
     assert said["Refuted:"] == "Table 3 (all 2)."
 
 
 def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
-    (error,) = blocks(sections()["verdict"], Statements)[-1].items
+    (error,) = blocks(sections()["printed"], Statements)[-1].items
     assert "A.5 row 2" in error.about
     assert "energy drifts by 0.13 J" in error.text
 
@@ -219,7 +220,7 @@ def test_every_headline_is_of_an_erratum_that_is_looked_for():
 def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_on_a_page_of_its_own():
     other = stored("compare", compare().groups, {**compare().summary, "departures": ["slope_rad 0.05"]})
     found = sections(compare=other)
-    assert not blocks(found["verdict"], Shares)
+    assert "printed" not in found
     assert "paper" not in texts(found["verdict"]).lower()
     assert found["paper-numbers"].page == PAPER
     (said,) = blocks(found["paper-numbers"], Paragraph)

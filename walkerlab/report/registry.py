@@ -35,6 +35,7 @@ SectionMaker = Callable[[Results], Section | None]
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,
     motion.section,
+    verdict.printed,
     motion.figures,
     gaits.section,
     families.section,

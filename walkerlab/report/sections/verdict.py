@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
-from walkerlab.report.numbers import count
+from walkerlab.report.numbers import count, listed
 from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
@@ -31,9 +31,17 @@ def section(results: Results) -> Section:
         blocks.append(Statements(tuple(fared), "cards"))
     if departs := departure(results):
         blocks.append(Paragraph(departs))
-    if rows:
-        blocks += of_the_paper(results, rows)
     return Section("verdict", "Verdict", tuple(blocks) or (Paragraph("There are no results to judge."),))
+
+
+def printed(results: Results) -> Section | None:
+    """How the numbers that the paper prints fared, and its gravest errors; None for another walker's results."""
+    rows = paper_numbers(results) if results.of_the_paper else ()
+    if not rows:
+        return None
+    fared = Counter(row["verdict"] for row in rows)
+    finding = f"Of {count(len(rows), 'number')}, {listed(f'{many} {name}' for name, many in fared.items())}."
+    return Section("printed", "What the paper prints", tuple(of_the_paper(results, rows)), finding)
 
 
 def failures(results: Results) -> list[str]:
