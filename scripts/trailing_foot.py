@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.ground.motion import motion_gradient, tree_equations
+from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
     LOCKED,
     FootMotion,
@@ -33,6 +33,7 @@ from walkerlab.ground.walker import (
     sines_cosines,
 )
 from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.mechanics.tree import add_inertia, projections
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
@@ -77,12 +78,14 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Flo
 def freed(system: OnGround, y: Floats) -> FootMotion:
     """The trailing foot after an impact that only the leading foot takes: M dv = J' impulse, J v+ = 0."""
     form, n = system.form, int(system.form.bodies)
-    s, c, M, masses = np.zeros(n), np.zeros(n), np.zeros((n, n)), np.diag([float(form.mass)] * (2 + n))
+    s, c, F, U, unused = np.zeros((5, n))
+    M, masses = np.zeros((n, n)), np.diag([float(form.mass)] * (2 + n))
     sines_cosines(form, y, s, c)
-    tree_equations(form, s, c, y, M, np.zeros(n))
+    add_inertia(form, n, s, c, y[4 + n :], M, unused)
     masses[2:, 2:] = M
     # how fast the leading foot slips and sinks, by each velocity
-    J = np.array([motion_gradient(form, LEADING, s, c, y, 2 + n + i)[1:] for i in range(2 + n)]).T
+    projections(form.foot_x[LEADING], form.foot_y[LEADING], n, s, c, F, U)
+    J = np.array([motion_gradient(form, LEADING, F, U, y, 2 + n + i)[1:] for i in range(2 + n)]).T
     v = y[2 + n :]
     taken = np.linalg.solve(masses, J.T)
     after = v - taken @ np.linalg.solve(J @ taken, J @ v)

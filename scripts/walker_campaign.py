@@ -38,7 +38,7 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.fixed_point import LEAST_START, MOST_START, Gait, GaitSearch, Search, SearchSettings, find_gaits
+from walkerlab.orbits.fixed_point import MAX_START, MIN_START, Gait, GaitSearch, Search, SearchSettings, find_gaits
 from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
@@ -231,8 +231,8 @@ def overlooks(walker: Standing) -> bool:
     """Whether another method finds a gait of a walker of which a search finds none."""
     search = Search(walker, SETTINGS)
     looking, still = search.looking, search.walker.slope + search.walker.lean
-    d = len(search.walker.picked)
-    starts = np.random.default_rng(7).uniform(LEAST_START[:d], MOST_START[:d], (OTHER_STARTS, d))
+    d = len(search.walker.section_indices)
+    starts = np.random.default_rng(7).uniform(MIN_START[:d], MAX_START[:d], (OTHER_STARTS, d))
     starts[:, 0] = 0.5 * starts[:, 0] - still
 
     def residual(z: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -235,7 +235,7 @@ from typing import NamedTuple
 from walkerlab import compiler
 from walkerlab.compiler import compiling
 from walkerlab.kernel_cache import watched
-from walkerlab.kernels import by_type, by_type_or_default, inlined, kernel, vector, woven
+from walkerlab.kernels import by_type, by_type_or_default, inlined, kernel, vector, always_inline
 
 
 class Thing(NamedTuple):
@@ -257,7 +257,7 @@ def factor(thing):
     return 1.0 / 3.0
 
 
-@woven
+@always_inline
 def scaled(x, by):
     return x * by
 

@@ -2,7 +2,7 @@
 
 Numba's own cache does not notice that a called function in another file changed, so the folder is keyed by a digest of
 all sources that kernels can be made of: an edited function can never run stale. It serves this package's kernels alone:
-what another program compiles with Numba stays where that program has it.
+caches of other programs that compile with Numba are untouched.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ PACKAGE = Path(__file__).parent
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
-UNUSED_S = 30 * 86_400.0  # an older generation that no process has begun to use for so long is nobody's
+UNUSED_S = 30 * 86_400.0  # an older generation that no process has begun to use for so long may be deleted
 
 
 class CacheWarning(RuntimeWarning):

@@ -31,7 +31,7 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": Fa
 # parts of a kernel are never entered from outside
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # of what takes lanes: handing them on in memory costs as much as the work
-WOVEN_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
+ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
@@ -55,9 +55,9 @@ def inlined(function: F) -> F:
     return function
 
 
-def woven(function: F) -> F:
+def always_inline(function: F) -> F:
     """As `inlined`, and put into the code of its callers, however large."""
-    compile_as(function, lambda *_: (function, WOVEN_FLAGS))
+    compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
 
@@ -100,7 +100,7 @@ class ByType:
         """Take name and documentation from `declaration`."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
-        self._woven: set[type] = set()
+        self._always_inline: set[type] = set()
         self._default: Callable[..., Any] | None = None
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
@@ -111,16 +111,16 @@ class ByType:
         """Whether a type has a body of its own."""
         return chosen in self._bodies
 
-    def case(self, chosen: type, woven: bool = False) -> Callable[[F], F]:
+    def case(self, chosen: type, always_inline: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
 
-        woven  it is put into the code of its callers, however large, and never called
+        always_inline  it is put into the code of its callers, however large, and never called
         """
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
-            if woven:
-                self._woven.add(chosen)
+            if always_inline:
+                self._always_inline.add(chosen)
             return body
 
         return register
@@ -133,7 +133,7 @@ class ByType:
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
         """The body for numba's type of a first argument, and how it is compiled."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._body_for(chosen, str(kind)), WOVEN_FLAGS if chosen in self._woven else PART_FLAGS
+        return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._always_inline else PART_FLAGS
 
     def _body_for(self, chosen: type, said: str) -> Callable[..., Any]:
         body = self._bodies.get(chosen, self._default)

@@ -7,7 +7,7 @@ from typing import Final, get_args, get_type_hints
 
 UNITS: Final = {
     "rad": "rad", "deg": "deg", "m": "m", "s": "s", "N": "N", "J": "J", "kg": "kg", "m_s": "m/s", "m_s2": "m/s^2",
-    "rad_s": "rad/s", "N_s_m": "N s/m", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
+    "rad_s": "rad/s", "N_s_m": "N s/m", "N_s": "N s", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
 }  # fmt: skip
 """By what names of numbers end in."""
 
@@ -49,6 +49,12 @@ def unit_ending(name: str) -> str:
 def unit_by_name(name: str) -> str:
     """The unit that a name ends in; '1' for none."""
     return UNITS.get(unit_ending(name), "1")
+
+
+def in_words(key: str) -> str:
+    """A key or a name without its unit, as an axis says it: thigh mass of walker.thigh.mass_kg."""
+    ending = unit_ending(key)
+    return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")
 
 
 def with_unit(words: str, unit: str) -> str:

@@ -28,8 +28,8 @@ def branch(period, value, stable, spread, marks):
     return Group(variables, {"period": period, "begins": "start", "ends": "end of the span"})
 
 
-def families(curves=True):
-    """The result of `continuation` as figures see it."""
+def families(curves=True, flips=True):
+    """The result of `continuation` as figures see it; without flips, of its gait of one step alone."""
     one = np.array([1.0, 3.0, 4.5, END])
     two = np.array([4.2, 4.6, END])
     groups = {
@@ -54,7 +54,7 @@ def families(curves=True):
     if curves:
         plane = {
             "value": Variable(np.array([4.5, FLIP, 3.5]), ("point",), "deg", "slope_deg"),
-            "second": Variable(np.array([5.0, 10.0, 20.0]), ("point",), "1", "walker.hip_mass_kg"),
+            "second": Variable(np.array([5.0, 10.0, 20.0]), ("point",), "kg", "walker.hip_mass_kg"),
         }
         groups["rigid/curve_0"] = Group(plane, {"kind": "flip", "period": 1})
         groups["curves"] = Group(
@@ -67,7 +67,7 @@ def families(curves=True):
         groups["rigid/regions"] = Group(
             {
                 "value": Variable(np.array([3.0, 4.0, 5.0]), ("first",), "deg", "slope_deg"),
-                "second": Variable(np.array([5.0, 15.0]), ("second",), "1", "walker.hip_mass_kg"),
+                "second": Variable(np.array([5.0, 15.0]), ("second",), "kg", "walker.hip_mass_kg"),
                 "period": Variable(np.array([[1, 1], [1, 2], [0, -1]]), ("first", "second"), "1", "period"),
             }
         )
@@ -91,4 +91,7 @@ def families(curves=True):
                         "ended": "fell", "periods": [0, 1]}],
         "curves": [],
     }  # fmt: skip
+    if not flips:
+        groups = {"branches": groups["branches"], "rigid/branch_0": branch(1, one, np.full(4, True), 0.0 * one, [])}
+        summary |= {"bifurcations": [], "attractors": [], "first_doubling": {}}
     return {"continuation": stored("continuation", groups, summary)}

@@ -15,7 +15,6 @@ from walkerlab.cli.exports import Target, export_from
 from walkerlab.cli.films import Film, walk_in, write_film
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.figures.style import PNG_DPI
 from walkerlab.report.tables import in_tex
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
@@ -37,7 +36,10 @@ def run(tmp_path, monkeypatch):
     return RunFolder.at(folder)
 
 
-@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")])
+@pytest.mark.parametrize(
+    ("kind", "start"),
+    [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("eps", b"%!PS-Adobe"), ("tiff", b"II")],
+)
 def test_a_figure_in_every_format(run, kind, start):
     path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
     assert path.name == f"paper-figure-07.{kind}"
@@ -48,7 +50,14 @@ def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
     for points in (252.0, 300.0):
         file = Target("png", tmp_path / f"{points}.png")
         with Image.open(export_from(run, "figure-07", file, points, "", QUIET)) as image:
-            assert image.size[0] == pytest.approx(points / 72.0 * PNG_DPI, abs=1.0)
+            assert image.size[0] == pytest.approx(points / 72.0 * 300.0, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["png", "tiff"])
+def test_pixels_are_as_many_an_inch_as_are_asked_for(run, kind):
+    with Image.open(export_from(run, "figure-07", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
+        assert image.size[0] == pytest.approx(3.5 * 600.0, abs=1.0)
+        assert image.info["dpi"] == pytest.approx((600.0, 600.0), abs=0.1)
 
 
 def test_fonts_of_a_pdf_are_embedded_as_truetype(run):

@@ -1,10 +1,14 @@
 """What the figures of families of gaits show."""
 
+import re
+
 import numpy as np
 import pytest
 from synthetic_families import END, FLIP, families
 
-from walkerlab.figures.canvas import styled
+from walkerlab.config.fields import leaves, leaves_of_other_kinds
+from walkerlab.config.schema import Config
+from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.families import (
     FIGURE_13,
     FIGURE_14,
@@ -12,10 +16,16 @@ from walkerlab.figures.families import (
     MODELS,
     STYLES,
     Curve,
+    DrawnBranch,
     curve_of,
+    finely,
+    multipliers_of,
     region_kinds,
     stretch_of,
 )
+from walkerlab.figures.style import GREY
+from walkerlab.labels import in_words
+from walkerlab.store.content import Group, Variable
 
 FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
 
@@ -90,3 +100,67 @@ def test_gaits_part_from_a_flip_as_the_root_of_the_distance():
     assert set(value) <= set(x)
     crossed = Curve(value, quantity, np.array([True, True]), ((1, "flip"),))
     assert stretch_of(crossed, 0, 2)[0].tolist() == value.tolist()
+
+
+def test_each_gait_of_one_step_has_its_own_look_and_says_how_long_its_steps_take():
+    results = families()
+    result = results["continuation"]
+    result.groups["rigid/branch_1"].attrs["period"] = 1
+    with styled():
+        figure = FIGURE_14.draw(results)[0]
+    looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[1].lines} - {(GREY, "-")}
+    assert len(looks) == 2
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert said[0] == "rigid model, steps of 0.7 to 0.7 s"
+    assert said[1] == "rigid model, steps of 0.6 to 0.8 s"
+
+
+def test_multipliers_that_meet_turn_as_roots_do():
+    product = np.linspace(0.20, 0.31, 6)
+    known = np.array([np.roots([1.0, -1.0, one]) for one in product], dtype=complex)
+    group = Group(
+        {
+            "multiplier_real": Variable(known.real, ("point", "multiplier"), "1", "real"),
+            "multiplier_imag": Variable(known.imag, ("point", "multiplier"), "1", "imaginary"),
+        }
+    )
+    found = multipliers_of(DrawnBranch("rigid", group))
+    # both are real up to a product of a quarter, and then on a circle of its root
+    exact = [np.sort(np.abs(np.roots([1.0, -1.0, one])))[::-1] for one in finely(product)]
+    np.testing.assert_allclose(np.abs(found), exact, atol=1e-9)
+
+
+def test_gaits_that_change_nowhere_are_drawn_once():
+    with styled():
+        figure = FIGURE_13.draw(families(flips=False))[0]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["", ""]
+
+
+def test_ticks_beside_a_lonely_flip_have_few_digits():
+    results = families()
+    summary = results["continuation"].summary
+    summary["to"] = summary["attractors"][0]["to"] = FLIP + 1e-6
+    with styled():
+        figure = FIGURE_13.draw(results)[0]
+        settle(figure)
+    for axes in figure.axes:
+        low, high = axes.get_ylim()
+        assert high - low >= 0.04 * abs(high)
+        assert all(len(label.get_text()) <= 6 for label in axes.get_yticklabels())
+
+
+def test_keys_are_words_on_axes():
+    result = families()["continuation"]
+    for key, unit, said in (
+        ("walker.hip_mass_kg", "kg", "hip mass (kg)"),
+        ("walker.thigh.mass_below_hip_m", "m", "thigh mass below hip (m)"),
+        ("contact.stiffness", "N/mm^e", "contact stiffness (N/mm$^{e}$)"),
+        ("gravity_m_s2", "m/s^2", "gravity (m/s$^{2}$)"),
+        ("contact.exponent", "1", "contact exponent"),
+    ):
+        result.summary.update(over=key, unit=unit)
+        with styled():
+            for figure in (FIGURE_13, FIGURE_14, FIGURE_16):
+                assert said in {axes.get_xlabel() for axes in figure.draw({"continuation": result})[0].axes}
+    keys = [path for path, _ in (*leaves(Config), *leaves_of_other_kinds(Config)) if path[0] != "name"]
+    assert all(re.fullmatch(r"[a-zA-Z0-9() -]+", in_words(".".join(path))) for path in keys)

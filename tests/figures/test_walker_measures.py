@@ -1,16 +1,20 @@
 """The pictures of walkers' measures: they name what a config names, lie where it says, and are those of the docs."""
 
+import itertools
 import re
 import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_texts import texts_drawn
 
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, draw_walker
+from walkerlab.config.loader import load
 from walkerlab.config.walkers import Kneed, PartsWalker, StraightLegs
-from walkerlab.figures.measures import drawn, of_parts, upright
+from walkerlab.figures.canvas import settle, styled
+from walkerlab.figures.measures import drawn, of_parts, of_type, upright
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
@@ -62,19 +66,61 @@ def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
     assert draw_walker(Path("kneed"), Target("png", Path("it")), Console()).read_bytes().startswith(b"\x89PNG")
 
 
-def test_words_of_two_parts_at_one_point_stand_on_either_side_of_it():
+OF_TYPES = (
+    ("paper", []),
+    ("kneed", []),
+    ("torso", []),
+    ("round-feet", ["walker.foot_centre_ahead_m=0.05", "walker.leg_mass_ahead_m=-0.04"]),
+    ("round-feet", ["walker.leg_mass_below_hip_m=0.02", "walker.foot_centre_ahead_m=-0.05"]),
+    ("paper", ["walker.foot_to_mass_m=0.02", "walker.foot_radius_m=0.01"]),
+    ("kneed", ["walker.thigh.length_m=0.4", "walker.shank.length_m=0.42", "walker.shank.mass_ahead_m=0.02"]),
+    ("kneed", ["walker.thigh.mass_below_hip_m=0.0123", "walker.thigh.mass_ahead_m=0.0312",
+               "walker.shank.inertia_kg_m2=0.0123", "walker.shank.mass_below_knee_m=0.4567"]),
+)  # fmt: skip
+
+
+def parts(radius=0.0, at=(0.0, 0.0)):
+    """Two legs on a hip with a mass on it, another one beside, and feet of a radius."""
     legs = ("leg 1", "leg 2")
-    walker = PartsWalker(
+    return PartsWalker(
         type="parts",
         bodies=[{"name": name, "mass_kg": 5, "centre_m": [0, -0.5]} for name in legs],
         hinges=[
             {"name": "hip", "parent": legs[1], "parent_point_m": [0, 0], "child": legs[0], "child_point_m": [0, 0]}
         ],
-        particles=[{"name": "hip", "mass_kg": 10, "body": legs[1], "at_m": [0, 0]}],
-        feet=[{"body": name, "centre_m": [0, -1]} for name in legs],
+        particles=[
+            {"name": "hip", "mass_kg": 10, "body": legs[1], "at_m": [0, 0]},
+            *({"name": f"weight on {name}", "mass_kg": 1, "body": name, "at_m": list(at)} for name in legs),
+        ],
+        feet=[{"body": name, "centre_m": [0.01, radius - 1.0], "radius_m": radius} for name in legs],
         legs=[[name] for name in legs],
         leg_length_m=1.0,
     )
-    (axes,) = of_parts(walker).axes
-    sides = [text.xyann[1] > 0.0 for text in axes.texts if text.xy == (0.0, 0.0)]
-    assert sorted(sides) == [False, True]
+
+
+def figures():
+    for name, changed in OF_TYPES:
+        yield of_type(load(Path(name), changed).config.walker)
+    yield from (of_parts(load(Path("parts")).config.walker), of_parts(parts()), of_parts(parts(0.2, (0.0, -0.48))))
+
+
+@pytest.mark.parametrize("place", range(len(OF_TYPES) + 3))
+def test_no_words_meet_or_leave_the_picture(place):
+    with styled():
+        figure = next(itertools.islice(figures(), place, None))
+        settle(figure)
+        words = texts_drawn(figure)
+    for text, box in words:
+        assert box.x0 >= 0.0, text
+        assert box.y0 >= 0.0, text
+        assert box.x1 <= figure.bbox.width, text
+        assert box.y1 <= figure.bbox.height, text
+    for (text, box), (other, other_box) in itertools.combinations(words, 2):
+        assert not box.overlaps(other_box), (text, other)
+
+
+def test_a_leg_of_parts_ends_on_its_arc():
+    (axes,) = of_parts(parts(0.2)).axes
+    sole, leg = (line for line in axes.lines if line.get_linewidth() == 2.0)
+    low = int(np.argmin(sole.get_ydata()))
+    assert (leg.get_xdata()[-1], leg.get_ydata()[-1]) == pytest.approx((sole.get_xdata()[low], sole.get_ydata()[low]))

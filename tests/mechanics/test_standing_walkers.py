@@ -281,7 +281,7 @@ def test_what_goes_to_zero_leaves_the_compass(order, walker):
     errors = []
     for e in (1e-3, 1e-4):
         model = standing(walker(e), G, SLOPE)
-        full = y if len(model.blank) == 4 else (*y[:2], 0.05, *y[2:], -0.95)
+        full = y if len(model.zero_state) == 4 else (*y[:2], 0.05, *y[2:], -0.95)
         errors.append(np.abs(np.array(rates(model, BENT, full))[:2] - wanted).max())
     assert np.log10(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 

@@ -80,7 +80,7 @@ def test_the_knee_strikes_when_the_published_one_does():
 def test_the_step_maps_derivative_is_its_slope_through_the_knee_strike(at_strike):
     model = standing(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
     shooting = Shooting(model, TIGHT)
-    z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.picked)]
+    z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.section_indices)]
     DP, h = shooting.walk(section_of(model), z).DP[0], 1e-4
 
     def ahead(offset):

@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from walkerlab.config.walkers import Kneed, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
-from walkerlab.orbits.fixed_point import LEAST_START, LOOKING, MOST_START, SearchSettings, find_gaits
+from walkerlab.orbits.fixed_point import LOOKING, MAX_START, MIN_START, SearchSettings, find_gaits
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.parts import assembly_of
@@ -72,7 +72,7 @@ def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_g
 
 def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found):
     walker, _ = unit_walker(with_torso())
-    starts = np.random.default_rng(1).uniform(LEAST_START[:3], MOST_START[:3], (2000, 3))
+    starts = np.random.default_rng(1).uniform(MIN_START[:3], MAX_START[:3], (2000, 3))
     starts[:, 0] = 0.5 * starts[:, 0] - walker.slope
     walked = 0
     for z in starts:

@@ -27,7 +27,7 @@ def gait_of(found):
     return find_gaits(rigid_walker(found, found.equations)).gait
 
 
-@pytest.mark.parametrize("degrees", [2, 3, 5])
+@pytest.mark.parametrize("degrees", [2, 3, 4, 5])
 def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
     one = config(KNEED, f"slope_deg={degrees}", base=Path("kneed"))
     assert gait_of(one) is None
@@ -38,8 +38,9 @@ def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
     assert beyond is None or not beyond.stable
 
 
-def test_the_command_that_is_told_finds_a_stable_gait():
-    said = nearby(config("slope_deg=40"), " --set slope_deg=40")
+@pytest.mark.parametrize("slope", ["slope_deg=40", "slope_rad=0.7"])
+def test_the_command_that_is_told_finds_a_stable_gait(slope):
+    said = nearby(config(slope), f" --set {slope}")
     command = re.search("`(.*)`", said)[1]
     sets = [word for word in shlex.split(command) if "=" in word]
     assert said.startswith("A stable gait exists from ")

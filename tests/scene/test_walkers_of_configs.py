@@ -30,7 +30,7 @@ def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
     one, other = rigid_walker(own, "corrected"), rigid_walker(kneed, "corrected")
     assert one.dtype == other.dtype
     assert numbers_of(one) == pytest.approx(numbers_of(other), rel=1e-15)
-    assert (one.picked, one.roles.tolist()) == (other.picked, other.roles.tolist())
+    assert (one.section_indices, one.roles.tolist()) == (other.section_indices, other.roles.tolist())
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
     model = rigid_walker(config, "corrected")
     assert model.mass == pytest.approx(mass, rel=1e-11)
     assert config.walker.total_mass_kg == pytest.approx(mass, rel=1e-11)
-    assert len(coordinates(config)) == len(model.blank) == numbers
+    assert len(coordinates(config)) == len(model.zero_state) == numbers
     assert len(assembly_of(config.walker).feet) == 2
 
 

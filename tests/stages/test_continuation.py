@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -178,6 +179,13 @@ def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
     flips = np.interp(plane["second"], curve["second"][order], curve["value"][order])
     assert plane["period"].tolist() == [[1 if value < flip else 2 for flip in flips] for value in plane["value"]]
     assert sum(one["share"] for one in found.summary["regions"]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("paper", "mm/s"), ("contact-si", "m/s")])
+def test_the_unit_of_a_contact_key_is_that_of_the_config(name, unit):
+    config = load(Path(name)).config
+    assert parameter_of("contact.stiction_velocity", config).unit == unit
+    assert parameter_of("walker.hip_mass_kg", config).unit == "kg"
 
 
 def test_what_follows_from_a_key_follows_it():

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.stages.progress import Silent
-from walkerlab.stages.walk import FIRST_STEPS, LAST_STEPS, MOST_BETWEEN, thinned
+from walkerlab.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thinned
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
     kept = thinned(samples, ends, Silent())
     first, last = samples.time_s < FIRST_STEPS, samples.time_s >= ends.size - LAST_STEPS
     assert np.isin(samples.time_s[first | last], kept.time_s).all()
-    assert kept.time_s.size <= MOST_BETWEEN + 2 * ends.size + (first | last).sum()
+    assert kept.time_s.size <= MAX_BETWEEN + 2 * ends.size + (first | last).sum()
     assert kept.time_s.size < samples.time_s.size / 8
 
 

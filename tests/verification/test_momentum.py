@@ -7,8 +7,8 @@ from walkerlab.config.stability import Case
 from walkerlab.verification import momentum
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.momentum import (
+    MAX_UNKNOWN,
     MEASURE,
-    MOST_UNKNOWN,
     impulse,
     momentum_balance,
     momentum_finding,
@@ -62,14 +62,14 @@ def test_beside_a_hinge_that_pushes_too_it_is_not_measured():
 def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():
     ready = ready_for("stiction-1e-7")
     found = momentum_balance(*ready)
-    assert found.unresolved > MOST_UNKNOWN > found.unsure
+    assert found.unresolved > MAX_UNKNOWN > found.unsure
     said = momentum_finding(*ready)
     assert isinstance(said, NotMeasured)
     assert "below the tolerance" in said.why
 
 
 def test_where_the_sums_do_not_settle_it_is_not_measured(monkeypatch):
-    monkeypatch.setattr(momentum, "MOST_UNKNOWN", 1e-9)
+    monkeypatch.setattr(momentum, "MAX_UNKNOWN", 1e-9)
     said = momentum_finding(*ready_for("paper"))
     assert isinstance(said, NotMeasured)
     assert "do not settle" in said.why

@@ -39,7 +39,7 @@ def cases_of(config, gait=GAIT):
 def start_of(config):
     """Legs apart on the slope, knees straight and the torso on the bisector, moving."""
     model = rigid_walker(config, "corrected")
-    bodies = len(model.blank) // 2
+    bodies = len(model.zero_state) // 2
     stance = 0.2
     swing = -2.0 * (config.slope_rad + config.walker.lean_rad) - stance
     more = 0.5 * (swing + stance) if config.walker.torso is not None else swing

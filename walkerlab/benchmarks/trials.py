@@ -87,7 +87,7 @@ class RigidTrial:
                 return TrialRun(Outcome.WALKED.label, state, evaluations, 0, 0)
 
             return as_a_script
-        n, entry = len(self.walker.blank), METHODS[method]
+        n, entry = len(self.walker.zero_state), METHODS[method]
         solver = entry.new(n, rtol, atol, budget)
         finder = finder_for(solver, RIGID_EVENTS)
         walker, observer = np.asarray(self.walker), unwatched()

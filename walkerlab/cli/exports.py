@@ -23,12 +23,14 @@ from walkerlab.store.runfolder import RunFolder
 if TYPE_CHECKING:
     from walkerlab.figures.illustration import Illustration
 
-FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png"), ("csv", "tex"), ("csv", "nc")
+FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "tex"), ("csv", "nc")
 DRAWING_KINDS = ("svg", "pdf", "png")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 TRAJECTORY = "trajectory"
 COLUMNS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal, pt."""
+DPI = 300
+"""Of a journal's pictures."""
 STORED_WITH = "outputs: [states, energies, forces] has it."
 """What a walk without a trajectory lacks in its config."""
 NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
@@ -72,10 +74,12 @@ def put(path: Path, data: bytes, console: Console) -> Path:
     return path
 
 
-def export_from(folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console) -> Path:
+def export_from(
+    folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = DPI
+) -> Path:
     """Write one thing of a run as a file, and say where it is.
 
-    width  of a figure, pt
+    width  of a figure, pt; of a picture of pixels, it has `dpi` an inch
     model  the stage whose trajectory is meant
 
     Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
@@ -90,7 +94,7 @@ def export_from(folder: RunFolder, what: str, target: Target, width: float, mode
         stem, kinds, make = what, TABLE_KINDS, lambda kind: table(folder, what, kind)
     else:
         illustration = figure_in(folder, what)
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width, dpi)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
     return put(path, make(kind), console)
 
@@ -126,15 +130,15 @@ def figure_in(folder: RunFolder, name: str) -> Illustration:
     raise ConfigError(f"nothing is called {name}.{meant}", advice)
 
 
-def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float) -> bytes:
-    """A figure, drawn again with a width in pt; StaleError if the run lacks what it needs."""
+def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float, dpi: int) -> bytes:
+    """A figure, drawn again with a width in pt and pixels an inch; StaleError if the run lacks what it needs."""
     stored = results_in(folder, illustration.stages)
     why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    return illustration.as_file(stored, kind, width)
+    return illustration.as_file(stored, kind, width, dpi)
 
 
 def table(folder: RunFolder, name: str, kind: str) -> bytes:

@@ -78,12 +78,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         request: Request,
         run: RunArgument,
         what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
-        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, csv, tex or nc.")] = None,
+        to: Annotated[
+            str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc.")
+        ] = None,
         output: Output = None,
         columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 1,
         width: Annotated[
             float | None, typer.Option(min=72.0, metavar="PT", help="Width of a figure in points; a column has 252.")
         ] = None,
+        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels an inch, of PNG and TIFF.")] = 300,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
@@ -93,7 +96,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.stages.runs import run_named
 
             folder, points = run_named(run, request.runs), width or COLUMNS[columns]
-            print(export_from(folder, what, Target(to, output), points, walk_in(folder, model), request.console))
+            whose = walk_in(folder, model)
+            print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
 
     @command(app)
     def draw(

@@ -149,6 +149,10 @@ class Contact(Block):
         """Whether the ground holds feet back, by whatever law."""
         return self.friction != "none"
 
+    def unit_of(self, either: str) -> str:
+        """The unit of a key, of those that its text names for either units."""
+        return either.split(" or ")[-1 if self.units == "si" else 0]
+
     def in_si(self) -> ContactSI:
         """The force laws in SI units."""
         scale = MM_PER_M if self.units == "adams" else 1.0

@@ -2,24 +2,35 @@
 
 import contextlib
 import io
+import re
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import matplotlib
 import matplotlib.style
-import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from walkerlab.figures.style import LEGEND_LETTERS, NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
+from walkerlab.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
+from walkerlab.labels import with_unit
 
-LETTER, BESIDE_LABEL = 0.07, 0.65
-"""Width of a legend's letter, and of all that is beside a label, in, at the ordinary size of its letters."""
+FILLS = 0.95
+"""Of the width that there is, at most: by a legend, a title or a label."""
+ROWS = 3
+"""Of a legend, for which a figure's height has room; it grows by those of a longer one."""
 SHRINKS = 0.7
 """Power of its width that a figure's height follows: letters keep their size."""
+
+BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
+"""Multiples of a power of ten that have labels too, on axes whose ends are less than a factor apart."""
+LONGEST: Final = 1e4
+"""Number that is written without its exponent."""
 
 
 @contextlib.contextmanager
@@ -33,17 +44,27 @@ def styled(width: float = WIDTH) -> Iterator[None]:
         yield
 
 
-def is_narrow(figure: Any) -> bool:
-    """Whether letters are smaller in a figure."""
-    return bool(figure.bbox.width < NARROW_BELOW * figure.dpi)
-
-
 def blank(height: float) -> Figure:
     """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def label_of(words: str, unit: str) -> str:
+    """An axis in words, with its unit."""
+    return with_unit(words, re.sub(r"\^([\w.]+)", r"$^{\1}$", unit))
+
+
+def label_ticks(axis: Axis) -> None:
+    """Labels of a logarithmic axis: at as many decades as there is room for, and between them where these are few."""
+    least, last = axis.get_view_interval()
+    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
+    axis.set_major_locator(LogLocator(subs=(1.0, *between)))
+    axis.set_minor_locator(NullLocator())
+    if between:
+        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
 
 
 def entry(label: str, **look: Any) -> Line2D:
@@ -57,16 +78,14 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
     title  of what it is the legend
     edge   "lower" puts it below all axes
     """
-    labels = np.array([str(handle.get_label()) for handle in handles], dtype=object)
-    room = figure.get_figwidth() * LEGEND_LETTERS / matplotlib.rcParams["legend.fontsize"]
-    for columns in range(len(labels), 0, -1):
-        # on the safe side; matplotlib fills the columns evenly, the first ones first
-        letters = sum(max(map(len, column)) for column in np.array_split(labels, columns))
-        if letters * LETTER + columns * BESIDE_LABEL < room:
+    where: dict[str, Any] = {"title": title, "alignment": "left", "loc": f"outside {edge} center"}
+    for rows in range(1, len(handles) + 1):
+        legend = figure.legend(handles=list(handles), ncols=-(-len(handles) // rows), **where)
+        box = legend.get_window_extent()
+        if rows == len(handles) or box.width < FILLS * figure.bbox.width:
             break
-    rows = -(-len(labels) // columns)
-    where: dict[str, Any] = {"loc": f"outside {edge} center", "ncols": -(-len(labels) // rows)}
-    figure.legend(handles=list(handles), title=title, alignment="left", **where)
+        legend.remove()
+    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - ROWS / rows) * box.height / figure.dpi)
 
 
 def settle(figure: Figure) -> None:
@@ -74,22 +93,37 @@ def settle(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
-    if any(axes.get_aspect() != "auto" for axes in figure.axes):
-        # Only now have axes of equal scales the size that they are left with.
-        engine.execute(figure)
+    break_lines(figure)
+    # only now do labels have their lines, and axes of equal scales the size that they are left with
+    engine.execute(figure)
     figure.set_layout_engine(None)
 
 
-def as_file(figure: Figure, kind: str, name: str, title: str) -> bytes:
-    """The figure as SVG with text kept as text, PNG or PDF; `name` makes an SVG's ids differ from other figures'."""
+def break_lines(figure: Figure) -> None:
+    """Titles and labels that are longer than their axes go on in further lines."""
+    for axes in figure.axes:
+        box = axes.get_window_extent()
+        title = axes.set_title(axes.get_title(matplotlib.rcParams["axes.titlelocation"]))
+        for text, room in ((title, box.width), (axes.xaxis.label, box.width), (axes.yaxis.label, box.height)):
+            extent = text.get_window_extent()
+            longest = max(extent.width, extent.height)
+            if longest > FILLS * room:
+                letters = int(len(text.get_text()) * FILLS * room / longest)
+                text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
+
+
+def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
+    """The figure in a format, an SVG with text kept as text; `name` makes its ids differ from other figures'."""
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
-        "png": {"metadata": {"Software": None, "Title": title}, "dpi": PNG_DPI},
+        "png": {"metadata": {"Software": None, "Title": title}},
         "pdf": {"metadata": {"CreationDate": None, "Title": title}},
+        "eps": {},
+        "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
     }
     file = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi, **undated[kind])
     return file.getvalue()
 
 
@@ -103,7 +137,9 @@ class Drawing:
     caption: str
 
 
-def files_of(figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png")) -> list[bytes]:
+def files_of(
+    figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
+) -> list[bytes]:
     """A figure, plotted within the style, laid out, as a file of each kind."""
     settle(figure)
-    return [as_file(figure, kind, name, title) for kind in kinds]
+    return [as_file(figure, kind, name, title, dpi) for kind in kinds]

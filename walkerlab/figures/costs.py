@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
-from walkerlab.figures.canvas import add_legend, blank, entry, is_narrow
+from walkerlab.figures.canvas import add_legend, blank, entry, label_ticks
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
 from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
@@ -27,21 +25,11 @@ if TYPE_CHECKING:
 DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
 
 
-def label_ticks(axis: Axis, most: int) -> None:
-    """Labels of a logarithmic axis: at every decade, at most so many, or at 1, 2 and 5 where it spans less than two."""
-    least, last = axis.get_view_interval()
-    short = last < 100.0 * least
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=most))
-    axis.set_minor_locator(NullLocator())
-    if short:
-        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-
-
 def decades(axes: Axes) -> None:
-    """A logarithmic axis of errors, with labels at fewer decades where letters would meet."""
+    """A logarithmic axis of errors."""
     if np.isfinite(axes.dataLim.intervaly).all():
         axes.set_yscale("log")
-        label_ticks(axes.yaxis, 8 if is_narrow(axes.figure) else 20)
+        label_ticks(axes.yaxis)
 
 
 @dataclass(frozen=True)
@@ -118,15 +106,16 @@ def draw_methods(scene: str, results: Results) -> Drawn:
     failed = FAILED * max(errors)
     figure = blank(3.9)
     left, right = figure.subplots(1, 2, sharey=True)
-    panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides (1)"))
+    panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides"))
     for axes, name, label in panels:
-        axes.set(xscale="log", xlabel=label)
+        axes.set_xlabel(label)
         axes.axhspan(SMALLEST, floor, color=PALE, zorder=0)
         for one in every:
             there, cost, order = one.runs["reached"] != 0, one.runs[name].astype(float), one.look.order
             axes.plot(cost[there], np.maximum(one.runs["error"][there], floor), **one.line, zorder=order)
             cross: dict[str, Any] = {"color": one.look.colour, "linestyle": "none", "marker": "x", "markersize": 5.0}
             axes.plot(cost[~there], np.full(np.count_nonzero(~there), failed), **cross, zorder=order)
+        costs(axes)
         decades(axes)
         axes.set_ylim(0.3 * floor, 4.0 * failed)
     left.set(ylabel="error of the end state (SI)", title="(a) against run time")
@@ -201,7 +190,7 @@ def costs(axes: Axes) -> None:
     """A logarithmic axis of costs; without any, the panel says so."""
     if np.isfinite(axes.dataLim.intervalx).all():
         axes.set_xscale("log")
-        label_ticks(axes.xaxis, 20)
+        label_ticks(axes.xaxis)
     else:
         axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
 
@@ -265,7 +254,9 @@ def draw_limit(results: Results) -> Drawn:
             axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
             if name != NUMERICAL:
                 axes.plot(rows[WALL][:1], values[:1], **CONFIGS)
-        axes.set(xscale="log", yscale="log", title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
+        costs(axes)
+        decades(axes)
+        axes.set(title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
         if of_the_paper:
             axes.axhline(ANGLE_ERROR.value, **CLAIM)
     both[0].set_ylabel("error")

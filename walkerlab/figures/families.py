@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, pairwise
+from itertools import count, cycle, pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
-from walkerlab.labels import with_unit
+from walkerlab.labels import in_words
 from walkerlab.store.content import Group
 
 if TYPE_CHECKING:
@@ -63,11 +63,10 @@ def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]
             yield DrawnBranch(model, group)
 
 
-def label_of(results: Results) -> str:
+def parameter_of(results: Results) -> str:
     """The parameter with its unit, as an axis says it."""
     summary = results[STAGE].summary
-    name = str(summary["over"])
-    return with_unit({"slope_deg": "slope", "slope_rad": "slope"}.get(name, name), str(summary["unit"]))
+    return label_of(in_words(str(summary["over"])), str(summary["unit"]))
 
 
 @dataclass(frozen=True)
@@ -142,41 +141,40 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
     return ((model, group) for model, group in found if group is not None)
 
 
-def model_entries(drawn: Sequence[DrawnBranch], **look: Any) -> list[Artist]:
-    """What the legend has of the models whose branches are drawn."""
-    models = {branch.model for branch in drawn}
-    return [entry(f"{model} model", color=colour, **look) for model, colour in MODELS.items() if model in models]
-
-
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
+LEAST: Final = 0.05
+"""Of the span, what the part with bifurcations is at least; of a quantity, what its axis spans at least."""
+BETWEEN: Final = 16
+"""Points between two of a branch, where a quantity's largest and least values are sought, and multipliers drawn."""
 
 
 def draw_branches(results: Results) -> Drawn:
-    """Both quantities over the whole span on the left, over the part with bifurcations on the right.
+    """Both quantities over the whole span on the left, over the part with bifurcations on the right if there are some.
 
     Told: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
     """
     figure, summary = blank(5.6), results[STAGE].summary
-    panels = figure.subplots(2, 2)
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
+    parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
+    panels = figure.subplots(2, len(parts), squeeze=False)
     kinds: set[str] = set()
     for row, (name, words) in zip(panels, QUANTITIES.items(), strict=True):
-        for axes, shown in zip(row, (None, close), strict=True):
+        for axes, shown in zip(row, parts.values(), strict=True):
             for model, cloud in settled:
                 values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
                 colour = BLACK if model == "rigid" else GREY
                 axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
             kinds.update(*(draw_branch(axes, branch, name) for branch in branches))
-            axes.set_xlabel(label_of(results))
+            axes.set(xlabel=parameter_of(results), ylabel=label_of(words, branches[0].group.variables[name].units))
             if shown is not None:
                 axes.set_xlim(*shown)
             axes.set_ylim(*bounds(results, name, shown))
-        row[0].set_ylabel(with_unit(words, branches[0].group.variables[name].units))
-    for axes, title in zip(panels[0], ("(a) all of it", "(b) where gaits change"), strict=True):
-        axes.set_title(title)
-    key = model_entries(branches, linewidth=1.5)
+    for axes, title in zip(panels[0], parts, strict=True):
+        axes.set_title(title if close else "")
+    models = {branch.model: MODELS[branch.model] for branch in branches}
+    key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
     if any(branch.colour == OTHER for branch in branches):
         key.append(entry("other gaits", color=OTHER, linewidth=1.0))
     key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
@@ -198,53 +196,93 @@ def close_of(results: Results) -> tuple[float, float] | None:
         return None
     ends = [one["to"] for one in summary["attractors"]] or [summary["to"]]
     least, most = min(found), max(*ends, max(found))
-    room = ROOM * (most - least)
-    return (least - room, most + room) if room > 0.0 else None
+    room = max(ROOM * (most - least), 0.5 * (LEAST * (summary["to"] - summary["from"]) - (most - least)))
+    return max(least - room, summary["from"]), min(most + room, summary["to"])
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
     """Room for what is stable and for the gaits of one step, in the part that is shown."""
     shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
-        value, wanted = branch.group["value"], branch.group["stable"].astype(bool)
+        curve = curve_of(branch.group, name)
+        value, quantity = (finely(values) for values in (curve.value, curve.quantity))
+        wanted = np.append(np.repeat(curve.stable, BETWEEN), curve.stable[-1:])
         if close is not None:
             wanted &= (value >= close[0]) & (value <= close[1])
-        shown.append(branch.group[name][wanted | (close is None and branch.period == 1)].ravel())
+        shown.append(quantity[wanted | (close is None and branch.period == 1)].ravel())
     values = np.concatenate(shown)
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
-    room = ROOM * max(float(np.ptp(values)), 1e-9)
+    least = LEAST * float(np.abs(values).max())
+    room = max(ROOM * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - room, float(values.max()) + room
 
 
+def finely(along: NDArray[Any]) -> NDArray[np.float64]:
+    """What is known at points of a branch, at further ones between them."""
+    # Imported here: no other figure needs it.
+    from scipy.interpolate import PchipInterpolator
+
+    count = len(along)
+    if count == 1:
+        return np.asarray(along)
+    fine = np.linspace(0.0, count - 1.0, BETWEEN * (count - 1) + 1)
+    return np.asarray(PchipInterpolator(np.arange(count), along)(fine))
+
+
+def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
+    """The multipliers along a branch, finely (points, multiplier), the largest first.
+
+    Between its points their polynomial is interpolated: where two of them meet they turn as roots do.
+    """
+    known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
+    found = np.array([np.roots(row) for row in finely(np.array([np.poly(row).real for row in known]))])
+    return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
+
+
+GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
+    "rigid": (
+        {"color": BLUE},
+        {"color": GREEN, "linestyle": "--"},
+        {"color": PURPLE, "linestyle": "-."},
+        {"color": BLACK, "linestyle": ":"},
+    ),
+    "contact": ({"color": ORANGE}, {"color": VERMILLION, "linestyle": "--"}, {"color": GREY, "linestyle": "-."}),
+}
+"""Looks of a model's gaits of one step, in the order in which they were found."""
+DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 FARTHEST: Final = 1.6
 """Of the complex plane that is shown; an unstable gait's multipliers may be far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:
-    """The complex plane on the left, magnitudes over the parameter on the right.
+    """The complex plane on the left, magnitudes over the parameter on the right, a colour for each gait of one step.
 
     Told: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
     """
     figure, largest = blank(3.6), 0.0
     left, right = figure.subplots(1, 2)
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
+    looks = {model: cycle(looks) for model, looks in GAITS.items()}
+    key = []
     for branch in drawn:
-        value, real, imag = (branch.group[name] for name in ("value", "multiplier_real", "multiplier_imag"))
-        dots: dict[str, Any] = {"color": branch.colour, "marker": "o", "markersize": 1.6}
-        left.plot(real.ravel(), imag.ravel(), linestyle="none", **dots)
-        last = int(np.argmax(value))
-        left.plot(real[last], imag[last], linestyle="none", marker=">", markersize=4, color=branch.colour)
-        # stored largest first, so that each magnitude is a line
-        right.plot(value, np.hypot(real, imag), linewidth=1.0, **dots)
-        largest = max(largest, float(np.max(np.hypot(real, imag))))
+        value, multipliers, look = finely(branch.group["value"]), multipliers_of(branch), next(looks[branch.model])
+        left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=look["color"], **DOTS)
+        last = multipliers[int(np.argmax(value))]
+        left.plot(last.real, last.imag, linestyle="none", marker=">", markersize=4, color=look["color"])
+        right.plot(value, np.abs(multipliers), linewidth=1.2, **look)
+        least, most = np.quantile(branch.group["step_period"], (0.0, 1.0))
+        key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", linewidth=1.2, **look))
+        largest = max(largest, float(np.abs(multipliers).max()))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
     left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
-    right.set(xlabel=label_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter")
+    right.set(
+        xlabel=parameter_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter"
+    )
     end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
-    add_legend(figure, [*model_entries(drawn, marker="o", markersize=3), end])
+    add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
     for one in results[STAGE].summary["bifurcations"]:
         if one["period"] == 1:
@@ -282,8 +320,9 @@ def draw_plane(results: Results) -> Drawn:
         kind = str(curve.group.attrs["kind"])
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
         axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
-        axes.set_ylabel(curve.group.variables["second"].long_name)
-    axes.set_xlabel(label_of(results))
+        second = curve.group.variables["second"]
+        axes.set_ylabel(label_of(in_words(second.long_name), second.units))
+    axes.set_xlabel(parameter_of(results))
     order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
     add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
     kinds = sorted({kind for _, kind in looks}, key=list(MARKS).index)

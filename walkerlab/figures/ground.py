@@ -108,7 +108,7 @@ def draw_losses(results: Results) -> Drawn:
         axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
         below += lost[: steps.size]
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set(xlabel="step number (1)", ylabel="energy lost (J)")
+    axes.set(xlabel="step", ylabel="energy lost (J)")
     add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
     later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
     return figure, (later, sum(later.values()))

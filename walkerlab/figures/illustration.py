@@ -117,10 +117,10 @@ class Illustration:
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.title, self.say("caption", *told))
 
-    def as_file(self, results: Results, kind: str, width: float) -> bytes:
-        """The figure as PDF, SVG or PNG, of a width in pt."""
+    def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
+        """The figure in a format, of a width in pt; what it has of pixels has so many an inch."""
         with styled(POINT * width):
-            return files_of(self.draw(results)[0], self.name, self.heading, [kind])[0]
+            return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
 
 
 def paper_figure(number: int, needs: tuple[Need, ...], draw: Draw) -> Illustration:

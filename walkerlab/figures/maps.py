@@ -13,16 +13,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
-from walkerlab.figures.canvas import add_legend, blank, entry
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of, label_ticks
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.labels import with_unit
 from walkerlab.store.content import Group
 
 WHITE: Final = "#FFFFFF"
@@ -69,7 +68,7 @@ def is_logarithmic(values: NDArray[Any]) -> bool:
 def axis_of(cells: Group, name: str) -> str:
     """A coordinate of the cells on an axis."""
     variable = cells.variables[name]
-    return with_unit(variable.long_name, variable.units.replace("^2.2", "$^{2.2}$"))
+    return label_of(variable.long_name, variable.units)
 
 
 SWING, STANCE = "swing_factor", "stance_factor"
@@ -79,16 +78,17 @@ MAP = Need(
 
 COLOURS: Final = {
     Outcome.WALKED: SKY,
-    Outcome.FELL: VERMILLION,
-    Outcome.OFF_PAD: ORANGE,
-    Outcome.LIFTED_OFF: PURPLE,
-    Outcome.SLID: GREEN,
+    Outcome.FELL: PALE,
+    Outcome.OFF_PAD: "#F7CF85",
+    Outcome.LIFTED_OFF: "#DDB3CC",
+    Outcome.SLID: "#A6D3B4",
     Outcome.NO_HEEL_STRIKE: GREY,
     Outcome.BUDGET_EXHAUSTED: BLACK,
-    Outcome.SOLVER_FAILED: BLACK,
-    Outcome.REJECTED: PALE,
-    Outcome.BENT_KNEE: BLUE,
+    Outcome.SOLVER_FAILED: "#5B3A1E",
+    Outcome.REJECTED: WHITE,
+    Outcome.BENT_KNEE: "#A9B8E0",
 }
+"""Of what becomes of a walk, in every map: full for what walks, as attractors' colours are, and pale for what fails."""
 OUTCOMES: Final = discrete([COLOURS[one] for one in Outcome])
 MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
@@ -118,7 +118,7 @@ def draw_starts(results: Results) -> Drawn:
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
     key: list[Artist] = [
-        Patch(facecolor=COLOURS[one], edgecolor="none", label=one.label)
+        Patch(facecolor=COLOURS[one], edgecolor=GREY, linewidth=0.3, label=one.label)
         for one in map(Outcome, np.unique([cells[f"{model}outcome"] for model, _ in MODELS]).tolist())
     ]
     for label, marker, size, face, (x, y) in marks:
@@ -136,8 +136,6 @@ def draw_starts(results: Results) -> Drawn:
 BASIN: Final = "basin"
 CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no start was walked")
 ATTRACTORS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
-FAILURES: Final = {Outcome.FELL: PALE, Outcome.NO_HEEL_STRIKE: GREY}
-OTHER_FAILURE: Final = "#C8C8C8"
 NO_ATTRACTOR: Final = -1
 
 
@@ -169,8 +167,7 @@ def draw_basins(results: Results) -> Drawn:
         scale = LogNorm(least, max(float(settled.max()), least + 1.0))
         bar = figure.colorbar(draw(right, settled, cmap="viridis_r", norm=scale), ax=right)
         bar.set_label("steps")
-        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        bar.ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if value < 1.5 * least else ""))
+        label_ticks(bar.ax.yaxis)
     else:
         right.text(0.5, 0.9, "no walk settles on a gait", transform=right.transAxes, ha="center")
     x, y = (float(cells.attrs[f"at_{name}"]) for name in plane)
@@ -199,9 +196,9 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
         for number in range(len(attractors))
     ]
     said = "never repeats itself" if summary["aperiodic"] else "walks, not settled"
-    kinds.append((SKY, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)))
+    kinds.append((COLOURS[Outcome.WALKED], said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)))
     failures = [one for one in Outcome if one is not Outcome.WALKED]
-    kinds += [(FAILURES.get(one, OTHER_FAILURE), one.label, outcome == one) for one in failures]
+    kinds += [(COLOURS[one], one.label, outcome == one) for one in failures]
     return [kind for kind in kinds if kind[2].any()]
 
 
@@ -245,7 +242,7 @@ class OverStiffness:
         for axes, title in ((left, titles[0]), (right, titles[1])):
             axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title)
             axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-            axes.xaxis.set_major_locator(LogLocator(numticks=7))
+            axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
         left.set_ylabel(axis_of(cells, up))
@@ -261,7 +258,7 @@ class OverStiffness:
         """Errors by brightness, where there are any, with their scale; cells of other kinds in their colours."""
         shown = np.ma.masked_where(~there, np.clip(cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
-        self.figure.colorbar(mesh, ax=self.right, label="error (1)", extend="both")
+        self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
         for colour, _, where in others:
             if where.any():
                 alone = np.ma.masked_where(~where, np.ones(where.shape))
@@ -282,7 +279,7 @@ def draw_stiction(results: Results) -> Drawn:
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
     for axes in (made.left, made.right):
         axes.plot(*PAPER, **mark, markersize=5.0)
-    patches = [Patch(facecolor=colour, label=label) for colour, label in seen]
+    patches = [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in seen]
     add_legend(made.figure, [*patches, entry("paper", linestyle="none", **mark)])
     return made.figure, (results[MAPS].summary, cells.attrs)
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
 from walkerlab.figures.canvas import blank, files_of, styled
-from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
+from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION, WIDTH
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 Point = tuple[float, float]
@@ -26,8 +26,14 @@ FAINT = "#C8C8C8"
 ARC = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
 """Angles (rad) of the other leg, and of its shank."""
-FIRST_LANE, LANE, LEFT = 0.24, 0.72, -0.62
-"""Where measures of height stand, one beside the other, and where masses are named; leg lengths ahead of the hip."""
+BESIDE, FIRST_LANE = 0.62, 0.24
+"""Where masses are named, behind the leg, and where the first measures of height stand, ahead of it; leg lengths."""
+LETTER, LINE = 0.0088, 0.0195
+"""Width and height of a letter, in parts of the picture's width."""
+CLEAR = 0.05
+"""Between the middles of words in a lane, leg lengths."""
+PARTS_ROOM = 1.5
+"""Height of a part's picture, in parts of the part's."""
 
 
 @dataclass(frozen=True)
@@ -126,13 +132,21 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     length, centre = leg.joints[0][1], leg.centre
     # the joints, and where the leg's line meets its sole's arc
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
-    figure = blank(HEIGHT)
+    labels, lanes = arranged(leg)
+    # letters keep their size, so that they take parts of the width, whatever the walker's length
+    behind = letters([words for words, *_ in labels])
+    ahead = [letters([said(one.key, one.value) for one in lane]) for lane in lanes]
+    width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
+    width = max(width, (leg.top + 0.3 * length) * WIDTH / HEIGHT)
+    left = -BESIDE * length - LETTER * behind * width
+    heights = apart([at[1] for *_, at in labels], [LINE * width * len(words.split("\n")) for words, *_ in labels], 0.0)
+    bottom, top, ends = -0.16 * length, max(leg.top, *heights) + 0.1 * length, (left, left + width)
+    figure = blank(WIDTH * (top - bottom) / width)
     axes = figure.add_subplot()
     axes.set_axis_off()
-    left, right = ends = (-1.15 * length, 1.35 * length)
-    axes.set(aspect="equal", xlim=ends, ylim=(-0.16 * length, leg.top + 0.1 * length))
+    axes.set(aspect="equal", xlim=ends, ylim=(bottom, top))
     axes.fill_between(ends, -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
-    axes.plot([left, right], [0.0, 0.0], color=BLACK, linewidth=0.8)
+    axes.plot(ends, [0.0, 0.0], color=BLACK, linewidth=0.8)
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
@@ -143,21 +157,56 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     draw_leg(axes, other, turned(angles[-1], leg.joints[-1], centre, other[-2]), leg.radius, FAINT)
     draw_leg(axes, line, centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
-    draw_lengths(axes, leg.lengths, length)
-    for words, (x, height) in leg.masses:
-        axes.plot(x, height, marker="o", markersize=8, color=GREEN, zorder=5)
-        axes.plot([LEFT * length, x], [height, height], color=GREEN, linewidth=0.5, zorder=1)
-        name(axes, LEFT * length, height, "\n".join(words) + " ", GREEN, ha="right", va="center")
+    x = FIRST_LANE * length
+    for lane, wide in zip(lanes, ahead, strict=True):
+        for one in lane:
+            draw_length(axes, one, x, LETTER * width)
+        x += LETTER * wide * width
+    axes.plot(*np.transpose([at for _, at in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
+    for one in leg.lengths:
+        if one.start[1] == one.end[1]:
+            axes.plot(*np.transpose([one.start, one.end]), color=VERMILLION, linewidth=1.5)
+    for (words, colour, at), height in zip(labels, heights, strict=True):
+        axes.plot([-BESIDE * length, at[0]], [height, at[1]], color=colour, linewidth=0.5, zorder=1)
+        axes.text(-BESIDE * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
     if leg.radius > SMALL_ARC * length:
         axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
-    elif leg.radius:
-        name(axes, LEFT * length, 0.03 * length, said("foot_radius_m", leg.radius) + " ", BLUE, ha="right")
     return figure
 
 
-def name(axes: Axes, x: float, y: float, words: str, colour: str, **aligned: Any) -> None:
-    """Small words at a point."""
-    axes.text(x, y, words, color=colour, fontsize=SMALL, **aligned)
+def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
+    """What is named behind the leg, with its colour and place, and the measures of height in lanes ahead of it."""
+    length, lanes = leg.joints[0][1], list[list[Length]]()
+    labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
+    for one in (one for one in leg.lengths if one.value):
+        level = one.start[1] == one.end[1]
+        if level or one.value <= SMALL_ARC * length:
+            labels.append((said(one.key, one.value), VERMILLION if level else BLUE, one.end))
+        elif free := [lane for lane in lanes if all(clear(one, other, length) for other in lane)]:
+            free[0].append(one)
+        else:
+            lanes.append([one])
+    return labels, lanes
+
+
+def letters(texts: Sequence[str]) -> int:
+    """Of the longest line of some texts, and of the room beside it."""
+    return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
+
+
+def clear(one: Length, other: Length, length: float) -> bool:
+    """Whether neither two measures nor their words meet in one lane."""
+    between = 0.5 * abs(one.start[1] + one.end[1] - other.start[1] - other.end[1])
+    return between > max(0.499 * (one.value + other.value), CLEAR * length)
+
+
+def apart(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
+    """The middles of words, as near to heights as they can be, further up where those below need room."""
+    found = list(heights)
+    for place in sorted(range(len(found)), key=found.__getitem__):
+        found[place] = max(found[place], lowest + 0.5 * sizes[place])
+        lowest = found[place] + 0.5 * sizes[place]
+    return found
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
@@ -175,29 +224,14 @@ def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 
 
-def draw_lengths(axes: Axes, lengths: Sequence[Length], leg_length: float) -> None:
-    """Measures from a point to one below it, each in the first lane that has room; others ahead of the leg's line.
-
-    Those too small to show are left out.
-    """
-    lanes: list[list[tuple[float, float]]] = []
-    for measure in lengths:
-        words, (_, high), (_, low) = said(measure.key, measure.value), measure.start, measure.end
-        if high == low and measure.value:
-            axes.annotate("", xy=measure.end, xytext=measure.start, arrowprops={"arrowstyle": "-", "color": VERMILLION})
-            name(axes, -0.03 * leg_length, high + 0.025 * leg_length, words, VERMILLION, ha="right")
-        if high == low or measure.value <= SMALL_ARC * leg_length:
-            continue
-        free = (number for number, taken in enumerate(lanes) if all(high <= b or low >= a for a, b in taken))
-        number = next(free, len(lanes))
-        if number == len(lanes):
-            lanes.append([])
-        lanes[number].append((high, low))
-        x = (FIRST_LANE + number * LANE) * leg_length
-        for point in (measure.start, measure.end):
-            axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
-        axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
-        name(axes, x + 0.015 * leg_length, 0.5 * (high + low), words, BLUE, va="center")
+def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
+    """A measure from a point to one below it, and what it is."""
+    for point in (measure.start, measure.end):
+        axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
+    high, low = measure.start[1], measure.end[1]
+    axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
+    words = said(measure.key, measure.value)
+    axes.text(x + letter, 0.5 * (high + low), words, color=BLUE, fontsize=SMALL, va="center")
 
 
 def of_parts(walker: PartsWalker) -> Figure:
@@ -205,23 +239,30 @@ def of_parts(walker: PartsWalker) -> Figure:
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.set(title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
+        axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
         marks = list(marks_of(walker, body.name, body.centre_m))
-        axes.plot(*np.transpose([at for *_, at in marks]), color=BLACK, linewidth=2.0, zorder=1)
-        above: dict[Point, bool] = {}  # of the last words at a point: the next ones go to its other side
-        for number, (words, colour, marker, at) in enumerate(marks):
-            axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
-            above[at] = not above[at] if at in above else number % 2 == 1
-            aside = (12.0, 18.0 if above[at] else -14.0)
-            axes.annotate(words, at, aside, textcoords="offset points", color=colour, fontsize=SMALL, va="center")
+        bones = [at for words, _, marker, at in marks if marker == "o" and not words.startswith("centre_m")]
         for foot in walker.feet:
-            if foot.body == body.name and foot.radius_m:
+            if foot.body == body.name:
                 x, y = foot.centre_m
+                bones.append((x, y - foot.radius_m))
                 axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
-        axes.margins(x=0.6, y=0.25)
+        axes.plot(*np.transpose(bones), color=BLACK, linewidth=2.0, zorder=1)
+        points = np.array([*bones, *(at for *_, at in marks)])
+        (left, low), (_, high) = points.min(axis=0), points.max(axis=0)
+        tall = PARTS_ROOM * max(high - low, 0.1 * walker.leg_length_m)
+        wide = tall * (WIDTH / len(shown) - 0.7) / (HEIGHT - 1.0)
+        low = 0.5 * (low + high - tall)
+        axes.set(ylim=(low, low + tall), xlim=(left - 0.25 * wide, left + 0.75 * wide))
+        line = tall * 1.35 * SMALL * POINT / (HEIGHT - 1.0)
+        heights = apart([at[1] for *_, at in marks], [line * len(words.split("\n")) for words, *_ in marks])
+        for (words, colour, marker, at), height in zip(marks, heights, strict=True):
+            axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
+            aside = points[:, 0].max() + 0.1 * wide
+            axes.plot([at[0], aside], [at[1], height], color=colour, linewidth=0.5, zorder=2)
+            axes.text(aside, height, f" {words}".replace("\n", "\n "), color=colour, fontsize=SMALL, va="center")
     figure.axes[0].set_ylabel("up (m)")
     return figure
 

@@ -10,7 +10,11 @@ from walkerlab.figures.style import BLUE, ORANGE
 from walkerlab.figures.walks import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.store.content import Content, Group
 
-ROWS: Final = (("angle", "angle (rad)"), ("mechanical_J", "energy (J)"))
+ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
+    ("angle", 0, "angle of leg 1 (rad)"),
+    ("angle", 1, "angle of leg 2 (rad)"),
+    ("mechanical_J", slice(None), "energy (J)"),
+)
 LOOKS: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "linewidth": 1.3},
     {"color": ORANGE, "linewidth": 1.2, "linestyle": (0.0, (3.2, 1.4))},
@@ -34,15 +38,15 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
 
 
 def drawn(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
-    """A column for each stage, with both runs' trajectories; a row for angles and one for the energy."""
+    """A column for each stage, with both runs' trajectories; a row for each leg's angle and one for the energy."""
     figure = blank(0.5 + 1.9 * len(ROWS))
     axes = figure.subplots(len(ROWS), len(both), sharex="col", sharey="row", squeeze=False)
-    for row, (variable, label) in zip(axes, ROWS, strict=True):
+    for row, (variable, leg, label) in zip(axes, ROWS, strict=True):
         row[0].set_ylabel(label)
         for one, (_, groups) in zip(row, both, strict=True):
             for group, look in zip(groups, LOOKS, strict=True):
                 if variable in group.variables:
-                    one.plot(group["time"], group[variable], **look)
+                    one.plot(group["time"], group[variable][..., leg], **look)
     for top, bottom, (stage, _) in zip(axes[0], axes[-1], both, strict=True):
         top.set_title(stage)
         bottom.set_xlabel("time (s)")

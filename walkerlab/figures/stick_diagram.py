@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry, styled
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, GREY, LEGS, WIDTH
+from walkerlab.figures.style import BLACK, GREY, LEGS
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
     JOINTS,
@@ -47,6 +47,8 @@ ARC_MIDDLE = np.zeros(1)
 SMALL_FOOT = 0.01
 """Radius of a sole, in leg lengths, below which it is a point to the eye."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
+UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
+"""What times of landings take below the lowest foot, and axes' labels and legend beside the axes and above them, in."""
 SHAPE = 0.68
 """Height of the axes in parts of their width, unless the walker is taller or longer."""
 
@@ -153,7 +155,11 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
     widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
     left, right = left - widen, right + widen
-    figure = blank(1.05 + (WIDTH - 0.7) * (top - bottom) / (right - left))
+    figure = blank(0.0)
+    across = figure.get_figwidth() - BESIDE
+    lowest = sticks.in_plane(seen)[..., 1].min()
+    bottom = min(bottom, lowest - UNDER * (right - left) / across)
+    figure.set_figheight(ABOVE + across * (top - bottom) / (right - left))
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
     draw_postures(axes, sticks, between, FAINT)

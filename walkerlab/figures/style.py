@@ -26,8 +26,7 @@ WIDTH: Final = 7.2
 POINT: Final = 1.0 / 72.0
 """In in."""
 PNG_DPI: Final = 160
-LEGEND_LETTERS: Final = 8.5
-"""Their size, pt."""
+"""Of a page's; what is exported says its own."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),
@@ -46,12 +45,13 @@ RC: Final = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.0,
     "legend.borderaxespad": 0.2,
-    "legend.fontsize": LEGEND_LETTERS,
+    "legend.fontsize": 8.5,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
     "mathtext.fontset": "dejavusans",
     "pdf.fonttype": 42,
+    "ps.fonttype": 42,
     "svg.fonttype": "none",
     "xtick.labelsize": 8.0,
     "xtick.major.width": 0.7,
@@ -62,16 +62,16 @@ RC: Final = {
 NARROW_BELOW: Final = 5.0
 """Width of a figure, in, below which its letters are smaller and its lines thinner."""
 NARROW: Final = {
-    "axes.labelsize": 7.0,
-    "axes.titlesize": 7.0,
-    "font.size": 7.0,
-    "legend.fontsize": 6.0,
+    "axes.labelsize": 7.2,
+    "axes.titlesize": 7.2,
+    "font.size": 7.2,
+    "legend.fontsize": 6.5,
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.0,
-    "xtick.labelsize": 6.0,
-    "ytick.labelsize": 6.0,
+    "xtick.labelsize": 7.2,
+    "ytick.labelsize": 7.2,
 }
-"""On top of it, for a figure of one column."""
+"""On top of it, for a figure of one column; of 7.2 pt, exponents have 5."""
 
 
 @dataclass(frozen=True)

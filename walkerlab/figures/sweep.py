@@ -1,6 +1,5 @@
 """Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
 
-import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -11,26 +10,27 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, styled
+from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, label_of, styled
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
+from walkerlab.labels import in_words
 from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
-MOST_PANELS: Final = 4
-MOST_LINES: Final = 5
+MAX_PANELS: Final = 4
+MAX_LINES: Final = 5
 """Values of a second parameter, each of which is a line; of more, there is a map."""
 DASHES: Final = ("-", "--", "-.")
 ONE: Final = "largest multiplier 1"
-MOST_SCATTERED: Final = 20_000
+MAX_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "spectral_radius", "step_length_m", "steps", "slip_per_step_m", "max_penetration_m",
     "min_normal_force_N", "energy_drift_J", "end_time_s",
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
-LABELS: Final = {RADIUS: "largest multiplier (1)"}
+LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
@@ -42,7 +42,7 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
             if np.unique(values[np.isfinite(values)]).size > 1:
                 varying.append(name)
     known = [name for name in PREFERRED if name in varying]
-    return (known or [name for name in varying if "." not in name] or varying)[:MOST_PANELS]
+    return (known or [name for name in varying if "." not in name] or varying)[:MAX_PANELS]
 
 
 def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
@@ -85,20 +85,17 @@ def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], name
 
 def label(group: Group, name: str) -> str:
     """A variable's axis: its name in words, and its unit."""
-    unit = group.variables[name].units or "1"
-    ending = re.sub(r"[^A-Za-z0-9]+", "_", unit.replace("^", ""))
-    spoken = name.rpartition(".")[2].removesuffix(f"_{ending}").replace("_", " ")
-    return LABELS.get(name, f"{spoken} ({unit})")
+    return label_of(LABELS.get(name, in_words(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
     """A row for each number, a column for each parameter; lines where the parameter orders the points."""
-    shown = list(parameters)[:MOST_PANELS]
+    shown = list(parameters)[:MAX_PANELS]
     figure = blank(0.5 + PANEL_HEIGHT * len(names))
     axes = figure.subplots(len(names), len(shown), sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
         x = spread(group, parameter, dims)
-        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_SCATTERED)).astype(int))
+        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
         ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
         for one, name in zip(axes[:, column], names, strict=True):
             y = group[name].astype(float).ravel()
@@ -138,7 +135,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
     """Whether one of two parameters has so few values that each is a line over the other one."""
-    return min(group["outcome"].shape) <= MOST_LINES and len(dims) == 2
+    return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
@@ -157,12 +154,11 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
         finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
         one.set_ylabel(label(group, name))
     axes[-1].set_xlabel(label(group, across))
-    spoken, _, unit = label(group, few).rstrip(")").rpartition(" (")
-    unit = "" if unit == "1" else f" {unit}"
+    unit = group.variables[few].units
     key = []
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
-        key.append(entry(f"{spoken} {said}{unit}", **look))
+        key.append(entry(f"{in_words(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
     add_legend(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
     return figure
 

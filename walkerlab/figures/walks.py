@@ -14,10 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, CONTACT, GREY, PALE, RIGID, VERMILLION, Look
-from walkerlab.labels import with_unit
 from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
 from walkerlab.store.content import Content, Group
 
@@ -81,7 +80,7 @@ class Walk:
 
     def label(self, words: str, name: str) -> str:
         """A variable on an axis."""
-        return with_unit(words, self.samples.variables[name].units)
+        return label_of(words, self.samples.variables[name].units)
 
     def first(self, strides: int) -> Walk:
         """Its first strides; the walk itself if it has no more."""
@@ -273,7 +272,7 @@ def draw_differences(results: Results) -> Drawn:
             one.axhline(printed.value, **PAPER.line)
             bottom, top = min(printed.value / ROOM, bottom), max(ROOM * printed.value, top)
         one.set_yscale("log", subs=[])
-        one.set(ylim=(bottom, top), ylabel=with_unit("error", raw.variables[f"raw_{name}"].units))
+        one.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
@@ -307,9 +306,10 @@ def draw_cycles(results: Results) -> Drawn:
     key = [entry(walk.look.label, **walk.look.line) for walk in walks]
     if any(walk.strikes.size > LAST_STRIDE for walk in walks):
         key.append(entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH))
-    for whose, face in (("this leg", GREY), ("the other leg", "white")):
-        dot: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": GREY, "markerfacecolor": face}
-        key.append(entry(f"heel strike of {whose}", linestyle="none", **dot))
+    for look in (walk.look for walk in walks):
+        for whose, face in (("own", look.colour), ("other", "white")):
+            mark: dict[str, Any] = {"marker": look.marker, "markersize": 4.5, "color": look.colour, "mfc": face}
+            key.append(entry(f"{whose} heel strike, {look.label.split()[0]}", linestyle="none", **mark))
     add_legend(figure, key)
     return figure, (extent, sentence(walks))
 

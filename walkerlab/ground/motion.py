@@ -12,7 +12,7 @@ from walkerlab.ground.walker import (
     half_size,
     sines_cosines,
 )
-from walkerlab.kernels import inlined, matrix, vector, woven
+from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import Counted, factor_linked, gathered, solve_linked
 from walkerlab.mechanics.tree import (
     add_gravity,
@@ -30,7 +30,7 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
     return (0.0, 0.0)
 
 
-@woven
+@always_inline
 def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
     """Force along and normal to the slope (N) on a foot with ground; its torques (N m) are added to r (n,)."""
     form = system.form
@@ -44,7 +44,7 @@ def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -
     return force.along, force.normal.force
 
 
-@woven
+@always_inline
 def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
     """Force of the ground along and normal to the slope (N); M (n, n) and all torques on the bodies (N m) into r (n,).
 

@@ -36,7 +36,7 @@ GOES_ON = -1
 
 
 @inlined
-def happen(
+def apply_event(
     system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
     """Let an event change the walk state; returns an outcome if it ends the walk."""

@@ -17,7 +17,7 @@ from walkerlab.solvers.radau5_tableau import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.solvers.system import jacobian
 
-THIS_SIDE = 4e-12  # s, some times as much as the time of an event is uncertain by
+THIS_SIDE = 4e-12  # s, a few event-time uncertainties
 ROOT6 = 6.0**0.5
 # Radau IIA, Hairer and Wanner II (5.6)
 A = np.array(

@@ -20,7 +20,7 @@ from walkerlab.hybrid.contact_events import (
     sample_event_functions,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe
-from walkerlab.hybrid.contact_rules import GOES_ON, happen, is_above, is_to_lift, note_flexion
+from walkerlab.hybrid.contact_rules import GOES_ON, apply_event, is_above, is_to_lift, note_flexion
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.solvers.events import CrossingFinder
@@ -175,7 +175,7 @@ def walk_in_form(
         arriving = False
         if happens:
             steps = walk_state.feet[STEPS]
-            outcome = happen(system, ground.terrain, observer, walk_state, event, method.clock[T], method.y)
+            outcome = apply_event(system, ground.terrain, observer, walk_state, event, method.clock[T], method.y)
             if outcome != GOES_ON:
                 return outcome, event
             released = is_hinged(system) and walk_state.feet[STEPS] > steps

@@ -121,14 +121,14 @@ class Recorder:
     def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
         self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
-        self.method = method = tolerances.new(len(walker.blank))
+        self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS)
         # a library's method is integrated with in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
-        self.numbers, self.kneed = len(walker.blank), walker.kneed
+        self.numbers, self.kneed = len(walker.zero_state), walker.kneed
         first = new_observer(np.zeros(0), self.numbers)
         observe_start(first, Mode(walker, BENT), start)
         self.energy_at_start = float(first.energy[LATEST])

@@ -35,7 +35,7 @@ NOBODY = -1
 FIRST_STEP = 0.1  # pendulum times
 ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
 REFINEMENTS = 6
-MOST_TRIES = 20_000  # of steps in one swing
+MAX_TRIES = 20_000  # of steps in one swing
 SMALLEST_STEP = 1e-13  # pendulum times
 NO_ERROR = 1e-300
 WALKED, FELL, REJECTED = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.REJECTED)
@@ -92,7 +92,7 @@ def two_legs(model: Standing) -> TwoLegs | None:
     )
 
 
-@derivative.case(TwoLegs, woven=True)
+@derivative.case(TwoLegs, always_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     """The equations of motion of standing.py for two bodies, written out: of floats or of lanes."""
     R, along, down = system.radius, system.gravity_along, system.gravity_down
@@ -256,7 +256,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     accepted = 1.0 - error
     over = NO_ERROR - (left - h)
     pendulum_time = walker.pendulum_time
-    stuck = max(tries - MOST_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
+    stuck = max(tries - MAX_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
     quiet = choose(event, 0.0, accepted)
@@ -295,7 +295,7 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
-    if rows[TRIES, lane] >= MOST_TRIES:
+    if rows[TRIES, lane] >= MAX_TRIES:
         return BUDGET_EXHAUSTED
     if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
         return SOLVER_FAILED
@@ -339,7 +339,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         usual = abs(rows[USUAL, lane])
         rows[STEP, lane] = max(-usual, min(usual, wait))
         return GOES_ON
-    y, new = vector(walker.model.blank), vector(walker.model.blank)
+    y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
     heel_strike(walker.model, y, new)
     step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait

@@ -80,7 +80,7 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
 @inlined
 def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, float, float]:
     """`assumptions` at a fraction of the last step."""
-    y = vector(mode.model.blank)
+    y = vector(mode.model.zero_state)
     interpolate(method, mode, fraction, y)
     return assumptions(mode, y)
 
@@ -144,7 +144,7 @@ def observe(observer: Observer, method: Any, mode: Mode, fraction: float, step: 
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
     mean_energy = SIMPSON[0] * observer.energy[LATEST]
-    y = vector(mode.model.blank)
+    y = vector(mode.model.zero_state)
     before = at = assumptions_at(method, mode, 0.0)
     for eighth in range(1, 9):
         interpolate(method, mode, spacing * eighth, y)

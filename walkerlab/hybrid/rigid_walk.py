@@ -149,7 +149,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 @by_type_or_default
 def scan_swing(method: Any, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """`events_in_step` of the last step of a method; its dense output is ready."""
-    y = vector(system.model.blank)
+    y = vector(system.model.zero_state)
     for node in range(finder.nodes.size):
         interpolate(method, system, finder.nodes[node], y)
         sample_events(system, y, node, finder)
@@ -261,7 +261,7 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
     """
     model, y = system.model, method.y
     n, knee = len(model.arm_x), is_bent(system)
-    before, f, waits = vector(model.blank), vector(model.blank), vector(model.blank)
+    before, f, waits = vector(model.zero_state), vector(model.zero_state), vector(model.zero_state)
     for i in range(2 * n):
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)

@@ -9,7 +9,7 @@ Source: (A.57) of the paper with the impulse projected away.
 
 from typing import Any
 
-from walkerlab.kernels import inlined, matrix, vector, woven
+from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
 from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, Standing, equations
 from walkerlab.mechanics.tree import projections, sines_cosines
@@ -85,7 +85,7 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
             new[at + n + k] = p[k]
 
 
-@woven
+@always_inline
 def momenta(model: Standing, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
     """Z' M u into p (n,), with the angular velocities omega (n,).
 
@@ -101,7 +101,7 @@ def momenta(model: Standing, M: Any, F: Any, U: Any, omega: Any, along: float, u
     p[STANCE] -= R * model.mass * sliding
 
 
-@woven
+@always_inline
 def mass_change(model: Standing, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
     """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
 

@@ -8,7 +8,7 @@ phase.
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import woven
+from walkerlab.kernels import always_inline
 
 
 class Counted(NamedTuple):
@@ -21,7 +21,7 @@ class Counted(NamedTuple):
     arm_x: Any  # (n,)
 
 
-@woven
+@always_inline
 def gathered(model: Any, phase: int, r: Any) -> None:
     """E' r in place of r (n,), zero for the followers: what acts on a follower acts on those it follows."""
     n = len(model.arm_x)
@@ -32,7 +32,7 @@ def gathered(model: Any, phase: int, r: Any) -> None:
             r[c] = 0.0
 
 
-@woven
+@always_inline
 def spread(model: Any, phase: int, z: Any) -> None:
     """E z in place of z (n,): a follower moves with those it follows."""
     n = len(model.arm_x)
@@ -44,7 +44,7 @@ def spread(model: Any, phase: int, z: Any) -> None:
             z[c] = total
 
 
-@woven
+@always_inline
 def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
     """E' r in place of r (n,), and L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
     n = len(model.arm_x)
@@ -68,7 +68,7 @@ def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
                 M[i, j] -= M[k, i] * M[j, k]
 
 
-@woven
+@always_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
     """E dz in place of b (n,) = E' r, of a matrix that `factor_linked` has taken apart."""
     n = len(model.arm_x)

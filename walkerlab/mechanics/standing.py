@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.kernels import inlined, matrix, vector, woven, zeros
+from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
 from walkerlab.mechanics.tree import (
@@ -69,10 +69,10 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     gravity_along: float  # m/s^2
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # [phi] rad, positive downhill in walking direction
-    blank: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
+    zero_state: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
 
     @property
-    def picked(self) -> tuple[int, ...]:
+    def section_indices(self) -> tuple[int, ...]:
         """Places (d) in the state of the section's coordinates."""
         return tuple(self.section[: self.coordinates].tolist())
 
@@ -112,7 +112,7 @@ def new_standing(n: int, **fields: Any) -> Standing:
         **dict.fromkeys(("A", "B"), square),
         **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
         "E": (3, n, n),
-        "blank": (2 * n,),
+        "zero_state": (2 * n,),
     }
     whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": ()}
     layout = [
@@ -142,10 +142,10 @@ class Mode(NamedTuple):
 @block.case(Mode)
 def state_or_column(system: Mode) -> Any:
     """A state, or a column."""
-    return zeros(system.model.blank)
+    return zeros(system.model.zero_state)
 
 
-@woven
+@always_inline
 def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
     """M' (n, n) in kg m^2 and r' (n,) in N m at the state y, with all that they are made of."""
     n, R = len(model.arm_x), model.radius
@@ -167,7 +167,7 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
         M[STANCE, STANCE] += model.mass * R * R
 
 
-@woven
+@always_inline
 def add_misprint(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
     """Add the torque (N m) on the stance leg by which printed equations differ from Lagrange's; none has no misprint.
 
@@ -177,7 +177,7 @@ def add_misprint(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
         r[STANCE] += model.misprint * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
 
-@woven
+@always_inline
 def add_misprint_gradients(model: Standing, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
     """Add its derivatives by the angles and by their velocities."""
     if model.misprint != 0.0:
@@ -216,7 +216,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
 
 
-@woven
+@always_inline
 def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     """Derivatives (n, n) of r' - M' alpha at fixed alpha with respect to the angles and to their velocities."""
     n, R = len(model.arm_x), model.radius
@@ -267,7 +267,7 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
         vector(model.arm_x),
         vector(model.arm_x),
         vector(model.arm_x),
-        vector(model.blank),
+        vector(model.zero_state),
     )
     sines_cosines(model, n, y, s, c)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

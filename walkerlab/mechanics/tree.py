@@ -15,18 +15,18 @@ where the tree's type tells.
 
 from typing import Any
 
-from walkerlab.kernels import woven
+from walkerlab.kernels import always_inline
 from walkerlab.mechanics.trigonometry import sine_cosine
 
 
-@woven
+@always_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
     """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)
 
 
-@woven
+@always_inline
 def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: Any) -> None:
     """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
     for k in range(n):
@@ -34,7 +34,7 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
         U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
 
 
-@woven
+@always_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
     """Where a point is from the root along the slope and over it (m), by its levers, and its rates (m/s)."""
     along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
@@ -47,14 +47,14 @@ def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any)
     return along, height, along_rate, height_rate
 
 
-@woven
+@always_inline
 def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
     """Add the torques of gravity (N m) about a root at rest to r (n,); F and U of the first moments."""
     for k in range(n):
         r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
 
 
-@woven
+@always_inline
 def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
     """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
     for k in range(n):
@@ -69,14 +69,14 @@ def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -
             r[l] -= omega[k] * omega[k] * turning
 
 
-@woven
+@always_inline
 def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> None:
     """Add the derivatives of the torques of gravity with respect to the angles to by_angle (n, n)."""
     for k in range(n):
         by_angle[k, k] += tree.gravity_down * U[k] - tree.gravity_along * F[k]
 
 
-@woven
+@always_inline
 def add_inertia_gradients(
     tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
 ) -> None:
@@ -94,7 +94,7 @@ def add_inertia_gradients(
         by_angle[k, k] += own
 
 
-@woven
+@always_inline
 def kinetic_energy(n: int, M: Any, omega: Any) -> float:
     """Kinetic energy (J) of the bodies' turning, with a mass matrix M (n, n)."""
     total = 0.0
@@ -104,7 +104,7 @@ def kinetic_energy(n: int, M: Any, omega: Any) -> float:
     return 0.5 * total
 
 
-@woven
+@always_inline
 def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: Any) -> float:
     """Potential energy of gravity (J) with the root at a place along the slope and a height over it (m)."""
     total = tree.mass * (tree.gravity_down * height - tree.gravity_along * along)

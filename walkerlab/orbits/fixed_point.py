@@ -36,7 +36,7 @@ JUMP, JUMP_IN_TIME = 0.05, 0.02  # a gait further than this from where it was ex
 RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
 # angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
 # free at heel strike
-LEAST_START, MOST_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Gait:
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """What no ground can give, so that nobody walks this gait; else empty. An unstable gait is a gait."""
+        """What no ground can give, so that this gait is not physical; else empty. An unstable gait is a gait."""
         found = []
         if self.min_normal_force < 0.0:
             found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
@@ -154,7 +154,7 @@ class GaitSearch:
         """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
         return (
             f"followed from a vanishing slope, and by Newton's method from {self.random_starts} random starts (legs up "
-            f"to {MOST_START[0]:g} rad apart, rates up to {MOST_START[1]:g} sqrt(g/L), steps of at most "
+            f"to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L), steps of at most "
             f"{LONGEST_SWING:g} sqrt(L/g))"
         )
 
@@ -294,7 +294,7 @@ class Search:
         """Solve the step map from random starting values, unless they lead to a gait that was found before."""
         d = int(self.walker.coordinates)
         self.drawn += count
-        starts = generator.uniform(LEAST_START[:d], MOST_START[:d], (count, d))
+        starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
         led = self.looking.lead(self.equations.section, [(found.z, found.DP) for found in self.found], starts)
         for z, gait in zip(starts, led, strict=True):
@@ -344,8 +344,8 @@ class Search:
         if not gaits:
             followed = f"followed from a vanishing slope, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW
             reason = (
-                f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MOST_START[0]:g} "
-                f"rad apart, rates up to {MOST_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
+                f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MAX_START[0]:g} "
+                f"rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
             )
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost))
 

@@ -183,7 +183,7 @@ def smallest_change(
     """The start nearest to (1, 1) that walks, from ever finer grids around the nearest that a map found.
 
     starts      walks at the config's tolerance: what is returned has walked there
-    quick       the same at the map's
+    quick       starts at the map's
     candidates  (n, 2) factors that walk according to the map
     cell        spacing of the map
     """

@@ -82,7 +82,7 @@ def section_of(walker: Standing) -> StrikeSection:
 def on_section(walker: Standing, z: Any) -> State:
     """The state (2 n) of section coordinates z (d,)."""
     section = section_of(walker)
-    return tuple((section.start[: len(walker.blank)] + np.asarray(z) @ section.basis).tolist())
+    return tuple((section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis).tolist())
 
 
 def coordinates_of(walker: Standing, y: Any) -> Floats:
@@ -121,7 +121,7 @@ class Shooting:
 
     def __init__(self, like: Standing, tolerances: Tolerances) -> None:
         """Steps at these tolerances."""
-        size, d = len(like.blank), int(like.coordinates)
+        size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
         finder = finder_for(self.plain, EVENTS)
         self.memory = Memory(varied, finder, unwatched(), np.zeros(size * (1 + d)), np.zeros(1), np.zeros(d, np.int64))

@@ -41,7 +41,7 @@ SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
 LOSS_ANGLE = 1e-3  # rad, small against one and large against rounding
 LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
 SHORT_AMPLITUDE = 0.002
-MOST_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
+MAX_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
 # on a slope of one radian: the state of (z, 1), z itself, and theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 COORDINATES = np.eye(3, 4)
@@ -71,7 +71,7 @@ def linear_modes(walker: Standing) -> Modes | None:
     """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
     M, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
-    equations(level, level.blank, s, c, F, U, M, r)
+    equations(level, level.zero_state, s, c, F, U, M, r)
     try:
         rates, V = eigh(walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs, legs.T @ M @ legs)
     except np.linalg.LinAlgError:
@@ -105,7 +105,7 @@ def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
 def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
     """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
     half = symmetric_half_period(modes)
-    if half is None or modes.fall * half > MOST_GROWTH:
+    if half is None or modes.fall * half > MAX_GROWTH:
         return None
     at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
     rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])

@@ -16,7 +16,7 @@ from walkerlab.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
 """The error is far below any printed digit."""
-CYCLES = 5  # that the paper walks
+CYCLES = 5  # walked in the paper
 ENERGY_STEPS = 5  # over which the paper averages the energy
 
 
@@ -162,7 +162,7 @@ settled          of that the last completed stride only
 
 @dataclass(frozen=True)
 class Departures:
-    """In what a scene is not the paper's, in words; empty if it is."""
+    """How a scene differs from the paper's, in words; empty if it does not."""
 
     rigid: tuple[str, ...]  # of the rigid model
     contact: tuple[str, ...]  # of the contact model, those of the rigid model included

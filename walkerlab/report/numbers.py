@@ -13,7 +13,7 @@ LEAST_LENGTH_M = 1e-9
 """Walkers are centimetres to metres tall, and walks are right to some 1e-10 of that: less is no length."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
 """Magnitudes that are written without a power of ten."""
-MOST_DECIMALS, USUAL_DECIMALS = 6, 4
+MAX_DECIMALS, USUAL_DECIMALS = 6, 4
 """Of the periods (s) and lengths (m) of steps: at most, and where their error is unknown."""
 
 
@@ -39,7 +39,7 @@ def decimals_left(error: float | None) -> int:
     """Decimals of a number that its error, if it is known, leaves: it is at most half a unit of the last one."""
     if error is None:
         return USUAL_DECIMALS
-    return max(0, min(MOST_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MOST_DECIMALS
+    return max(0, min(MAX_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MAX_DECIMALS
 
 
 def power_of_ten(value: float, digits: int = 3) -> str:

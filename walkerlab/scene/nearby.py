@@ -110,10 +110,11 @@ def nearby(config: Config, typed: str = "") -> str:
     if met is not None:
         in_degrees = tuple(math.degrees(value) for value in met.stable or met.whole)
         what = "A stable gait" if met.stable else "A gait, unstable,"
-        value = math.degrees(met.value_towards(config.slope_rad))
+        slope = met.value_towards(config.slope_rad)
+        setting = f"slope_rad={slope:.4g}" if "slope_rad=" in typed else f"slope_deg={math.degrees(slope):.3g}"
         return (
             f"{what} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: "
-            f"`walkerlab fixedpoint{typed} --set slope_deg={value:.3g}`."
+            f"`walkerlab fixedpoint{typed} --set {setting}`."
         )
     way = way_from_built_in(config)
     if way is None:

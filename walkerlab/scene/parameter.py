@@ -67,7 +67,8 @@ def parameter_of(key: str, config: ContactConfig) -> Parameter:
     why = why_no_parameter(key, config, own)
     if why:
         raise ConfigError(f"{shown(key)} {why}", _ADVICE)
-    return Parameter(key, extra(own[key], "unit") or "1", tuple(key.split(".")))
+    unit = extra(own[key], "unit") or "1"
+    return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
 _ADVICE = "Name a number that the walker, its slope or its ground is made of; `walkerlab schema` lists every key."

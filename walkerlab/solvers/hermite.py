@@ -12,7 +12,7 @@ Jet = tuple[float, float, float]
 Quintic = tuple[float, float, float, float, float, float]
 """Bernstein coefficients over the step."""
 CLOSE = 1e-4  # of the step, Newton's last move: it misses by the square of that
-MOST_ITERATIONS = 50
+MAX_ITERATIONS = 50
 
 
 @inlined
@@ -86,7 +86,7 @@ def only_crossing(quintic: Quintic) -> float:
     """The zero of a quintic that has one and falls: Newton's method from the end, halving where that leads astray."""
     powers = in_powers(quintic)
     low, high, x = 0.0, 1.0, 1.0
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         value, slope = value_and_slope(powers, x)
         if value < 0.0:
             high = x

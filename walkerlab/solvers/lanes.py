@@ -28,7 +28,7 @@ Lanes = Any
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """Type of lanes in compiled code; a float may be taken for them."""
+    """Type of lanes in compiled code; floats convert to it."""
 
     def __init__(self) -> None:
         """There is one width only."""
@@ -138,7 +138,7 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 
 @functools.cache
 def teach_arithmetic() -> None:
-    """Have numba know arithmetic on lanes, before the first kernel that does any is compiled.
+    """Register arithmetic on lanes with numba, before the first kernel that does any is compiled.
 
     Operators are registered for all that a process compiles, so not by an import alone.
     """

@@ -68,13 +68,13 @@ def run(
     there is not.
     """
     gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config, config.equations)
-    if len(rigid.picked) != len(COORDINATES):
+    if len(rigid.section_indices) != len(COORDINATES):
         raise ConfigError(
             f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
-            f"{len(rigid.picked)}.",
+            f"{len(rigid.section_indices)}.",
             "Lock the knees in the heel strike: --set walker.knee.at_heel_strike=locked.",
         )
-    window = window_of(config, [float(gait["state"][place]) for place in rigid.picked])
+    window = window_of(config, [float(gait["state"][place]) for place in rigid.section_indices])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
     begun, shared_from = time.perf_counter(), question.shared_from

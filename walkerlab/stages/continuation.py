@@ -332,7 +332,7 @@ def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed,
     for value in asked.looked_at():
         walker = walker_at(value)
         if walker is not None:
-            section, (_, units) = list(walker.picked), unit_walker(walker)
+            section, (_, units) = list(walker.section_indices), unit_walker(walker)
             in_units = [1.0] + [units.time] * (len(section) - 1)
             gaits = find_gaits(walker, config.seed).gaits
             seeds += [Seed(np.array(gait.state)[section] * in_units, value) for gait in gaits]
@@ -682,7 +682,7 @@ def groups(found: Sequence[Followed], said: Mapping[str, Any], asked: FamilyQues
 
     said  the summary, of which branches and curves are stored as tables too
     """
-    parameter, second = asked.parameter, asked.config.continuation.second
+    parameter, second = asked.parameter, asked.second
     value = {"value": Label(parameter.unit, parameter.key)}
     stored: dict[str, Group] = {}
     if said["branches"]:
@@ -696,7 +696,7 @@ def groups(found: Sequence[Followed], said: Mapping[str, Any], asked: FamilyQues
             continue
         own: dict[str, Group] = {}
         if second is not None:
-            labels = Label(parameter.unit, parameter.key), Label("1", second.over)
+            labels = Label(parameter.unit, parameter.key), Label(second.parameter.unit, second.parameter.key)
             own |= {f"curve_{number}": curve_group(curve, *labels) for number, curve in enumerate(one.curves)}
             if one.regions is not None:
                 own["regions"] = regions_group(one.regions, *labels)

@@ -1,7 +1,7 @@
 """Kernels of later stages compiled in other processes while earlier stages compile their own.
 
-On a new machine they would else wait for the compiler, one after the other. What is compiled goes into the cache that
-all processes share. A stage whose kernels were not compiled ahead compiles for itself.
+On a new machine they would otherwise wait for the compiler, one after the other. What is compiled goes into the cache
+that all processes share. A stage whose kernels were not compiled ahead compiles for itself.
 """
 
 import importlib
@@ -24,7 +24,7 @@ def compile_kernels(module: str, config: Config, only_first: bool) -> None:
 
 
 class Precompiler:
-    """What is compiled ahead of stages, in the workers of a pool, and what is wrong with it."""
+    """What is compiled ahead of stages, in the workers of a pool, and its errors."""
 
     def __init__(self, pool: WorkerPool, config: Config) -> None:
         """Nothing is compiled ahead so far."""

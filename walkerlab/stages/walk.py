@@ -26,7 +26,7 @@ from walkerlab.store.content import Content, Group, Variable
 
 FIRST_STEPS, LAST_STEPS = 200, 20
 """Steps of which every sample is stored."""
-MOST_BETWEEN = 50_000
+MAX_BETWEEN = 50_000
 """Samples of the steps between them, at most, beside both sides of every heel strike."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
@@ -131,7 +131,7 @@ def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
     changes = np.flatnonzero(np.diff(step))
     stored[changes] = stored[changes + 1] = True
     between = np.flatnonzero(~stored)
-    stored[between[:: max(1, -(-between.size // MOST_BETWEEN))]] = True
+    stored[between[:: max(1, -(-between.size // MAX_BETWEEN))]] = True
     progress.note(
         f"{ends.size} steps: of {step.size} samples {np.count_nonzero(stored)} are stored, all of the first "
         f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between; both sides of every heel strike are "

@@ -14,7 +14,7 @@ from walkerlab.store.content import Attribute, Group, Variable
 # What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 TEXT = h5py.string_dtype()
-MOST_LEVELS = 16
+MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
 LEAST_BYTES = 32
 """What a member of a group takes in a file at least: a bound on how many there can be, links in circles included."""
@@ -139,7 +139,7 @@ class Budget:
 
 def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
     """Every group below a group, by path, after those below it."""
-    if path.count("/") >= MOST_LEVELS:
+    if path.count("/") >= MAX_LEVELS:
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
     members: dict[str, Any] = {}

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.labels import unit_by_name, unit_ending
+from walkerlab.labels import in_words, unit_by_name
 from walkerlab.store.content import Variable
 from walkerlab.sweeps.chunk import Labels
 
@@ -133,9 +133,3 @@ class Columns:
             unit, text = unit_by_name(last), in_words(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
         return Variable(values.reshape(shape + extra), dims + own, unit, text, missing=gaps)
-
-
-def in_words(name: str) -> str:
-    """A name as words, without its unit."""
-    ending = unit_ending(name)
-    return name.removesuffix(f"_{ending}" if ending else "").replace("_", " ")

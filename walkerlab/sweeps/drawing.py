@@ -21,7 +21,7 @@ from walkerlab.sweeps.question import Question
 from walkerlab.sweeps.sweep import Swept
 
 PAGE = "sweep.html"
-MOST_ROWS = 200
+MAX_ROWS = 200
 """Points that the page lists."""
 
 
@@ -82,7 +82,7 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
         *(Column(name, written=in_words, numeric=True) for name in (*question.names, *shown)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
-    listed = f"Of the {len(question)} points the first {MOST_ROWS} are listed. " if len(question) > MOST_ROWS else ""
+    listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
     where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
     tables = (
         table("Parameters", PARAMETER_COLUMNS, parameters),
@@ -108,7 +108,7 @@ def spoken(values: Sequence[object]) -> str:
 
 def rows(group: Group, question: Question, shown: Sequence[str]) -> list[tuple[Any, ...]]:
     """The first points: parameters, numbers, outcome, and the reason where there is no answer."""
-    count = min(len(question), MOST_ROWS)
+    count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]
     columns: list[list[Any]] = [[axis.values[at[k]] for at in places] for k, axis in enumerate(question.axes)]
     columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "reason")]

@@ -19,8 +19,8 @@ LARGEST_CHUNK: Final = 1000
 SHARES: Final = 3
 """A chunk is at most this part of what is left to a worker, so that all end together."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
-"""What no worker's death is, but a fault of this program's outside any point."""
-MOST_DEATHS: Final = 12
+"""Errors that mean a bug here, outside any point."""
+MAX_DEATHS: Final = 12
 """Deaths before any chunk has come back, after which it is the machine and not the points."""
 
 
@@ -28,7 +28,7 @@ MOST_DEATHS: Final = 12
 class Try:
     """A chunk on its way.
 
-    failures  how often it has come to nothing
+    failures  failed attempts
     """
 
     task: ChunkTask
@@ -108,7 +108,7 @@ class FanOut:
             raise error
         self._deaths += 1
         said = f"{type(error).__name__}: {error}"
-        if self._deaths > MOST_DEATHS and not self._alive:
+        if self._deaths > MAX_DEATHS and not self._alive:
             raise NoAnswer(
                 f"no worker lives: {said}",
                 "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",

@@ -22,7 +22,7 @@ Value = float | int | str | bool
 Layout = Literal["grid", "list"]
 
 POINT: Final = "point"
-MOST_POINTS: Final = 10_000_000
+MAX_POINTS: Final = 10_000_000
 FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
 EXAMPLE: Final = "For example: `walkerlab sweep --over slope_deg=0.5:5:10 --stage fixedpoint`"
 SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
@@ -142,8 +142,8 @@ def asked(
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refused(None, f"--zip: the parameters have different numbers of values: {lengths}")
     question = Question(stage, axes, "list" if zip else "grid")
-    if len(question) > MOST_POINTS:
-        raise refused(None, f"sweep: {len(question)} points", f"up to {MOST_POINTS} in one sweep")
+    if len(question) > MAX_POINTS:
+        raise refused(None, f"sweep: {len(question)} points", f"up to {MAX_POINTS} in one sweep")
     return question
 
 
@@ -221,7 +221,7 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     sample  SAMPLER:N
     """
     name, _, number = sample.partition(":")
-    if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MOST_POINTS:
+    if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MAX_POINTS:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
         raise refused(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
     import numpy as np
@@ -260,7 +260,4 @@ def described(config: Config, key: str) -> tuple[str, str]:
     if field is None:
         return "1", key
     unit = extra(field, "unit")
-    if " or " in unit:
-        contact: Contact | None = config.contact
-        unit = unit.split(" or ")[0 if contact is None or contact.units == "adams" else 1]
-    return unit, field.description or key
+    return (config.contact or Contact()).unit_of(unit), field.description or key

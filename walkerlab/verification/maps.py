@@ -28,7 +28,7 @@ PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the p
 STEP: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
 BUDGET, SHARPER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
-MOST_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
+MAX_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
 VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
 Numbers = list[float]
@@ -112,7 +112,7 @@ class StepColumn:
         arrival = arrival_of("map", walk.record, natural_units(config))
         numbers: Numbers = []
         for h in self.steps_s:
-            one = fixed(arrival, start, h, MOST_EVALUATIONS)
+            one = fixed(arrival, start, h, MAX_EVALUATIONS)
             numbers += [float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error]
         return numbers
 

@@ -29,9 +29,9 @@ MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
-MOST_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
+MAX_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
 SETTLED: Final = 1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
-MOST_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
+MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,12 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         return NotMeasured(MEASURE, "the hinge pushes too")
     found = momentum_balance(config, scene, start, case)
     unknown = found.unsure + found.unresolved
-    if unknown > MOST_UNKNOWN:
+    if unknown > MAX_UNKNOWN:
         shares = {
             "the impulses' sums do not settle": found.unsure,
             "friction hangs on slip velocities below the tolerance": found.unresolved,
         }
-        why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MOST_UNKNOWN)
+        why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
     limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(found.residual), limit)
@@ -86,7 +86,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         given = impulse_rate(samples, scene, config) / scale
         change = unsettled(samples.time_s, given)
         wanting = change > SETTLED / grid.size
-        if not wanting.any() or grid.size > MOST_INTERVALS:
+        if not wanting.any() or grid.size > MAX_INTERVALS:
             break
         grid = split(samples.time_s, wanting)
     assert samples is not None, "it was looked at"

@@ -8,7 +8,7 @@ from walkerlab.config.stability import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
-"""A measure of work, which would hide those of what is right where the largest of all is shown."""
+"""A measure of cost, not of correctness: left out where the largest of all is shown."""
 
 MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its steps
 
@@ -24,7 +24,7 @@ class Measure:
 
     @property
     def ok(self) -> bool:
-        """Whether the run passes; what is no number does not."""
+        """Whether the run passes; NaN fails."""
         return bool(math.isfinite(self.value) and self.value <= self.limit)
 
     def __str__(self) -> str:
@@ -91,6 +91,6 @@ def promised(case: Case, rtol: float, steps: int) -> float:
     rtol   the looser of their tolerances
     steps  of the solver, both together
 
-    A tolerance lets every step be wrong by its share of numbers of the order of one.
+    Each step may err by rtol times numbers of order one.
     """
     return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.labels import with_unit
+from walkerlab.labels import in_words, with_unit
 from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Section, Walker
 from walkerlab.report.numbers import number, whole
 from walkerlab.report.results import Results
@@ -57,8 +57,8 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
 
 
 def parameter(summary: Mapping[str, Any]) -> str:
-    """What the families are over; the slope is the slope in either unit."""
-    return str(summary["over"]).removesuffix("_deg").removesuffix("_rad")
+    """What the families are over."""
+    return in_words(str(summary["over"]))
 
 
 MODEL = "rigid"
@@ -123,7 +123,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     return Diagram(
         title=f"Gaits over {over}",
         caption=words("families.diagram"),
-        titles=(f"{over} ({unit})", "duration of a step (s)"),
+        titles=(with_unit(over, unit), "duration of a step (s)"),
         curves=tuple(curve for branch in branches for curve in curves(branch, across, up)),
         ticks=(across.ticks(), up.ticks()),
         gaits=apart(marks),

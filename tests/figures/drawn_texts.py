@@ -1,0 +1,19 @@
+"""What a renderer is told to write, and where."""
+
+import pytest
+from matplotlib.text import Text
+
+
+def texts_drawn(figure):
+    """Every text that the renderer is given, with its box."""
+    seen, draw = [], Text.draw
+
+    def noted(text, renderer):
+        if text.get_visible() and text.get_text().strip():
+            seen.append((text, Text.get_window_extent(text, renderer)))
+        draw(text, renderer)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", noted)
+        figure.draw_without_rendering()
+    return seen
