@@ -7,7 +7,7 @@ from contact_walks import scene_of
 from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_events import HEIGHT, PASSING, PER_FOOT
-from walkerlab.hybrid.contact_rules import GOES_ON, happen
+from walkerlab.hybrid.contact_rules import GOES_ON, apply_event
 from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.scene.contact import start_state
 
@@ -29,7 +29,7 @@ class Feet:
 
     def event(self, event):
         system = on_ground(self.scene.walker, self.known.has_ground)
-        assert happen(system, self.scene.terrain, None, self.known, event, 0.0, tuple(self.y)) == GOES_ON
+        assert apply_event(system, self.scene.terrain, None, self.known, event, 0.0, tuple(self.y)) == GOES_ON
         return self
 
     def passing(self, forward, carried):
