@@ -5,6 +5,7 @@ import math
 import numpy as np
 from compass_parts import CompassParts, compass_assembly
 
+import walkerlab.ground.motion  # noqa: F401, the equations, which are found by the system's type
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.normal_force import NormalLaw

@@ -3,7 +3,7 @@
 import ground_walkers as ground
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from system_rates import gradient_of, rate_of
@@ -90,6 +90,7 @@ def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_conta
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
+@example(theta=(0.6875, 0.0), omega=(0.0, 2.0**-7), slip=0.0, vertical_velocity=0.0, depth=2.0**-7, foot=0)
 def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertical_velocity, depth, foot):
     """dE/dt of the energy balance along the motion is what damping and friction take."""
     walker = ground.compass(normal=SOFT)
@@ -99,8 +100,8 @@ def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertica
     damping, friction = np.sum(powers, axis=0)
     assert damping >= 0.0
     assert friction >= 0.0
-    assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-5)  # the other foot is at no join of the law
-    h = 1e-7 / (1.0 + np.abs(rate).max() * 1e-2)
+    assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-4)  # the other foot reaches no join of the law
+    h = 1e-5 / (1.0 + np.abs(rate).max() * 1e-2)  # long enough for the rounding of energies of 1 kJ to be left small
     before, after = (total_energy(on_ground(walker, BOTH), tuple(state + step * rate)) for step in (-h, h))
     size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker.whole, tuple(state))
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from system_rates import rate_of
 
+import walkerlab.ground.motion  # noqa: F401, the equations, which are found by the system's type
 from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.energy import total_energy
 from walkerlab.ground.friction import Coulomb
