@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import walkerlab.ground.motion  # noqa: F401 (registers the equations of what is assembled here)
 from walkerlab.ground.friction import FrictionLaw
 from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.normal_force import NormalLaw
