@@ -7,16 +7,24 @@ import numpy as np
 import pytest
 import xarray
 from PIL import Image
+from synthetic_families import families
+from synthetic_methods import everything
 from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, export_from
 from walkerlab.cli.films import Film, walk_in, write_film
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.figures.style import PNG_DPI
+from walkerlab.figures import illustration
+from walkerlab.figures.style import PNG_DPI, WIDTH
 from walkerlab.report.tables import in_tex
+from walkerlab.stages import plot
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
@@ -33,7 +41,7 @@ def run(tmp_path, monkeypatch):
     for name, result in both_models().items():
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
-        write(folder / f"{name}.h5", content, result.identity, begin(Config(), {}))
+        write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
     return RunFolder.at(folder)
 
 
@@ -42,6 +50,26 @@ def test_a_figure_in_every_format(run, kind, start):
     path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
     assert path.name == f"paper-figure-07.{kind}"
     assert path.read_bytes().startswith(start)
+
+
+def test_every_figure_is_the_pages_in_another_size(run, monkeypatch):
+    monkeypatch.setattr(illustration, "POINT", 1.0)
+    results = {**everything(), **families()}
+    for name, result in results.items():
+        write(run.artifact(name), Content(result.groups, result.summary), result.identity, begin(load().config, {}))
+    drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
+    names = [Path(entry["svg"]).stem for entry in drawn]
+    assert {"figure-07", "figure-09", "figure-10", "figure-13", "stability-step"} <= set(names)
+    for name in names:
+        path = export_from(run, name, Target("svg", None), WIDTH, "", QUIET)
+        assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
+
+
+def test_a_figure_of_outdated_results_says_so(run, capsys):
+    export_from(run, "figure-07", Target("svg", None), 516.0, "", Console())
+    assert "outdated results, which are drawn all the same: compare, contact-sim and simulate;" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):

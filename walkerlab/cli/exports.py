@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 
 from walkerlab.cli.console import Console
 from walkerlab.config.problems import nearest
+from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
 from walkerlab.report.numbers import listed
 from walkerlab.report.tables import as_csv, as_tex, csv_text, of_records
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.runs import makes, read_all, result_in, results_in
+from walkerlab.stages.plan import Planner
+from walkerlab.stages.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.store.artifact import Stored
 from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -90,7 +92,7 @@ def export_from(folder: RunFolder, what: str, target: Target, width: float, mode
         stem, kinds, make = what, TABLE_KINDS, lambda kind: table(folder, what, kind)
     else:
         illustration = figure_in(folder, what)
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width, console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
     return put(path, make(kind), console)
 
@@ -126,15 +128,39 @@ def figure_in(folder: RunFolder, name: str) -> Illustration:
     raise ConfigError(f"nothing is called {name}.{meant}", advice)
 
 
-def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float) -> bytes:
-    """A figure, drawn again with a width in pt; StaleError if the run lacks what it needs."""
+def planned(folder: RunFolder) -> Planner:
+    """A run's planner, which has its current results; of a config that is none any more there are none."""
+    config = config_of(folder)
+    planner = Planner(config or Config(), folder, elsewhere=False)
+    if config is not None:
+        planner.plan(PIPELINE.stages)
+    return planner
+
+
+def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float, console: Console) -> bytes:
+    """A figure as the page has it, drawn again with a width in pt; StaleError if the run lacks what it needs.
+
+    Where what it needs is outdated, so may be all that is there, and the console is told.
+    """
     stored = results_in(folder, illustration.stages)
     why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    return illustration.as_file(stored, kind, width)
+    planner, plot = planned(folder), PIPELINE["plot"]
+    taken, outdated = planner.inputs(plot), read_all(folder, plot.results(planner.config))[0]
+    for name in (*taken, *planner.left_out):
+        outdated.pop(name, None)
+    left_out = stored.keys() <= taken.keys()
+    if not left_out:
+        taken |= stored | {name: result for name, result in outdated.items() if result.complete}
+    if outdated:
+        console.warn(
+            f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
+            f"{listed(sorted(outdated))}; {makes(folder, PIPELINE['report'])} makes them anew."
+        )
+    return illustration.as_file(taken, kind, width)
 
 
 def table(folder: RunFolder, name: str, kind: str) -> bytes:
