@@ -126,7 +126,10 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
 
 def test_a_table_for_latex_guards_its_letters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
-    assert r"t\_left & s & $0.7$ \\" in text
+    assert r"$t_\mathrm{left}$ & s & $0.7$ \\" in text
+    assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
+    assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
+    assert in_tex("end_time_s") == r"end\_time\_s"
     assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert in_tex("50 %") == r"50 \%"
     assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
@@ -141,7 +144,7 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     with pytest.raises(ConfigError) as refused:
         export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
     assert "figure-07" in refused.value.advice
-    assert refused.value.advice.endswith("table-3 and trajectory.")
+    assert refused.value.advice.endswith("table-3, what-was-left-out-of-this-scene and trajectory.")
     assert "figure-13" not in refused.value.advice
 
 
