@@ -7,15 +7,24 @@ import numpy as np
 import pytest
 import xarray
 from PIL import Image
+from synthetic_families import families
+from synthetic_methods import everything
 from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import Target, export_from
 from walkerlab.cli.films import Film, walk_in, write_film
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.figures import illustration
+from walkerlab.figures.style import WIDTH
 from walkerlab.report.tables import in_tex
+from walkerlab.stages import plot
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
@@ -32,7 +41,7 @@ def run(tmp_path, monkeypatch):
     for name, result in both_models().items():
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
-        write(folder / f"{name}.h5", content, result.identity, begin(Config(), {}))
+        write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
     return RunFolder.at(folder)
 
 
@@ -44,6 +53,26 @@ def test_a_figure_in_every_format(run, kind, start):
     path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
     assert path.name == f"paper-figure-07.{kind}"
     assert path.read_bytes().startswith(start)
+
+
+def test_every_figure_is_the_pages_in_another_size(run, monkeypatch):
+    monkeypatch.setattr(illustration, "POINT", 1.0)
+    results = {**everything(), **families()}
+    for name, result in results.items():
+        write(run.artifact(name), Content(result.groups, result.summary), result.identity, begin(load().config, {}))
+    drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
+    names = [Path(entry["svg"]).stem for entry in drawn]
+    assert {"figure-07", "figure-09", "figure-10", "figure-13", "stability-step"} <= set(names)
+    for name in names:
+        path = export_from(run, name, Target("svg", None), WIDTH, "", QUIET)
+        assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
+
+
+def test_a_figure_of_outdated_results_says_so(run, capsys):
+    export_from(run, "figure-07", Target("svg", None), 516.0, "", Console())
+    assert "outdated results, which are drawn all the same: compare, contact-sim and simulate;" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
@@ -107,7 +136,10 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
 
 def test_a_table_for_latex_guards_its_letters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
-    assert r"t\_left & s & $0.7$ \\" in text
+    assert r"$t_\mathrm{left}$ & s & $0.7$ \\" in text
+    assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
+    assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
+    assert in_tex("end_time_s") == r"end\_time\_s"
     assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert in_tex("50 %") == r"50 \%"
     assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
@@ -122,7 +154,7 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     with pytest.raises(ConfigError) as refused:
         export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
     assert "figure-07" in refused.value.advice
-    assert refused.value.advice.endswith("table-3 and trajectory.")
+    assert refused.value.advice.endswith("table-3, what-was-left-out-of-this-scene and trajectory.")
     assert "figure-13" not in refused.value.advice
 
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
 
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, stick_diagram, sticks_of
+from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, pictures, stick_diagram, sticks_of
 from walkerlab.figures.style import LEGS
 
 ROUNDING = 1e-12
@@ -107,3 +107,26 @@ def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries
     assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
     assert "once it has passed the stance foot" in FIGURE_6.caption(results)
     assert "lane of pads" in FIGURE_6.caption(both_models())
+
+
+def coloured(picture, look):
+    """How many of a picture's pixels have a leg's colour."""
+    return int((picture == np.round(255.0 * np.array(to_rgb(look.colour))).astype(np.uint8)).all(axis=2).sum())
+
+
+def film_frame(result, pads=None, **changed):
+    (picture,) = pictures(replace(sticks_of(result), **changed), np.array([0.3]), pads)
+    return picture
+
+
+def test_a_film_shows_the_arcs_of_round_feet():
+    flat, round_feet = (film_frame(rigid(), radius=radius) for radius in (0.0, 0.2))
+    for look in LEGS:
+        assert coloured(round_feet, look) > coloured(flat, look) + 50
+
+
+def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
+    result = contact()
+    plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
+    tinted = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in (plane, on_pads)]
+    assert tinted[1] > 2 * tinted[0]

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from walkerlab.errors import ConfigError
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.sweep import draw, lines, maps
+from walkerlab.figures.maps import is_logarithmic
+from walkerlab.figures.sweep import choose, draw, lines, maps
 from walkerlab.store.content import Group, Variable
+from walkerlab.sweeps.drawing import refuse_unheard
 
 PARAMETERS = ("slope_deg", "hip_mass_kg")
 
@@ -64,3 +67,21 @@ def test_the_caption_tells_how_gaps_look():
         made = draw(swept(9, masses, answered=False), "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"])
         assert said in made.caption
         assert made.svg.startswith(b"<?xml")
+
+
+def test_a_logarithmic_range_has_a_logarithmic_axis_however_narrow():
+    for low, high in ((1.0, 3.0), (1.0, 1.001), (1e-3, 1e5)):
+        assert is_logarithmic(np.geomspace(low, high, 7), span=1.0)
+        assert not is_logarithmic(np.linspace(low, high, 7), span=1.0)
+
+
+def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
+    names = ("slip_per_step_m", "max_penetration_m", "last_step_length_m", "last_step_period_s")
+    group = Group({name: Variable(np.arange(3.0), ("x",), "1", name) for name in names})
+    assert choose(group, ("x",), ["x"])[:2] == ["last_step_period_s", "last_step_length_m"]
+
+
+def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
+    refuse_unheard("contact-sim", ["steps", "last_step_period_s", "gaits.3.period_s"], ["steps"])
+    with pytest.raises(ConfigError, match="--show nonsense: no such number"):
+        refuse_unheard("contact-sim", ["nonsense"], ["steps"])

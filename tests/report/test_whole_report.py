@@ -6,7 +6,12 @@ from html_page import Page
 
 from walkerlab.benchmarks import ladder, references
 from walkerlab.benchmarks.trials import ContactTrial, RigidTrial
+from walkerlab.cli.console import Console
+from walkerlab.cli.exports import Target, export_from, page_tables
 from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.figures import illustration
+from walkerlab.figures.style import WIDTH
 from walkerlab.report.registry import SECTIONS
 from walkerlab.report.results import Results
 from walkerlab.stages import known_problems, stability
@@ -56,6 +61,40 @@ def test_every_stage_ran_and_the_page_is_there(run):
     assert len(report.summary["tables"]) > 10
     assert len(report.summary["figures"]) > 8
     assert not {"None", "nan", "inf"} & set(page.text.split())
+
+
+def test_every_table_of_the_pages_is_exported_by_its_caption(run, tmp_path):
+    _, folder, report = run
+    heads = set()
+    for number, caption in enumerate(report.summary["tables"]):
+        texts = []
+        for kind in ("csv", "tex"):
+            file = tmp_path / f"{number}.{kind}"
+            texts.append(export_from(folder, caption, Target(None, file), 252.0, "", Console(quiet=True)).read_text())
+        heads.add(texts[0].splitlines()[0])
+        assert texts[1].startswith("\\begin{table}\n\\centering\n\\caption{" + caption[:5])
+        assert not set("θωφμλ₁₂⁻−×") & set(texts[1])
+    assert len(heads) > 10
+    with pytest.raises(ConfigError) as refused:
+        export_from(folder, "no-such-thing", Target(None, None), 252.0, "", Console(quiet=True))
+    assert "the-contact-models-walk" in refused.value.advice
+
+
+def test_a_number_in_an_exported_table_is_in_the_unit_of_its_head(run):
+    tables = page_tables(run[1])
+    cells = [cell for table in tables.values() for body in table.bodies for row in body.rows for cell in row]
+    numbers = [cell for cell in cells if isinstance(cell.datum, float) and cell.text.isascii()]
+    assert len(numbers) > 50
+    for cell in numbers:
+        assert cell.datum == pytest.approx(float(cell.text), rel=0.06), cell
+
+
+def test_an_exported_figure_has_all_that_the_page_has(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(illustration, "POINT", 1.0)
+    for number in ("07", "09", "10"):
+        file = Target("svg", tmp_path / f"{number}.svg")
+        drawn = export_from(run[1], f"figure-{number}", file, WIDTH, "", Console(quiet=True)).read_bytes()
+        assert drawn == (run[1].path / "figures" / f"figure-{number}.svg").read_bytes()
 
 
 ON_DEMAND = ("families", "basin", "engines")  # sections of stages that only their own commands run

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 
 from walkerlab.cli.console import Console
 from walkerlab.config.problems import nearest
+from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
 from walkerlab.report.numbers import listed
-from walkerlab.report.tables import as_csv, as_tex, csv_text, of_records
+from walkerlab.report.tables import Table, as_csv, as_tex, csv_text, of_records
 from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.runs import makes, read_all, result_in, results_in
+from walkerlab.stages.plan import Planner
+from walkerlab.stages.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.store.artifact import Stored
 from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -23,9 +25,11 @@ from walkerlab.store.runfolder import RunFolder
 if TYPE_CHECKING:
     from walkerlab.figures.illustration import Illustration
 
-FIGURE_KINDS, TABLE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "tex"), ("csv", "nc")
+FIGURE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "nc")
+WRITERS = {"csv": as_csv, "tex": as_tex}
 DRAWING_KINDS = ("svg", "pdf", "png")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
+NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY = "trajectory"
 COLUMNS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal, pt."""
@@ -90,11 +94,10 @@ def export_from(
     kinds: Sequence[str]
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(result_in(folder, model), kind)
-    elif what in TABLES:
-        stem, kinds, make = what, TABLE_KINDS, lambda kind: table(folder, what, kind)
+    elif isinstance(found := table(folder, what) if what in TABLES else named_in(folder, what), Table):
+        stem, kinds, make = hyphened(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
     else:
-        illustration = figure_in(folder, what)
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, illustration, kind, width, dpi)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
     return put(path, make(kind), console)
 
@@ -110,8 +113,35 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     return put(path, drawn(loaded.config.walker, path.stem, kind), console)
 
 
-def figure_in(folder: RunFolder, name: str) -> Illustration:
-    """The figure of a name; ConfigError with what the run has if there is none."""
+def hyphened(words: str) -> str:
+    """Words as a name of a file: small letters and figures, hyphens between."""
+    return NOT_IN_NAMES.sub("-", words.lower().replace("'", "").replace("’", "")).strip("-")
+
+
+def shortened(caption: str) -> str:
+    """The same of a caption's first words, up to a comma or colon."""
+    return hyphened(re.split("[,:]", caption)[0])
+
+
+def page_tables(folder: RunFolder) -> dict[str, Table]:
+    """Every table of a run's page, by its caption's first words if they tell it from others."""
+    # Imported here: figures need no page.
+    from walkerlab.report.registry import pages_of
+    from walkerlab.report.results import Results
+
+    planner, report = planned(folder), PIPELINE["report"]
+    results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
+    sections = [section for page in pages_of(results, folder.name) for section in page.sections]
+    tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
+    short = [shortened(one.caption) for one in tables]
+    unique = [name not in TABLES and short.count(name) == 1 for name in short]
+    return {
+        name if alone else hyphened(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
+    }
+
+
+def named_in(folder: RunFolder, name: str) -> Illustration | Table:
+    """The figure or the page's table of a name; ConfigError with what the run has if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
 
@@ -119,39 +149,73 @@ def figure_in(folder: RunFolder, name: str) -> Illustration:
     if name in named:
         return named[name]
     stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
-    near = nearest(name, (*named, *TABLES, TRAJECTORY))
+    tables = page_tables(folder)
+    for called in (hyphened(name), shortened(name)):
+        if called in tables:
+            return tables[called]
+    near = nearest(name, (*named, *TABLES, TRAJECTORY, *tables))
     meant = f" Did you mean {near}?" if near else ""
     compared = stored["compare"].summary if "compare" in stored else {}
     there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
     there += [table for table, key in TABLES.items() if key in compared]
+    there += tables
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
     nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
     advice = f"{folder.path} has {listed(there)}." if there else nothing
     raise ConfigError(f"nothing is called {name}.{meant}", advice)
 
 
-def figure(folder: RunFolder, illustration: Illustration, kind: str, width: float, dpi: int) -> bytes:
-    """A figure, drawn again with a width in pt and pixels an inch; StaleError if the run lacks what it needs."""
+def planned(folder: RunFolder) -> Planner:
+    """A run's planner, which has its current results; of a config that is none any more there are none."""
+    config = config_of(folder)
+    planner = Planner(config or Config(), folder, elsewhere=False)
+    if config is not None:
+        planner.plan(PIPELINE.stages)
+    return planner
+
+
+def figure(
+    folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
+) -> bytes:
+    """A figure as the page has it, drawn again; StaleError if the run lacks what it needs.
+
+    size  width in pt, and pixels an inch
+
+    Where what it needs is outdated, so may be all that is there, and the console is told.
+    """
     stored = results_in(folder, illustration.stages)
     why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    return illustration.as_file(stored, kind, width, dpi)
+    planner, plot = planned(folder), PIPELINE["plot"]
+    taken, outdated = planner.inputs(plot), read_all(folder, plot.results(planner.config))[0]
+    for name in (*taken, *planner.left_out):
+        outdated.pop(name, None)
+    left_out = stored.keys() <= taken.keys()
+    if not left_out:
+        taken |= stored | {name: result for name, result in outdated.items() if result.complete}
+    if outdated:
+        console.warn(
+            f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
+            f"{listed(sorted(outdated))}; {makes(folder, PIPELINE['report'])} makes them anew."
+        )
+    return illustration.as_file(taken, kind, *size)
 
 
-def table(folder: RunFolder, name: str, kind: str) -> bytes:
+def table(folder: RunFolder, name: str) -> Table:
     """A table of the paper's numbers; ConfigError if the walker is another than the paper's."""
     summary = result_in(folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
-            f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another."
+            f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another.",
+            f"Its page has {listed(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
-    return as_tex(of_records(rows)) if kind == "tex" else as_csv(of_records(rows))
+    return of_records(rows)
 
 
 def trajectory(stored: Stored, kind: str) -> bytes:

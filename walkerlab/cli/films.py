@@ -68,7 +68,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     line.start("drawing", int(at.size))
 
     def told() -> Iterator[Any]:
-        for picture in pictures(sticks, at):
+        for picture in pictures(sticks, at, results[film.model].groups.get("terrain")):
             yield picture
             line.advance()
 

@@ -12,7 +12,7 @@ from walkerlab.stages.graph import Graph
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 and so on, or its number; table-1 to table-3, table, trajectory"
+FIGURES = "figure-07 and so on, or its number; trajectory; a table by its caption; any other word lists them"
 Output = Annotated[
     Path | None,
     typer.Option(

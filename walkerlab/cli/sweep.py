@@ -17,6 +17,8 @@ from walkerlab.cli.text import paragraph
 from walkerlab.stages.graph import PIPELINE, Graph
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
 TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
@@ -111,7 +113,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 run = SweepRun(question, loaded, request.folder, graph)
                 # What is needed at the end is loaded while others compute.
                 threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
-                work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph))
+
+                def check(there: Collection[str]) -> None:
+                    from walkerlab.sweeps.drawing import refuse_unheard
+
+                    refuse_unheard(question.stage, show or (), there)
+
+                work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph), check)
                 swept = run.run(work, request.console)
             show_result(request, swept, tuple(show or ()), as_csv)
 

@@ -57,12 +57,12 @@ def edges(centres: NDArray[Any]) -> NDArray[Any]:
     return np.exp(found) if is_logarithmic(centres) else found
 
 
-def is_logarithmic(values: NDArray[Any]) -> bool:
-    """Whether values are evenly spaced powers over a wide range."""
-    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < LOG_SPAN:
+def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
+    """Whether values are evenly spaced powers over a range that is so many times as wide as it begins."""
+    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
         return False
-    gaps = np.diff(np.log(np.sort(values)))
-    return bool(gaps.max() < 1.01 * gaps.min())
+    gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
+    return bool(gaps.max() / gaps.min() < min(1.01, plain.max() / plain.min()))
 
 
 def axis_of(cells: Group, name: str) -> str:

@@ -88,6 +88,11 @@ class Sticks:
         """Largest distance of a foot from the hip (m)."""
         return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
 
+    @property
+    def has_soles(self) -> bool:
+        """Whether its soles are more than points to the eye."""
+        return self.radius > SMALL_FOOT * self.leg_length
+
     def leg(self, leg: int) -> Array:
         """A leg's line (samples, points, 2): from the hip, over its knee if it has one, to the middle of its sole."""
         joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
@@ -185,7 +190,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
         dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
         style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
         axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
-        if sticks.radius > SMALL_FOOT * sticks.leg_length:
+        if sticks.has_soles:
             axes.plot(*sticks.in_plane(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
     if sticks.head is not None:
         axes.plot(
@@ -255,6 +260,14 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
     return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
 
 
+def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
+    """The pads, or the plane if there are none; returns the legend entries."""
+    if pads is not None:
+        return draw_pads(axes, sticks, pads)
+    draw_slope(axes, sticks)
+    return []
+
+
 def draw_cycle(stage: str, results: Results) -> Drawn:
     """A model's walker on its pads, or on its plane.
 
@@ -264,10 +277,7 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     result = results[stage]
     sticks, pads = sticks_of(result), result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
-    ground = [] if pads is None else draw_pads(axes, sticks, pads)
-    if pads is None:
-        draw_slope(axes, sticks)
-    add_legend(figure, [*entries(sticks), *ground])
+    add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
     strikes = sticks.strikes[:CYCLE]
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
     told = list(steps), strikes.size == CYCLE, sticks.head is not None
@@ -299,25 +309,33 @@ def film_times(sticks: Sticks, steps: int, rate: int, slower: float) -> Array:
     return np.arange(0.0, end, 1.0 / (rate * slower))
 
 
-def pictures(sticks: Sticks, at: Array) -> Iterator[NDArray[np.uint8]]:
-    """A picture (height, width, 3) for each time."""
-    joints = np.concatenate([sticks.leg(leg) for leg in range(len(LEGS))], axis=1)
-    flat = joints.reshape(joints.shape[0], -1)
+def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
+    """A picture (height, width, 3) for each time, on pads if there are some."""
+    lines = [sticks.leg(leg) for leg in range(len(LEGS))]
+    if sticks.has_soles:
+        lines += [sticks.sole(leg) for leg in range(len(LEGS))]
+    if sticks.head is not None:
+        lines.append(np.stack((sticks.hip, sticks.head), axis=1))
+    points = np.concatenate(lines, axis=1)
+    flat = points.reshape(points.shape[0], -1)
     # between two samples, straight; both sides of a heel strike are samples, so none is cut across
     places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
-    shown = sticks.in_plane(places.reshape(at.size, *joints.shape[1:]))
+    shown = sticks.in_plane(places.reshape(at.size, *points.shape[1:]))
+    ends = np.cumsum([line.shape[1] for line in lines])[:-1]
     with styled():
         figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
         left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
         axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
-        draw_slope(axes, sticks)
-        legs = [axes.plot([], [], color=look.colour, linestyle=look.style, linewidth=2.2)[0] for look in LEGS]
+        draw_ground(axes, sticks, pads)
+        looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
+        looks += [{"color": look.colour} for look in LEGS] * sticks.has_soles + [{"color": BLACK}]
+        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for look in looks[: len(lines)]]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
         clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
         for time, places in zip(at, shown, strict=True):
-            for line, joint in zip(legs, np.split(places, len(LEGS)), strict=True):
+            for line, joint in zip(parts, np.split(places, ends), strict=True):
                 line.set_data(*joint.T)
             hip.set_data(*places[:1].T)
             clock.set_text(f"{time:.2f} s")

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -26,10 +27,11 @@ ONE: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
 """Points that a panel shows one by one; of more, evenly chosen ones."""
 PREFERRED: Final[tuple[str, ...]] = (
-    "period_s", "spectral_radius", "step_length_m", "steps", "slip_per_step_m", "max_penetration_m",
-    "min_normal_force_N", "energy_drift_J", "end_time_s",
+    "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
+    "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
+MISSING: Final[dict[str, Any]] = {"color": VERMILLION, "marker": "|", "linestyle": "none", "markersize": 5.0}
 LABELS: Final = {RADIUS: "largest multiplier"}
 
 
@@ -108,6 +110,8 @@ def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names
         axes[-1][column].set_xlabel(label(group, parameter))
     for one, name in zip(axes[:, 0], names, strict=True):
         one.set_ylabel(label(group, name))
+    if key := marked(group, names):
+        add_legend(figure, key)
     return figure
 
 
@@ -126,11 +130,17 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
-        mark: dict[str, Any] = {"color": VERMILLION, "marker": "|", "linestyle": "none", "markersize": 5.0}
-        axes.plot(missing, np.full(missing.size, 0.02), **mark, transform=axes.get_xaxis_transform())
-    if is_logarithmic(np.unique(numbers(group, parameter))):
+        axes.plot(missing, np.full(missing.size, 0.02), **MISSING, transform=axes.get_xaxis_transform())
+    if is_logarithmic(np.unique(numbers(group, parameter)), span=1.0):
         axes.set_xscale("log")
     name_ticks(axes, group, parameter, "x")
+
+
+def marked(group: Group, names: Sequence[str]) -> list[Artist]:
+    """Legend entries of what `finish_panel` draws."""
+    gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
+    one = [entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else []
+    return [*one, *([entry("no answer", **MISSING)] if gaps else [])]
 
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
@@ -159,7 +169,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
         key.append(entry(f"{in_words(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
-    add_legend(figure, [*key, *([entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else [])])
+    add_legend(figure, [*key, *marked(group, names)])
     return figure
 
 
@@ -189,7 +199,7 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
             add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
         for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
             getattr(one, f"set_{axis}label")(label(group, parameter))
-            if is_logarithmic(scale):
+            if is_logarithmic(scale, span=1.0):
                 getattr(one, f"set_{axis}scale")("log")
             if scale.size > 1 and group[parameter].dtype.kind != "O":
                 getattr(one, f"set_{axis}ticks")(scale, minor=True)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Final, Literal
 
 from walkerlab.labels import labels_of, unit_by_name, with_unit
 from walkerlab.report.numbers import NONE, number
+from walkerlab.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
 
 Tone = Literal["plain", "good", "fair", "bad"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
@@ -17,6 +18,20 @@ LONGEST_CELL: Final = 100
 """Letters; a column of records with longer cells holds sentences."""
 RAISED = re.compile(r"\\\^\{\}(-?\d+)")
 """A power in a text whose letters are guarded already."""
+SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
+"""A quantity in plain letters, guarded already."""
+IN_MATHS = {
+    **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
+    **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},
+    **{chr(low): f"$_{{{chr(plain)}}}$" for plain, low in SUBSCRIPTS.items()},
+    **{chr(high): f"$^{{{chr(plain)}}}$" for plain, high in SUPERSCRIPTS.items()},
+    **{"−": "$-$", "×": r"$\times$", "±": r"$\pm$", "≤": r"$\le$", "≥": r"$\ge$", "Δ": r"$\Delta$", "°": r"$^\circ$"},
+    **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
+}
+SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
+"""Signs that LaTeX sets in maths only."""
+BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
+"""A number without unit or words."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
@@ -31,6 +46,14 @@ class Cell:
     text: str
     tone: Tone | None = None
     value: Any = None
+
+    @property
+    def datum(self) -> Any:
+        """What stands for it in a file: the number that it was written from, or the text; None for nothing."""
+        if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
+            return self.value
+        plain = self.value if isinstance(self.value, str) else self.text
+        return None if plain in ("", NONE) else plain
 
 
 def plainly(value: Any) -> str:
@@ -76,8 +99,12 @@ def measured(
     """A column of numbers in a multiple of their unit: that of the key's label in a class of rows, or of its ending."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
-    scaled = written if not prefix else lambda value: written(None if value is None else factor * value)
-    return Column(with_unit(words, f"{prefix}{unit}"), key, scaled, numeric=True)
+
+    def scaled(record: Mapping[str, Any]) -> Any:
+        value = record.get(key)
+        return None if value is None else factor * value
+
+    return Column(with_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
 
 
 @dataclass(frozen=True)
@@ -208,7 +235,7 @@ def width(text: str) -> int:
 def as_csv(shown: Table) -> bytes:
     """A table's values as CSV."""
     heads, rows = flat(shown, wide=True)
-    return csv_text(heads, ([cell.value for cell in row] for row in rows))
+    return csv_text(heads, ([cell.datum for cell in row] for row in rows))
 
 
 def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
@@ -221,19 +248,33 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def as_tex(shown: Table) -> bytes:
-    """A table's values for LaTeX with the package booktabs; sentences are left out."""
+    """A table's values for LaTeX with the package booktabs, afloat where it has a caption; without sentences."""
     heads, rows = flat(shown)
-    values = [[name.replace("_", " ") for name in heads], *([cell.value for cell in row] for row in rows)]
+    values = [[name.replace("_", " ") for name in heads], *([cell.datum for cell in row] for row in rows)]
     head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in values]
     body = [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
-    return "\n".join([*body, r"\end{tabular}", ""]).encode()
+    caption = in_tex(". ".join(filter(None, (shown.caption, shown.note))))
+    before, after = (
+        ([r"\begin{table}", r"\centering", rf"\caption{{{caption}}}"], [r"\end{table}"]) if caption else ([], [])
+    )
+    return "\n".join([*before, *body, r"\end{tabular}", *after, ""]).encode()
 
 
 def in_tex(value: Any) -> str:
-    """A value in a LaTeX table: numbers in maths, text with its powers raised and its special letters guarded."""
+    """A value in a LaTeX table: numbers in maths, text with symbols and powers set and special letters guarded."""
     if value is None:
         return "--"
     if isinstance(value, float):
         mantissa, _, exponent = f"{value:.5g}".partition("e")
         return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
-    return RAISED.sub(r"$^{\1}$", str(value).translate(TEX))
+    text = SIGNS.sub(lambda found: IN_MATHS[found[0]], RAISED.sub(r"$^{\1}$", str(value).translate(TEX)))
+    return SYMBOL.sub(symbol_in_tex, text).replace("$$", "")
+
+
+def symbol_in_tex(found: re.Match[str]) -> str:
+    """A symbol with its subscript, such as t_left or dtheta_1, in maths."""
+    rate, letter, below = found.groups()
+    letter = rf"\{letter}" if letter in LETTERS else letter
+    below = below if len(below) == 1 else rf"\mathrm{{{below}}}"
+    letter = rf"\dot{{{letter}}}" if rate else letter
+    return rf"${letter}_{below}$"

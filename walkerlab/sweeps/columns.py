@@ -101,6 +101,11 @@ class Columns:
         """Of the variables."""
         return self._columns.keys()
 
+    @property
+    def numbers(self) -> Collection[str]:
+        """Of the variables that are one number for each result."""
+        return [name for name, column in self._columns.items() if not column.text and column.values.ndim == 1]
+
     def of(self, name: str) -> NDArray[Any] | None:
         """What the results have under a name, nan or an empty text for a gap; None if none of them has it."""
         return self._columns[name].values if name in self._columns else None

@@ -1,6 +1,6 @@
 """The figure and the page of a sweep, beside its file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.figures.sweep import choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.blocks import Gallery, Picture, Section
+from walkerlab.report.headlines import HEADLINES
 from walkerlab.report.numbers import number
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import picture
@@ -65,6 +66,15 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) ->
         if not is_number(group, name, dims):
             there = ", ".join(one for one in group.variables if is_number(group, one, dims) and "." not in one)
             raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
+
+
+def refuse_unheard(stage: str, names: Sequence[str], there: Collection[str]) -> None:
+    """Raise ConfigError for a name that the first results have not; of nested numbers others may have more."""
+    known = sorted({*there, *HEADLINES.get(stage, ())} - {"outcome"})
+    for name in names:
+        if name not in known and "." not in name:
+            listed = ", ".join(one for one in known if "." not in one)
+            raise ConfigError(f"--show {name}: no such number in the first results.", f"There are {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))

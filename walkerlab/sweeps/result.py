@@ -41,7 +41,8 @@ class Merge:
         for row in wanted:
             numbers = json.loads(row.numbers)
             own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": row.reason}
-            rows.append({**numbers, **own})
+            last = {name: numbers[whole][-1] for name, whole in LAST_OF.items() if whole in numbers}
+            rows.append({**numbers, **last, **own})
         self.there[at] = True
         self.columns.put(at, rows)
 
@@ -160,11 +161,6 @@ def as_csv(content: Content, question: Question, every: bool = False) -> str:
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
     variables = dict(group.variables)
     if not every:
-        for name, whole in LAST_OF.items():
-            if whole in variables:
-                lists = variables[whole]
-                last = last_of_each(np.asarray(lists.values, float))
-                variables[name] = Variable(last, lists.dims[:dimensions], lists.units, name, missing=True)
         found = headlines(question.stage, (name for name, one in variables.items() if len(one.dims) == dimensions))
         variables = {name: variables[name] for name in dict.fromkeys(("outcome", *found, "reason"))}
     for name, variable in variables.items():

@@ -3,7 +3,7 @@
 import contextlib
 import hashlib
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ class SweepWork:
     wait     for another process that works in the folder
     force    compute every point, there or not
     graph    where the pipeline is, as module:NAME
+    check    is told the names of the numbers there are once a point has an answer, and may raise
     """
 
     engine: SweepEngine = ENGINES["local"]
@@ -53,6 +54,7 @@ class SweepWork:
     wait: bool = True
     force: bool = False
     graph: str = PIPELINE_AT
+    check: Callable[[Collection[str]], None] = lambda _names: None
 
 
 @dataclass(frozen=True)
@@ -259,6 +261,8 @@ class SweepRun:
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, begun)
             merge.put(chunk, self.places)
+            if any(row.status == "answered" for row in chunk.rows):
+                work.check(merge.columns.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
                 place = bug.rpartition("\n  ")[0]  # without what it says there, which differs from point to point
                 if place not in bugs:

@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section
 from walkerlab.report.numbers import count, number, whole
 from walkerlab.report.results import Results
-from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, table
+from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.report.words import words
 from walkerlab.verification.verdict import BUDGET_USED
 
@@ -58,7 +58,7 @@ CASE_COLUMNS = (
     Column("other method", "second_method", lambda name: name or "none"),
     Column("worst measure over its limit", worst_measure, partial(number, digits=2), numeric=True),
     Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
-    Column("time (ms)", "wall_s", lambda value: number(1e3 * value, 3), numeric=True),
+    measured("time", "wall_s", partial(number, digits=3), prefix="m"),
     Column("why that is to be expected", "reason", wide=True),
 )
 
