@@ -50,6 +50,29 @@ def test_no_stage_is_made_of_the_python_interface():
     assert "walkerlab.api" not in names
 
 
+IN_GRAMS = {"walker.leg_mass_kg": 5000}
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda runs: walkerlab.run("fixedpoint", set=IN_GRAMS, runs=runs),
+        lambda runs: walkerlab.sweep("fixedpoint", {"slope_deg": [1]}, set=IN_GRAMS, runs=runs, jobs=1),
+        lambda _: walkerlab.find_gait(walkerlab.compass(leg_mass_kg=5000)),
+    ],
+    ids=["run", "sweep", "in memory"],
+)
+def test_what_the_command_line_warns_of_is_a_warning_to_who_calls(ask, tmp_path):
+    with pytest.warns(UserWarning, match="^[^:]*walker.leg_mass_kg.* masses are in kg, not in g$") as said:
+        ask(tmp_path)
+    assert {one.filename for one in said} == {__file__}
+
+
+def test_a_start_that_is_moved_in_memory_is_told():
+    with pytest.warns(UserWarning, match="^start: theta_1 moved from 0.5 to "):
+        walkerlab.simulate(slope_deg=1, start=[0.5, 0.17, -0.6, -0.86], strides=1)
+
+
 def test_a_run_from_python_is_the_run_of_the_command_line(tmp_path):
     result = walkerlab.run("simulate", set={"slope_deg": 2}, runs=tmp_path, strides=1)
     assert result.artifact == tmp_path / "paper@slope_deg=2,strides=1" / "simulate.h5"

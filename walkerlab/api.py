@@ -2,6 +2,7 @@
 
 import json
 import os
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, kinds_of
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
+from walkerlab.config.loader import doubts
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
@@ -194,6 +196,7 @@ def run(
 
     refuse_unknown_stage(stage)
     asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
+    warn(asked.loaded.warnings)
     report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
@@ -243,6 +246,7 @@ def sweep(
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     found = resolve(str(config), settings(set), runs=folder_of(runs), name=name)
+    warn(found.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
@@ -412,7 +416,15 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
     tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
-    return on_the_slope(typed(tree), tree)[0]
+    config, moved = on_the_slope(typed(tree), tree)
+    warn([*doubts(config, tree), *moved], inside=1)
+    return config
+
+
+def warn(said: Iterable[str], inside: int = 0) -> None:
+    """Warn at the line of who called a function of this module; `inside`: how many of its functions lie between."""
+    for text in said:
+        warnings.warn(text, stacklevel=3 + inside)
 
 
 def plain(value: Any) -> Any:

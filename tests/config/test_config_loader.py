@@ -119,7 +119,9 @@ def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> Non
 
 def test_legs_as_long_as_towers_are_doubted(loaded: Loaded) -> None:
     (said,) = loaded("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n").warnings
-    assert said.endswith("mine.yaml:1:10: the walker's legs are 1000 m long; lengths are in m, not in mm")
+    assert said.endswith("mine.yaml:1:10: walker.leg_length_m is 1000 m; lengths are in m, not in mm")
+    (said,) = loaded("extends: kneed\nwalker:\n  thigh:\n    length_m: 500\n").warnings
+    assert said.endswith("mine.yaml:4:5: walker.thigh.length_m is 500 m; lengths are in m, not in mm")
 
 
 def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Loaded) -> None:
@@ -190,8 +192,8 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         ("contact: {pad_pitch: -1}\n", r"-1 is out of bounds; allowed: rigid, own, or 1e-6 to 1e4 \(m\)"),
         ("contact: {friction_velocity: 100}\n", r"friction_velocity: 100 must exceed stiction_velocity, 100"),
         (
-            "contact: {static_friction: 0.5}\n",
-            r"dynamic_friction: 0.7 \(its default\) must not exceed static_friction, 0.5",
+            "contact:\n  stiffness: 1e5\n  static_friction: 0.5\n",
+            r"mine.yaml:3:20: contact.dynamic_friction: 0.7 \(its default\) must not exceed static_friction, 0.5",
         ),
         ("contact: {units: si, stiction_velocity: 100}\n", r"must be from 1e-07 to 10 m/s, as `units: si` has it"),
         ("slope_deg: 90\n", r"1:12: slope_deg: 90 is out of bounds; allowed: number, between -90 and 90"),
@@ -299,6 +301,11 @@ def test_a_steep_slope_in_degrees_and_heavy_walkers_of_their_size_are_taken_with
 def test_masses_of_parts_are_told_too() -> None:
     (warning,) = load(sets=["walker.torso={mass_kg: 5000, above_hip_m: 0.3}"]).warnings
     assert "walker.torso.mass_kg is 5000 kg" in warning
+
+
+def test_a_number_of_an_inner_block_is_told_where_it_is_written(loaded: Loaded) -> None:
+    (warning,) = loaded("extends: kneed\nwalker:\n  shank:\n    mass_kg: 5000\n").warnings
+    assert "mine.yaml:4:5: walker.shank.mass_kg is 5000 kg" in warning
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,12 @@ def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
     assert draw_walker(Path("kneed"), Target("png", Path("it")), Console()).read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_drawing_warns_of_what_its_config_perhaps_means_otherwise(tmp_path, capsys):
+    (tmp_path / "long.yaml").write_text("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n")
+    draw_walker(tmp_path / "long.yaml", Target("svg", tmp_path / "long.svg"), Console(quiet=True))
+    assert "lengths are in m, not in mm" in " ".join(capsys.readouterr().err.split())
+
+
 OF_TYPES = (
     ("paper", []),
     ("kneed", []),

@@ -109,6 +109,8 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     from walkerlab.figures.measures import drawn
 
     loaded = load(config, ())
+    for warning in loaded.warnings:
+        console.warn(warning)
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
     return put(path, drawn(loaded.config.walker, path.stem, kind), console)
 

@@ -12,10 +12,11 @@ from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_laye
 from walkerlab.config.layers import ConfigSetting, option_setting, setting_of, stacked, with_settings
 from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
+from walkerlab.config.problems import Problem
 from walkerlab.config.run_name import run_name
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping, Position, Scalar
-from walkerlab.config.validation import on_the_slope, typed
+from walkerlab.config.validation import Location, key_at, on_the_slope, typed
 from walkerlab.config.walkers import CompassWalker
 
 STEEP_RAD: Final = 0.5
@@ -109,26 +110,22 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short(stays)} m, "
                 f"as {mass} has it: the mass is not in the middle of the leg"
             )
-    if walker.leg_length_m > LONG_M:
-        given = places.get("leg_length_m", tree.position)
-        yield f"{given}: the walker's legs are {length} m long; lengths are in m, not in mm"
     slope = tree.keys.get("slope_rad")
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
         degrees = short(round(math.degrees(config.slope_rad), 1))
-        yield f"{slope}: slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"
-    for key, kilograms in masses("walker", walker.model_dump(mode="json")):
-        if kilograms > HEAVY_KG_M3 * walker.leg_length_m**3:
-            given = places.get(key.split(".")[1], tree.position)
-            yield f"{given}: {key} is {short(kilograms)} kg on legs of {length} m; masses are in kg, not in g"
+        yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
+    for path, value in numbers(("walker",), walker.model_dump(mode="json")):
+        key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
+        if key.endswith("length_m") and value > LONG_M:
+            yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
+        if key.endswith("mass_kg") and value > HEAVY_KG_M3 * walker.leg_length_m**3:
+            yield str(Problem(key_at(tree, path), f"{text} kg on legs of {length} m; masses are in kg, not in g"))
 
 
-def masses(key: str, value: Any) -> Iterator[tuple[str, float]]:
-    """The masses (kg) in a block, with their keys."""
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from masses(f"{key}.{name}", inner)
-    elif isinstance(value, list):
-        for place, inner in enumerate(value):
-            yield from masses(f"{key}.{place}", inner)
-    elif key.endswith("mass_kg") and isinstance(value, int | float):
-        yield key, float(value)
+def numbers(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
+    """The numbers in a block or list, with where they are."""
+    if isinstance(value, dict | list):
+        for name, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from numbers((*path, name), inner)
+    elif isinstance(value, int | float):
+        yield path, float(value)

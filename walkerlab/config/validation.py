@@ -100,12 +100,13 @@ def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]
             start[first + place] = sum(weight * start[first + other] for other, weight in of.items())
             why[first + place] = f"{theta}_{name.split()[0]}", f"as the {name} follows other bodies"
     moved = [
-        f"{tree.entries['start'].position}: start: {name} moved from {short(config.start[place])} to "
-        f"{short(start[place])} {'rad' if place < bodies else 'rad/s'}, {because}"
+        f"start: {name} moved from {short(config.start[place])} to {short(start[place])} "
+        f"{'rad' if place < bodies else 'rad/s'}, {because}"
         for place, (name, because) in why.items()
         if abs(start[place] - config.start[place]) > MOVED_RAD
     ]
-    return config.model_copy(update={"start": tuple(start)}), tuple(moved)
+    where = tree.entries["start"].position
+    return config.model_copy(update={"start": tuple(start)}), tuple(str(Problem(where, text)) for text in moved)
 
 
 def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
@@ -118,7 +119,7 @@ def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
 
     def refuse(place: Location, why: str, allowed: Sequence[str], near: str = "") -> None:
         text = f"{'.'.join(map(str, place))}: {why}"
-        problems.append(Problem(_node_at(tree, place)[1], text, ", ".join(allowed), near))
+        problems.append(Problem(node_at(tree, place)[1], text, ", ".join(allowed), near))
 
     for place, name in bodies_named(walker):
         if name not in bodies:
@@ -156,7 +157,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     location, what = detail["loc"], detail["type"]
     kinds = kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
     if what == "union_tag_invalid":
-        node, position = _node_at(tree, (*location, "type"))
+        node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
         text = f"{location[0]}.type: {shown(word)} is of no known type"
         return Problem(position, text, f"one of {', '.join(kinds)}", nearest(word, kinds))
@@ -167,14 +168,16 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     path, field, _ = _along(model, location, tree)
     assert field is not None, "a key that is wrong is a key"
     key = ".".join(path)
-    node, position = _node_at(tree, location)
+    node, position = node_at(tree, location)
     if node is None and what == "missing":
         return Problem(position, f"{key}: is missing", allowed(field))
     value = shown_value(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
-        given, where = _node_at(tree, ("contact", judge))
-        if given is not None and where.source != position.source and _is_later(where, position):
+        given, where = node_at(tree, ("contact", judge))
+        if given is not None and node is None:
+            position = where
+        elif given is not None and where.source != position.source and _is_later(where, position):
             text = f"contact.{judge}: {key} stays {value}, as {position.source} has it, and {reason}"
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
@@ -205,7 +208,7 @@ def _along(
             break
         path.append(str(part))
         field = block.model_fields[str(part)]
-        node, _ = _node_at(tree, tuple(path))
+        node, _ = node_at(tree, tuple(path))
         chosen = node.entries.get("type") if isinstance(node, Mapping) else None
         kind = str(chosen.value) if isinstance(chosen, Scalar) else ""
         block = kinds_of(field).get(kind) or block_of(field)
@@ -216,7 +219,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     above, field, held = _along(Config, location[:-1], tree)
     name, block = str(location[-1]), held or Config
     kinds = {} if field is None else kinds_of(field)
-    parent, _ = _node_at(tree, location[:-1])
+    parent, _ = node_at(tree, location[:-1])
     assert isinstance(parent, Mapping), "it holds the key"
     if any(name in kind.model_fields for kind in kinds.values()):
         return _keys_of_another_kind(".".join(above), parent, parent.keys[name].source, block, kinds)
@@ -245,7 +248,7 @@ def _keys_of_another_kind(
     if source.startswith("--") or type_at.source in (source, builtin(DEFAULT).label):
         return Problem(where, f"{above}.type is {chosen}, which {has_no}", ", ".join(block.model_fields))
     layers = {name: stacked(read_layers(builtin(name))) for name in (DEFAULT, *builtin_names())}
-    types = {name: _node_at(tree, (above, "type"))[0] for name, tree in layers.items()}
+    types = {name: node_at(tree, (above, "type"))[0] for name, tree in layers.items()}
     begin = next(name for name, node in types.items() if isinstance(node, Scalar) and node.value == chosen)
     instead = f"`-c {begin}`, in a file `extends: {begin}`; or the whole {above} block in a file without `extends`"
     return Problem(type_at, f"{above}.type: {chosen} {has_no}, given at {where}", instead)
@@ -261,7 +264,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
     return paths.get(found, "")
 
 
-def _node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
+def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
     """The value at a location and its position; for a key that is not in the tree None and the block it is missing in.
 
     Parts of the location that are not in the tree, such as the kind of value pydantic tried, are passed over.
@@ -277,3 +280,9 @@ def _node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
             node = node.items[part]
             position = node.position
     return node, node.position
+
+
+def key_at(tree: Mapping, location: Location) -> Position:
+    """Where a key is written; if it is not in the tree, the block that it is missing in."""
+    block, position = node_at(tree, location[:-1])
+    return block.keys.get(str(location[-1]), position) if isinstance(block, Mapping) else position

@@ -112,6 +112,9 @@ def break_lines(figure: Figure) -> None:
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 
+OF_PIXELS = ("png", "tiff")
+
+
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
     """The figure in a format, an SVG with text kept as text; `name` makes its ids differ from other figures'."""
     undated: dict[str, dict[str, Any]] = {
@@ -123,7 +126,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
     }
     file = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, dpi=dpi, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi if kind in OF_PIXELS else PNG_DPI, **undated[kind])
     return file.getvalue()
 
 
