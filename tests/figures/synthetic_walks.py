@@ -68,7 +68,7 @@ def joints(step, stance, angle):
 
 def trajectory(step, time, angle, velocity, level):
     stance = 1 - step % 2
-    moving = over_time(time=time, stance_leg=stance, angle=angle, velocity=velocity)
+    moving = over_time(time=time, stance_leg=stance + 1, angle=angle, velocity=velocity)
     return {**moving, **energies(time, level), **joints(step, stance, angle)}
 
 
@@ -123,7 +123,7 @@ def steps_of(step):
 def pads_group(steps):
     numbers = np.arange(-2, steps + 3)
     edges = {"left_m": (numbers - 0.5) * STEP_LENGTH, "right_m": (numbers + 0.5) * STEP_LENGTH}
-    lanes = {"leg": 1 - numbers % 2}
+    lanes = {"leg": 2 - numbers % 2}
     return Group({name: Variable(values, ("pad",), "1", name) for name, values in {**edges, **lanes}.items()})
 
 

@@ -94,7 +94,7 @@ def rigid_trajectory(steps):
     feet = hip[:, None] + leg
     places = {"hip_along_m": hip[:, 0], "hip_height_m": hip[:, 1], "foot_along_m": feet[..., 0]}
     places |= {"foot_height_m": feet[..., 1]}
-    seen = over_time(time=time, stance_leg=stance, angle=angle, **places)
+    seen = over_time(time=time, stance_leg=stance + 1, angle=angle, **places)
     return Group({**seen, **legs(), "step": column(step, "time")})
 
 

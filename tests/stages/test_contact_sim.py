@@ -87,7 +87,7 @@ def test_every_touch_is_on_a_pad_of_its_leg(paper):
     pads, touches = paper["terrain"], paper["steps"]["touch_along_m"]
     for step, along in enumerate(touches):
         under = (pads["left_m"] <= along) & (along <= pads["right_m"])
-        assert pads["leg"][under].tolist() == [step % 2]
+        assert pads["leg"][under].tolist() == [1 + step % 2]
 
 
 def masses(trajectory):

@@ -88,8 +88,8 @@ def test_each_leg_moves_without_jumps_through_the_changes_of_roles(paper):
 
 def test_leg_0_swings_first_and_the_legs_take_turns(paper):
     trajectory = paper["trajectory"]
-    assert trajectory["stance_leg"][0] == 1
-    assert (trajectory["stance_leg"] == 1 - trajectory["step"] % 2).all()
+    assert trajectory["stance_leg"][0] == 2
+    assert (trajectory["stance_leg"] == 2 - trajectory["step"] % 2).all()
     assert trajectory["angle"][0].tolist() == paper.summary["start_state"][:2]
     assert trajectory["velocity"][0].tolist() == paper.summary["start_state"][2:]
 

@@ -237,5 +237,5 @@ def trajectory(stored: Stored, kind: str) -> bytes:
             columns[with_unit(name, variable.units)] = variable.values.tolist()
         elif variable.dims[:1] == ("time",):
             for place, values in enumerate(variable.values.T.tolist()):
-                columns[with_unit(f"{name} {place}", variable.units)] = values
+                columns[with_unit(f"{name} {place + 1}", variable.units)] = values
     return csv_text(list(columns), zip(*columns.values(), strict=True))

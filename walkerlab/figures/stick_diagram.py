@@ -256,7 +256,7 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
     for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
         outline = sticks.in_plane(np.array([[begin, 0.0], [end, 0.0], [end, bottom], [begin, bottom]]))
         if outline[:, 0].max() > left and outline[:, 0].min() < right:
-            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **PADS[int(leg)]))
+            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **PADS[int(leg) - 1]))
     return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
 
 

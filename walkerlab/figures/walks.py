@@ -221,7 +221,7 @@ def draw_states(results: Results) -> Drawn:
     first = walks[0]
     figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
     for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
-        edges = np.diff((first["stance_leg"] == leg).astype(int), prepend=0, append=0)
+        edges = np.diff((first["stance_leg"] == leg + 1).astype(int), prepend=0, append=0)
         for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
             one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
     stance = f"stance of the leg, {first.look.label.split()[0]}"
@@ -324,7 +324,7 @@ def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
     last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
     line(axes, angle[last], velocity[last], look)
     before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
-    own = walk["stance_leg"][before] != leg
+    own = walk["stance_leg"][before] != leg + 1
     for rows, face in ((before[own], look.colour), (before[~own], "white")):
         axes.plot(
             angle[rows], velocity[rows], linestyle="none", marker=look.marker, markersize=4.5,
@@ -334,7 +334,7 @@ def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
 
 def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
     """Arrowheads in the middle of the first swing and the first stance of a leg."""
-    carries = walk["stance_leg"] == leg
+    carries = walk["stance_leg"] == leg + 1
     for phase in (carries, ~carries):
         rows = np.flatnonzero(phase)
         first = rows[: np.argmax(np.diff(rows, append=rows[-1] + 2) > 1) + 1] if rows.size else rows

@@ -254,10 +254,9 @@ def as_tex(shown: Table) -> bytes:
     head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in values]
     body = [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
     caption = in_tex(". ".join(filter(None, (shown.caption, shown.note))))
-    before, after = (
-        ([r"\begin{table}", r"\centering", rf"\caption{{{caption}}}"], [r"\end{table}"]) if caption else ([], [])
-    )
-    return "\n".join([*before, *body, r"\end{tabular}", *after, ""]).encode()
+    float_on, float_off = [r"\begin{table}", r"\centering", rf"\caption{{{caption}}}"], [r"\end{table}"]
+    whole = [*body, r"\end{tabular}"]
+    return "\n".join([*([*float_on, *whole, *float_off] if caption else whole), ""]).encode()
 
 
 def in_tex(value: Any) -> str:

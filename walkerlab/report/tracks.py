@@ -80,6 +80,8 @@ def track_in(trajectory: Group | None) -> Track | None:
         return None
     there = trajectory.variables.keys()
     channels = {channel: trajectory[name] for name, channel in OF_THE_WALKER.items() if name in there}
+    if "stance_leg" in there:
+        channels[OF_THE_WALKER["stance_leg"]] = trajectory["stance_leg"] - 1
     of_legs = {name: channel for name, channel in OF_A_LEG.items() if name in there}
     channels |= {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in of_legs.items() for leg in LEGS}
     if {"penetration_m", "slip_velocity_m_s"} <= there:

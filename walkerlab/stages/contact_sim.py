@@ -158,7 +158,7 @@ def pads_group(pitch: float, end: float) -> Group:
             **numbered(numbers.size, "pad", "pad number"),
             "left_m": Variable(numbers * pitch - 0.5 * pitch, ("pad",), "m", "where the pad begins, along the slope"),
             "right_m": Variable(numbers * pitch + 0.5 * pitch, ("pad",), "m", "where the pad ends, along the slope"),
-            "leg": Variable(1 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
+            "leg": Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
         }
     )
 
@@ -167,7 +167,7 @@ def trajectory_group(
     config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
     """Samples of the walk: what `outputs` asks for."""
-    variables = {**over_time(time=samples.time_s, stance_leg=samples.stance), **legs()}
+    variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
     feet = np.zeros((samples.time_s.size, 2, 5))
     sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
     if "states" in config.outputs:

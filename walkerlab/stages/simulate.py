@@ -77,7 +77,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
     """Samples of the walk, both sides of each heel strike among them: what `outputs` asks for."""
     stance = stance_leg(samples)
-    variables = {**over_time(time=samples.time_s, stance_leg=stance, step=samples.step), **legs()}
+    variables = {**over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
     if "states" in scene.outputs:
         variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)

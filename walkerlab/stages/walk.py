@@ -161,8 +161,8 @@ def of_body(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """The legs, which keep their numbers when they change roles."""
-    return numbered(2, LEG, "leg: 0 swings first, 1 stands first")
+    """The legs, 1 and 2, which keep their numbers when they change roles."""
+    return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:

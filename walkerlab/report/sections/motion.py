@@ -97,7 +97,7 @@ def pads(results: Results) -> tuple[Pad, ...]:
     if terrain is None or "left_m" not in terrain.variables:
         return ()
     left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
-    return tuple((round(one[0], 4), round(one[1], 4), int(one[2])) for one in zip(left, right, leg, strict=True))
+    return tuple((round(one[0], 4), round(one[1], 4), int(one[2]) - 1) for one in zip(left, right, leg, strict=True))
 
 
 def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:
