@@ -36,8 +36,10 @@ def command_of(pid):
 
 
 def is_alive(pid):
-    """Whether a process runs."""
+    """Whether a process runs: one that was killed does until all its threads have ended, and may be waited for then."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return False
+    state, threads = fields[0], int(fields[17])
+    return state != "Z" or threads > 1

@@ -124,7 +124,7 @@ def test_a_trajectory_as_csv_is_the_stored_one(run):
     assert head[0] == "time (s)"
     assert np.array([float(row[0]) for row in rows]).tolist() == stored["time"].tolist()
     column = head.index("angle 1 (rad)")
-    assert [float(row[column]) for row in rows] == stored["angle"][:, 1].tolist()
+    assert [float(row[column]) for row in rows] == stored["angle"][:, 0].tolist()
 
 
 def test_a_trajectory_as_netcdf_opens_without_a_group(run):
