@@ -37,8 +37,7 @@ from walkerlab.mechanics.standing import (
     Standing,
     energy_at_touch,
     linked,
-    rolled_distance,
-    swing_foot,
+    step_length,
 )
 from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
@@ -94,22 +93,25 @@ def take_walk(
     steps: int,
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
+    heights: Array | None = None,
 ) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends.
 
     tolerances  how to integrate; no step is given more right-hand sides than any step needs
     sampled     whether states in time are wanted
     advance     told how many more steps were taken
+    heights     (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
 
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
+    rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
         taken = recorder.steps
-        status = recorder.walk_on(min(STEPS_AT_ONCE, steps - taken))
+        status = recorder.walk_on(rises[taken : taken + STEPS_AT_ONCE + 1])
         if advance is not None:
             advance(recorder.steps - taken)
     return recorder.finished(status)
@@ -139,9 +141,10 @@ class Recorder:
         self.strikes, self.before, self.after, self.knees = [np.zeros(0)], [no_states], [no_states], [np.zeros(0)]
         self.pieces: list[Samples] = []
 
-    def walk_on(self, steps: int) -> Outcome:
-        """Take up to `steps` more steps."""
-        seen, times = new_heel_strikes(steps, self.numbers, self.kneed), np.zeros(0)
+    def walk_on(self, rises: Array) -> Outcome:
+        """Take up to so many more steps as footholds rise (m) over the present one, whose own rise is the first."""
+        steps = rises.size - 1
+        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises), np.zeros(0)
         if self.sampled:  # as many as the steps may reach, from the start of the first of them
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
@@ -205,7 +208,7 @@ class Recorder:
         strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
         lengths, begun = np.zeros(self.steps), self.start
         for k, row in enumerate(map(np.ndarray.tolist, before)):  # between touches, and what the stance foot rolled
-            lengths[k] = swing_foot(self.walker, row)[1] + rolled_distance(self.walker, begun, row)
+            lengths[k] = step_length(self.walker, begun, row)
             begun = after[k]
         return RigidWalkResult(
             outcome=outcome,

@@ -99,13 +99,14 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 def foot_function(system: Mode, y: Any) -> tuple[float, float, float, float]:
     """What falls through zero as the swing foot comes down, what is positive with it ahead, and their rates.
 
-    Of a straight leg both are linear in the angles, and scuffing near mid-swing is no zero; of a bent one they are its
-    foot's height and place.
+    Of a straight leg over even ground both are linear in the angles, and scuffing near mid-swing is no zero; otherwise
+    they are the foot's height over its next foothold, and its place.
     """
     model = system.model
-    if is_bent(system):
-        return swing_foot_motion(model, y)
     n = len(model.arm_x)
+    if is_bent(system) or system.rise != 0.0:
+        height, ahead, upward, apart = swing_foot_motion(model, y, y[n : 2 * n])
+        return height - system.rise, ahead, upward, apart
     swing, stance = y[n + SWING], y[n + STANCE]
     return feet_on_slope(model, y), y[SWING] - y[STANCE], swing + stance, swing - stance
 
@@ -137,9 +138,10 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 @inlined
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
-    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, at_start)
+    on_ground = at_start and system.behind == system.rise
+    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
-        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, at_start)
+        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
     fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
         struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
@@ -173,27 +175,29 @@ def scan_scipy(method: ScipyMethod, system: Mode, finder: CrossingFinder, at_sta
 
 @inlined
 def take_step(
-    model: Standing, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, knee_time: Any
+    model: Standing, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
     """One step: a swing from time t (s) on, and the heel strike.
 
-    y          the walker's state at the start, with columns behind it if the method has room for them; overwritten with
-               where it led
-    knee_time  (steps,) s; that of this step's knee strike is written
+    y        the walker's state at the start, with columns behind it if the method has room for them; overwritten with
+             where it led
+    strikes  the walk's HeelStrikes, whose footholds are told; the time of this step's knee strike is written
 
     Returns WALKED and the time of the heel strike, whose state before it is the method's; or what happened, and when.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK else STRAIGHT
+    behind, rise = -strikes.rise[step], strikes.rise[step + 1]
     while True:
-        status = swing_phase(method, Mode(model, phase), finder, observer, t, y, latest, step)
+        system = Mode(model, phase, behind, rise)
+        status = swing_phase(method, system, finder, observer, t, y, latest, step)
         if status != WALKED and status != KNEE_STRUCK:
             return status, method.clock[T]
-        t = pass_event(method, Mode(model, phase), y)
-        observe_strike(observer, Mode(model, phase), method.y, y)
+        t = pass_event(method, system, y)
+        observe_strike(observer, system, method.y, y)
         if status == WALKED:
             return WALKED, t
-        knee_time[step] = t
+        strikes.knee_time[step] = t
         phase = STRAIGHT
 
 
@@ -239,14 +243,18 @@ def swing_phase(
 
 
 @inlined
-def event_value(model: Standing, knee: bool, y: Any, at: int, resting: float) -> float:
-    """The event function of the strike that ends a phase, linear in the angles y[at], ..., or in their velocities.
+def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
+    """The event function of the strike that ends a phase, and how it changes as the bodies turn.
 
-    resting  its value where all angles are zero
+    turn  (n,) and more: angular velocities, or a column
     """
-    if knee:
-        return y[at + model.shank] - y[at + model.thigh]
-    return y[at + SWING] + y[at + STANCE] + resting
+    model = system.model
+    if is_bent(system):
+        return knee_angle(model, y, 0), knee_angle(model, turn, 0)
+    if system.rise != 0.0:
+        height, _, upward, _ = swing_foot_motion(model, y, turn)
+        return height - system.rise, upward
+    return feet_on_slope(model, y), turn[SWING] + turn[STANCE]
 
 
 @inlined
@@ -265,8 +273,7 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
     for i in range(2 * n):
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)
-    rate = event_value(model, knee, y, n, 0.0)
-    value = event_value(model, knee, y, 0, 2.0 * (model.slope + model.lean))
+    value, rate = event_value(system, y, y[n : 2 * n])
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]
@@ -274,17 +281,18 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
     t = method.clock[T] + wait
     if len(y) > 2 * n:
         derivative(system, t, before, f)
-        rate = event_value(model, knee, y, n, 0.0)
+        _, rate = event_value(system, y, y[n : 2 * n])
         for column in range(1, len(y) // (2 * n)):
             at = 2 * n * column
-            waits[column] = -event_value(model, knee, y, at, 0.0) / rate
+            _, change = event_value(system, y, y[at : at + n])
+            waits[column] = -change / rate
             for i in range(2 * n):
                 y[at + i] += waits[column] * f[i]
     strike(model, STRAIGHT if knee else AT_STRIKE, not knee, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
-        derivative(Mode(model, STRAIGHT), t, before, f)
+        derivative(Mode(model, STRAIGHT, system.behind, system.rise), t, before, f)
         for column in range(1, len(y) // (2 * n)):
             for i in range(2 * n):
                 new[2 * n * column + i] -= waits[column] * f[i]
@@ -298,12 +306,17 @@ class HeelStrikes(NamedTuple):
     before: Any  # (steps, m) states just before them
     after: Any  # (steps, m) just after, roles changed
     knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
+    rise: Any  # (steps + 1,) m, of each foothold over the one before, of the present one first: given
 
 
-def new_heel_strikes(steps: int, m: int, kneed: bool = True) -> HeelStrikes:
-    """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees."""
+def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None) -> HeelStrikes:
+    """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees.
+
+    rise  as `HeelStrikes` has it; even ground without
+    """
     before, after = np.zeros((2, steps, m))
-    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0))
+    even = np.zeros(steps + 1) if rise is None else rise
+    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0), even)
 
 
 @kernel
@@ -321,7 +334,7 @@ def walk(
     model = walker[()]
     t = 0.0
     for step in range(strikes.time.size):
-        status, t = take_step(model, method, finder, observer, t, y, step, strikes.knee_time)
+        status, t = take_step(model, method, finder, observer, t, y, step, strikes)
         if status != WALKED:
             return status, step
         strikes.time[step] = t

@@ -9,9 +9,12 @@ Source: (A.57) of the paper with the impulse projected away.
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, Standing, equations
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, Standing, equations, hip_height
 from walkerlab.mechanics.tree import projections, sines_cosines
 
 
@@ -83,6 +86,23 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         solve_linked(model, phase, factors, p)
         for k in range(n):
             new[at + n + k] = p[k]
+
+
+def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:
+    """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
+
+    The new stance foot stays where it is, and the constraints are those of the heel strike.
+    """
+    n, new = len(model.arm_x), np.array(y, float)
+    s, c, F, U, p = np.zeros((5, n))
+    M = np.zeros((n, n))
+    equations(model, new, s, c, F, U, M, p)
+    p[:] = 0.0
+    p[STANCE] = -impulse * hip_height(model, new)
+    factor_linked(model, AT_STRIKE, M, p)
+    solve_linked(model, AT_STRIKE, M, p)
+    new[n:] += p
+    return new
 
 
 @always_inline

@@ -137,6 +137,9 @@ class Mode(NamedTuple):
 
     model: Standing
     phase: int  # BENT or STRAIGHT
+    # m, heights over the present foothold: of that which the swing foot leaves, and of that on which it is to land
+    behind: float = 0.0
+    rise: float = 0.0
 
 
 @block.case(Mode)
@@ -315,17 +318,17 @@ def energy_at_touch(model: Standing, touched: Any) -> Any:
 @inlined
 def swing_foot(model: Standing, y: Any) -> tuple[float, float]:
     """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
-    height, ahead, _, _ = swing_foot_motion(model, y)
+    height, ahead, _, _ = swing_foot_motion(model, y, y)
     return height, ahead
 
 
 @inlined
-def swing_foot_motion(model: Standing, y: Any) -> tuple[float, float, float, float]:
-    """`swing_foot` and its rates (m/s)."""
+def swing_foot_motion(model: Standing, y: Any, turn: Any) -> tuple[float, float, float, float]:
+    """`swing_foot`, and how both change as the bodies turn: rates (m/s) where `turn` are angular velocities."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
-    ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, y[n : 2 * n])
+    ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, turn)
     return height, ahead, upward, apart
 
 
@@ -338,7 +341,7 @@ def hip_height(model: Standing, y: Any) -> float:
 
 @inlined
 def feet_on_slope(model: Standing, y: Any) -> float:
-    """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on the slope.
+    """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
     It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
     """
@@ -349,6 +352,11 @@ def feet_on_slope(model: Standing, y: Any) -> float:
 def rolled_distance(model: Standing, start: Any, end: Any) -> float:
     """How far (m) the stance foot's point of contact has moved along the slope between two states of one step."""
     return -model.radius * (end[STANCE] - start[STANCE])
+
+
+def step_length(model: Standing, start: Any, end: Any) -> float:
+    """Distance (m) along the slope between a step's touch and the next one, by its first and its last state."""
+    return float(swing_foot(model, end)[1] + rolled_distance(model, start, end))
 
 
 def kinetic_energy(model: Standing, y: Any) -> float:

@@ -29,7 +29,7 @@ from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, ma
 from walkerlab.hybrid.contact_knee import rate_of
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.orbits.step_map import REMEMBERED, MappedStep, Monitor, StepMap, no_step
+from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, MappedStep, Monitor, StepMap, no_step
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -300,6 +300,10 @@ class ContactMap(StepMap):
                 on_pads = self._walk(here, z, False, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk over footholds (m), after a push as the feet pass."""
+        raise NotImplementedError
 
     def at(self, tolerances: Tolerances) -> ContactMap:
         """The same map, its steps integrated otherwise."""

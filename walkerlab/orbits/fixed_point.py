@@ -106,7 +106,7 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
         max_scuff_depth=step.max_scuff_depth * units.length,
         min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
         max_impulse_ratio=step.max_impulse_ratio or None,
-        trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
+        trailing_foot_rises=bool(swing_foot_motion(walker, start, start[len(start) // 2 :])[2] >= 0.0),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )
 

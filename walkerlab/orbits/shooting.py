@@ -20,10 +20,11 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, swing_foot
+from walkerlab.mechanics.impact import pushed_at_hip
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_length, swing_foot
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.similarity import Units, unit_walker
-from walkerlab.orbits.step_map import REMEMBERED, Iterates, MappedStep, Monitor, StepMap, no_step
+from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
@@ -97,12 +98,14 @@ class Steps(NamedTuple):
     time     (steps,) of the heel strikes, in units of the walker
     z        (steps, d) where each led
     DP       (steps, d, d) derivatives with respect to where the first began; none if they were not wanted
+    strikes  the heel strikes themselves
     """
 
     outcome: Outcome
     time: Floats
     z: Floats
     DP: Floats
+    strikes: HeelStrikes
 
 
 class Memory(NamedTuple):
@@ -112,7 +115,7 @@ class Memory(NamedTuple):
     finder: CrossingFinder
     observer: Observer
     y: Any  # (2 n (1 + d),) the state with its columns
-    knee_time: Any  # (1,) s
+    strikes: HeelStrikes  # of one step
     pivots: Any  # (d,)
 
 
@@ -124,10 +127,17 @@ class Shooting:
         size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
         finder = finder_for(self.plain, EVENTS)
-        self.memory = Memory(varied, finder, unwatched(), np.zeros(size * (1 + d)), np.zeros(1), np.zeros(d, np.int64))
+        self.memory = Memory(
+            varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0), np.zeros(d, np.int64)
+        )
 
-    def walk(self, section: StrikeSection, z: Floats, steps: int = 1, derived: bool = True) -> Steps:
-        """Walk from z (d,), with the derivative if it is wanted: without, it is two thirds of the work."""
+    def walk(
+        self, section: StrikeSection, z: Floats, steps: int = 1, derived: bool = True, rises: Floats | None = None
+    ) -> Steps:
+        """Walk from z (d,), with the derivative if it is wanted: without, it is two thirds of the work.
+
+        rises  as HeelStrikes has them, in units of the walker; even ground without
+        """
         memory = self.memory
         method = memory.varied if derived else self.plain
         d, size = section.basis.shape
@@ -135,11 +145,11 @@ class Shooting:
         y[:size] += z @ section.basis
         method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
-        strikes: HeelStrikes = new_heel_strikes(steps, y.size)
+        strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises)
         status, taken = walk(section.walker, method, memory.finder, memory.observer, y, strikes)
         ahead = strikes.after[:taken].take(section.places if derived else section.places[:d], axis=1)
         DP = ahead[:, d:].reshape(taken, d if derived else 0, d) / SMALL
-        return Steps(Outcome(status), strikes.time[:taken], ahead[:, :d], DP)
+        return Steps(Outcome(status), strikes.time[:taken], ahead[:, :d], DP, strikes)
 
     def lead(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
         """Follow starts (starts, d) to where they lead; they are overwritten with the last states tried.
@@ -191,7 +201,7 @@ def follow(model: Standing, section: StrikeSection, memory: Memory, known: Known
             for j in range(d):
                 y[i] += z[j] * section.basis[j, i]
         method.clock[H_NEXT] = 0.0
-        status, t = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.knee_time)
+        status, t = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.strikes)
         residual = NO_RESIDUAL
         if status == WALKED and t >= SHORTEST_STEP:
             residual = 0.0
@@ -299,6 +309,22 @@ class RigidMap(StepMap):
         taken = take_walk(walker, WATCHED, on_section(walker, z), steps)
         extremes = (taken.min_normal_force, taken.max_friction_ratio, taken.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk over footholds (m), after a push just after the heel strike that z is."""
+        unit = self._unit_at(p)
+        assert unit is not None, "what is disturbed has a gait"
+        walker, units, section = unit
+        if push_N_s != 0.0:
+            z = coordinates_of(walker, pushed_at_hip(walker, on_section(walker, z), push_N_s / units.impulse))
+        rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
+        walked = self._exact.walk(section, z, rises.size - 1, derived=False, rises=rises)
+        begun, lengths = on_section(walker, z), np.zeros(len(walked.time))
+        for k in range(lengths.size):
+            lengths[k] = step_length(walker, begun, walked.strikes.before[k])
+            begun = walked.strikes.after[k]
+        durations = np.diff(walked.time, prepend=0.0) * units.time
+        return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z)
 
     def at(self, tolerances: Tolerances) -> RigidMap:
         """The same map, its steps integrated otherwise."""

@@ -26,6 +26,11 @@ class Units(NamedTuple):
         """Unit of force, N."""
         return self.mass * self.length / self.time**2
 
+    @property
+    def impulse(self) -> float:
+        """Unit of impulse, N s."""
+        return self.mass * self.length / self.time
+
 
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""

@@ -74,6 +74,22 @@ class Iterates:
     angles: Floats
 
 
+@dataclass(frozen=True)
+class DisturbedWalk:
+    """A walk from the section over uneven ground, or pushed.
+
+    outcome      WALKED if it took all its steps
+    durations_s  (steps,) between heel strikes, the first from the section on
+    lengths_m    (steps,)
+    z            (steps, d) where each led: a point of the section where the footholds before and after are level
+    """
+
+    outcome: Outcome
+    durations_s: Floats
+    lengths_m: Floats
+    z: Floats
+
+
 class StepMap(Protocol):
     """A walker's step from section to section, over one parameter.
 
@@ -93,6 +109,12 @@ class StepMap(Protocol):
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """(monitors,) the worst of each over some steps."""
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk from z (d,) over footholds, after an impulse at the hip along the slope.
+
+        heights_m  (steps + 1,) of the footholds, the present one's first
+        """
 
     def at(self, tolerances: Tolerances) -> StepMap:
         """The same map, its steps integrated otherwise."""
