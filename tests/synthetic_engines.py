@@ -53,6 +53,7 @@ def truth():
     times = np.array((0.7, 0.7 + PERIOD, 0.7 + 2 * PERIOD))
     along = LENGTH * np.arange(1.0, 4.0)
     walk = ContactWalkResult(
+        foothold_height_m=None,
         outcome=Outcome.WALKED,
         touch_time_s=times,
         touch_along_m=along,

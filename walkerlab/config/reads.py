@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from walkerlab.config.basin import Basin
     from walkerlab.config.contact import Contact
     from walkerlab.config.continuation import Continuation
+    from walkerlab.config.ground import Ground
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
 
@@ -79,6 +80,8 @@ class WalkConfig(StartConfig, Protocol):
 
     @property
     def strides(self) -> int: ...
+    @property
+    def ground(self) -> Ground: ...
     @property
     def outputs(self) -> tuple[schema.Output, ...]: ...
 

@@ -10,6 +10,7 @@ from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.ground import Ground
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, rigid_bodies, too_light_for_contact
@@ -209,6 +210,7 @@ class Config(Block):
         bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
     )
     strides: int = key(5, "1", "strides to walk, one stride is two steps", ge=1, le=10_000)
+    ground: Ground = Ground()
     contact: Contact | None = None
     solver: Solvers = Solvers()
     stability: Stability = Stability()

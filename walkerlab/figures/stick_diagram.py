@@ -32,6 +32,7 @@ from walkerlab.figures.walks import (
 )
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
+from walkerlab.store.footholds import FAR, ground_levels
 
 CYCLE = 2
 """Steps of a gait cycle."""
@@ -61,11 +62,12 @@ class Sticks:
     hip      (samples, 2)
     feet     (samples, leg, 2)
     strikes  (steps,) s
-    landings (1 + steps,) m along the slope: where the first stance foot stands and each step's foot comes down
+    landings (1 + steps, 2) where the first stance foot stands and each step's foot comes down
     slope    rad
     knees    (samples, leg, 2); None for straight legs
     radius   of the soles' arcs, m; the feet are their lowest points
     head     (samples, 2), the torso's centre of mass; None without a torso
+    ground   as `ground_levels` says
     """
 
     time: Array
@@ -77,6 +79,7 @@ class Sticks:
     knees: Array | None = None
     radius: float = 0.0
     head: Array | None = None
+    ground: tuple[Array, Array] | None = None
 
     @property
     def top(self) -> Array:
@@ -146,9 +149,11 @@ def sticks_of(result: Stored) -> Sticks:
     radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
     if result.identity.stage == RIGID_STAGE and walker["type"] == "compass":
         radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
+    ground = ground_levels(steps)
     landings = np.append(0.0, steps["touch_along_m"])
+    landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head
+        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head, ground
     )  # fmt: skip
 
 
@@ -206,8 +211,8 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
     """
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
-    for along, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
-        x, y = sticks.in_plane(np.array([along, -0.03 * length]))
+    for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
+        x, y = sticks.in_plane(landing - np.array([0.0, 0.03 * length]))
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
             f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
@@ -222,11 +227,15 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
 
 
 def draw_slope(axes: Axes, sticks: Sticks) -> None:
-    """The ground as a plane, hatched underneath."""
+    """The ground as a plane, or a level around each foothold, hatched underneath."""
     left, right = axes.get_xlim()
     depth = 0.02 * sticks.leg_length
     ends = np.array([left, right])
     top = -math.tan(sticks.slope) * ends
+    if sticks.ground is not None:
+        begins, heights = sticks.ground
+        edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
+        ends, top = sticks.in_plane(np.column_stack((edges, np.repeat(heights, 2)))).T
     axes.plot(ends, top, color=BLACK, linewidth=0.9, zorder=2.5)
     axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
 
@@ -279,7 +288,7 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     figure, axes = stick_diagram(sticks)
     add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
     strikes = sticks.strikes[:CYCLE]
-    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1]), strict=True)
+    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1, 0]), strict=True)
     told = list(steps), strikes.size == CYCLE, sticks.head is not None
     if stage == RIGID_STAGE:
         return figure, told

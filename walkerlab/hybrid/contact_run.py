@@ -424,6 +424,7 @@ def gather(
     strikes = walk_state.knee_strike[:done]
     known = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
+        foothold_height_m=None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],

@@ -105,6 +105,7 @@ def take_walk(
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
+    recorder.heights = heights
     rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
@@ -125,6 +126,7 @@ class Recorder:
         self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
+        self.heights: Array | None = None
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS)
@@ -217,6 +219,7 @@ class Recorder:
             knee_strike_time_s=np.concatenate(self.knees) if self.kneed else None,
             end_time_s=end_time,
             work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+            foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             start=self.start,
             before=before,
             after=after,

@@ -49,7 +49,7 @@ def fill_reactions(walker: Standing, states: Any, bent: Any, out: Any) -> None:
 class Places:
     """Points of the walker at samples, in m along the slope from the first foothold and over it."""
 
-    contact: Array  # (samples,) where the stance foot touches
+    contact: Array  # (samples, 2) where the stance foot touches
     hip: Array  # (samples, 2)
     swing_foot: Array  # (samples, 2) its lowest point
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
@@ -64,8 +64,9 @@ def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RigidWalk
     psi = samples.state[:, :n] + walker.slope
     touches = np.append(0.0, walk.touch_along_m)[samples.step]
     set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
-    contact = touches - walker.radius * (samples.state[:, STANCE] - set_down)
-    centre = np.column_stack((contact, np.full_like(contact, walker.radius)))
+    rolled = -walker.radius * (samples.state[:, STANCE] - set_down)
+    contact = np.column_stack((touches + rolled, walk.ground_m[samples.step]))
+    centre = contact + np.array([0.0, walker.radius])
     hip = centre + turned(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
     foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
     knees = None

@@ -30,6 +30,7 @@ class WalkRecord:
     knee_strike_time_s: Array | None  # (steps,) when the swing leg's knee locked, nan if it did not; None without knees
     end_time_s: float  # of the walk, which may end after the last touch
     work: WalkWork
+    foothold_height_m: Array | None  # (steps,) over the slope, where each touch is; None on even ground
 
     @property
     def advice(self) -> str:
@@ -50,6 +51,12 @@ class WalkRecord:
     def lengths_m(self) -> Array:
         """Distance along the slope of each step from touch to touch, (steps,); the first from the first foothold."""
         return np.diff(self.touch_along_m, prepend=0.0)
+
+    @property
+    def ground_m(self) -> Array:
+        """(steps + 1,) heights over the slope of the footholds, that of the start first."""
+        heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
+        return np.append(0.0, heights)
 
     @property
     def knee_strikes_s(self) -> Array:

@@ -174,6 +174,7 @@ class Player:
     ordinary_force: float
     closeup_m: float
     pads: tuple[Pad, ...]
+    ground: tuple[tuple[float, float], ...]  # m along the slope where each level of uneven ground begins, and over it
     view: tuple[int, int, int, int]
 
     @property
@@ -184,7 +185,7 @@ class Player:
     @property
     def scene(self) -> dict[str, object]:
         """What a script has to know of the scene."""
-        names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads")
+        names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
         return {name: getattr(self, name) for name in names}
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from walkerlab.config.ground import Ground
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
 from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
+from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
@@ -33,6 +35,7 @@ class RigidScene:
     names: tuple[str, ...]  # of the state's numbers
     knee_m: tuple[float, float] | None  # the knee in its thigh's frame
     outputs: tuple[Output, ...]  # what in time is wanted
+    ground: Ground
 
     def walk(
         self,
@@ -43,7 +46,8 @@ class RigidScene:
         advance: Callable[[int], None] | None = None,
     ) -> RigidWalkResult:
         """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
-        return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance)
+        heights = foothold_heights(self.ground, steps)
+        return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance, heights)
 
 
 def rigid_scene(config: SimulateConfig) -> RigidScene:
@@ -55,6 +59,7 @@ def rigid_scene(config: SimulateConfig) -> RigidScene:
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
         outputs=config.outputs,
+        ground=config.ground,
     )
 
 

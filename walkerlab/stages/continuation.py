@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from walkerlab.config.ground import Ground
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.config.schema import Output
 from walkerlab.config.walkers import without_contact
@@ -818,7 +819,7 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     knee = knee_of(assembly_of(changed.walker, rigid=True))
-    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS)
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS, Ground())
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)
     if walk.steps < steps or walk.samples is None:
         return

@@ -129,8 +129,7 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
 def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Where hip, knees and feet are, along the slope from the first foothold and over it."""
     at = places(scene.walker, scene.knee_m, walk, samples)
-    standing = np.column_stack((at.contact, np.zeros_like(at.contact)))
-    points = {"foot": np.stack((at.swing_foot, standing), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
+    points = {"foot": np.stack((at.swing_foot, at.contact), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
     found = over_time(hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1])
     for name, point in points.items():
         along, height = (of_legs(point[:, :, axis], stance) for axis in range(2))

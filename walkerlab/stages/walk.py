@@ -23,6 +23,7 @@ from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import labelled, numbered
 from walkerlab.store.content import Content, Group, Variable
+from walkerlab.store.footholds import UNEVEN
 
 FIRST_STEPS, LAST_STEPS = 200, 20
 """Steps of which every sample is stored."""
@@ -34,6 +35,7 @@ OF_STEPS: Final = {
     "period_s": Label("s", "time from touch to touch"),
     "length_m": Label("m", "distance along the slope from touch to touch"),
     "touch_along_m": Label("m", "where that touch is, along the slope from the first foothold"),
+    UNEVEN: Label("m", "height of the foothold of that touch over the slope"),
     "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
     "slip_m": Label("m", "net slip of the stance foot's material from its touch to its lift"),
     "rolling_m": Label("m", "how far the stance foot rolled from its touch to its lift"),
@@ -188,6 +190,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,
         "touch_along_m": walk.touch_along_m,
+        UNEVEN: walk.foothold_height_m,
         "knee_strike_time_s": walk.knee_strike_time_s,
     }
     return of_steps(walk.touch_time_s, **known, **values)

@@ -10,6 +10,7 @@ from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
 from walkerlab.report.results import Results
 from walkerlab.report.tracks import Array, Track, sampling_gap, track_in
 from walkerlab.report.words import words
+from walkerlab.store.footholds import ground_levels
 
 MAX_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
@@ -43,6 +44,7 @@ def section(results: Results) -> Section | None:
         ordinary_force=weight(tracks),
         closeup_m=closeup(tracks.get(CONTACT), length),
         pads=pads(results),
+        ground=ground(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
     )
     return Section("motion", "The walk", (player,))
@@ -98,6 +100,18 @@ def pads(results: Results) -> tuple[Pad, ...]:
         return ()
     left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
     return tuple((round(one[0], 4), round(one[1], 4), int(one[2]) - 1) for one in zip(left, right, leg, strict=True))
+
+
+def ground(results: Results) -> tuple[tuple[float, float], ...]:
+    """Where each level of uneven ground begins along the slope, and its height (m); none on even ground."""
+    for stage in reversed(MODELS):
+        steps = results.group(stage, "steps")
+        levels = None if steps is None else ground_levels(steps)
+        if levels is not None:
+            return tuple(
+                (round(float(begin), 4), round(float(height), 6)) for begin, height in zip(*levels, strict=True)
+            )
+    return ()
 
 
 def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:

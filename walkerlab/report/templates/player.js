@@ -102,7 +102,8 @@ function drawWalk(picture, scene, tracks, colours) {
   };
   c.clearRect(0, 0, width, height);
   const under = scene.pads.length ? -0.04 * scene.leg_m : 0;
-  slab(hip - across, hip + across, under, -scene.leg_m, colours.ground);
+  const levels = levelsOf(scene, hip - across, hip + across);
+  for (const [from, to, height] of levels) slab(from, to, height + under, -scene.leg_m, colours.ground);
   c.globalAlpha = 0.55;
   for (const [from, to, leg] of scene.pads) {
     if (to > hip - across && from < hip + across) slab(from, to, 0, under, colours[`leg-${leg + 1}`]);
@@ -111,8 +112,11 @@ function drawWalk(picture, scene, tracks, colours) {
   c.strokeStyle = colours.soft;
   c.lineWidth = 1;
   c.beginPath();
-  c.moveTo(...place(hip - across, 0));
-  c.lineTo(...place(hip + across, 0));
+  levels.forEach(([from, to, height], k) => {
+    if (k === 0) c.moveTo(...place(from, height));
+    c.lineTo(...place(from, height));
+    c.lineTo(...place(to, height));
+  });
   const tick = 0.5 * scene.leg_m;
   for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
     c.moveTo(...place(i * tick, under));
@@ -192,6 +196,20 @@ function dot(c, [x, y], radius, fill) {
   c.fill();
 }
 
+// The ground between two places: where each of its levels begins and ends, and its height over the slope.
+function levelsOf(scene, left, right) {
+  const levels = scene.ground.length ? scene.ground : [[-Infinity, 0]];
+  return levels
+    .map(([from, height], k) => [Math.max(left, from), Math.min(right, (levels[k + 1] ?? [Infinity])[0]), height])
+    .filter(([from, to]) => from < to);
+}
+
+// How high a foot is over the ground under it, m.
+function clearance(scene, track, leg) {
+  const x = track.at(`fx${leg}`);
+  return track.at(`fy${leg}`) - levelsOf(scene, x - 1e-9, x + 1e-9)[0][2];
+}
+
 // One foot, the slope drawn level: how deep it is in the ground, how far it slipped, and the forces.
 function drawFoot(picture, scene, track, leg, colours) {
   const { context: c, width, height } = picture;
@@ -200,7 +218,7 @@ function drawFoot(picture, scene, track, leg, colours) {
   const mark = 0.5 * width;
   const slip = track.at(`q${leg}`) ?? 0;
   const x = mark + clamp(scale * slip, -0.42 * width, 0.42 * width);
-  const sole = ground - scale * track.at(`fy${leg}`);
+  const sole = ground - scale * clearance(scene, track, leg);
   const radius = Math.max(scale * scene.foot_radius_m, 0.02 * height);
   c.clearRect(0, 0, width, height);
   c.fillStyle = colours.ground;
@@ -237,7 +255,7 @@ function drawFoot(picture, scene, track, leg, colours) {
   c.fillRect(8, height - 9, scale * bar, 2);
   if (!seen) {
     c.textAlign = "center";
-    c.fillText(`${metres(track.at(`fy${leg}`))} above the ground`, width / 2, 0.3 * height);
+    c.fillText(`${metres(clearance(scene, track, leg))} above the ground`, width / 2, 0.3 * height);
     arrow(c, width / 2, 0.25 * height, 0, -0.15 * height);
   }
   c.lineWidth = 2;

@@ -1,0 +1,35 @@
+"""The ground block: heights of footholds over the slope."""
+
+from pydantic import ValidationInfo, field_validator
+
+from walkerlab.config.fields import Block, key, wrong
+
+
+class Ground(Block):
+    """Uneven ground: each foothold of a walk at its own height; without these keys it is even."""
+
+    roughness_m: float = key(
+        0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3
+    )
+    seed: int = key(0, "1", "seed of the heights that are drawn", ge=0, le=2**32 - 1)
+    heights_m: tuple[float, ...] = key(
+        (),
+        "m",
+        "heights of footholds 1, 2, … over the slope, along its normal; those beyond lie at the last",
+        bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
+        sequence=True,
+    )
+
+    @field_validator("heights_m")
+    @classmethod
+    def _drawn_or_listed(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if value and info.data.get("roughness_m"):
+            raise wrong("the heights are either listed or drawn: leave out heights_m or roughness_m")
+        if any(abs(height) > 1e3 for height in value):
+            raise wrong("must be numbers from -1e3 to 1e3")
+        return value
+
+    @property
+    def even(self) -> bool:
+        """Whether all footholds lie on the slope."""
+        return self.roughness_m == 0.0 and not any(self.heights_m)
