@@ -92,7 +92,7 @@ def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
 
 def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
     """`compass`, or None for another walker."""
-    return compass(config, equations) if is_plain_compass(config.walker) else None
+    return compass(config, equations) if is_plain_compass(config) else None
 
 
 def coordinates(config: RigidConfig) -> tuple[str, ...]:
@@ -103,4 +103,4 @@ def coordinates(config: RigidConfig) -> tuple[str, ...]:
 
 def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
     """The sets of equations that a config's walker has: Appendix A is a compass's."""
-    return ("corrected", "as-printed") if is_plain_compass(config.walker) else ("corrected",)
+    return ("corrected", "as-printed") if is_plain_compass(config) else ("corrected",)

@@ -109,10 +109,10 @@ def limit_findings(
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
-        1 if is_plain_compass(config.walker) else OTHERS_EVERY,
+        1 if is_plain_compass(config) else OTHERS_EVERY,
     )
     walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
-    gaits = COMPASS_GAITS if is_plain_compass(config.walker) else GAITS
+    gaits = COMPASS_GAITS if is_plain_compass(config) else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
     def start(walker: ContactWalker) -> State:
