@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from walkerlab.config.drives import Hip
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
@@ -60,7 +61,14 @@ def rigid_scene(config: SimulateConfig) -> RigidScene:
 
 def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
-    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
+    hip = config.walker.hip
+    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad).changed(
+        driven_hip=hip != Hip(),
+        hip_stiffness=hip.spring_N_m_per_rad,
+        hip_damping=hip.damping_N_m_s_per_rad,
+        hip_torque=hip.torque_N_m,
+        push_off=config.push_off.impulse_N_s,
+    )
     return as_printed(model) if equations == "as-printed" else model
 
 
