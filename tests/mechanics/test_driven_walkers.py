@@ -1,4 +1,4 @@
-"""Torques at the hip and the push-off, by routes that do not use them: momentum and energy of random walkers' masses."""
+"""Torques at the hip and the push-off, by a route that does not use them: random walkers mass by mass."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def momentum(points):
 
 
 @driven
-def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(_assembly, model, free):
+def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(assembly, model, free):
     y, n = state_of(model, BENT, free), len(model.arm_x)
 
     def with_work(_, x):
@@ -135,13 +135,13 @@ def test_a_push_off_acts_from_the_trailing_foots_contact_through_the_hip(assembl
     assert impact.push_off_work(model, after) == pytest.approx(work, rel=1e-7, abs=1e-7)
     ground = momentum(new_points) - momentum(points) - push
     landing = rate(lambda state, centre: in_motion(assembly, model, state, centre)[2], y)
-    landing = landing + (model.radius * y[len(y) // 2 + SWING], 0.0)
+    landing += (model.radius * y[len(y) // 2 + SWING], 0.0)
     change = energy_of(new_points, new_spins) - energy_of(points, spins)
     assert change == pytest.approx(work + 0.5 * float(ground @ landing), abs=1e-7 * scale)
 
 
 @driven
-def test_the_driven_strikes_and_swings_derivatives_are_their_slopes(_assembly, model, free):
+def test_the_driven_strikes_and_swings_derivatives_are_their_slopes(assembly, model, free):
     y, h = both_feet_down(model, free), 1e-5
     n = len(model.arm_x)
     angles = state_linked(model, AT_STRIKE, (*np.linspace(0.3, -0.2, n), *np.linspace(-0.5, 0.7, n)))
@@ -155,7 +155,7 @@ def test_the_driven_strikes_and_swings_derivatives_are_their_slopes(_assembly, m
 
 
 @driven
-def test_the_unit_walker_is_driven_alike(_assembly, model, free):
+def test_the_unit_walker_is_driven_alike(assembly, model, free):
     unit, units = unit_walker(model)
     n = len(model.arm_x)
 

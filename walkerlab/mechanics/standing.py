@@ -94,6 +94,16 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         """Whether the swing leg has a knee."""
         return bool(self.shank != NO_SHANK)
 
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return bool(self.push_off != 0.0 or self.hip_torque != 0.0)
+
+    @property
+    def passive(self) -> bool:
+        """Whether nothing but gravity acts on it, not even a spring or a damper."""
+        return not self.driven_hip and not self.driven
+
     def __eq__(self, other: object) -> bool:
         """Whether all numbers are the same."""
         return isinstance(other, Standing) and self.dtype == other.dtype and self.tobytes() == other.tobytes()

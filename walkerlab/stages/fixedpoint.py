@@ -62,7 +62,8 @@ def advice(config: RigidConfig) -> str:
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
     )
     if config.slope_rad <= 0.0:
-        return f"Let the slope descend in walking direction (slope_deg above 0); {walk_anyway}."
+        driven = "drive the walker (push_off.impulse_N_s or walker.hip.torque_N_m)"
+        return f"Let the slope descend in walking direction (slope_deg above 0), or {driven}; {walk_anyway}."
     return f"Gaits on other slopes are followed by `walkerlab continuation`; {walk_anyway}."
 
 
