@@ -1,4 +1,4 @@
-"""Gaits of driven walkers: published ones, those of the level, and passive gaits that torques turn onto other slopes."""
+"""Gaits of driven walkers: published ones, those of the level, and passive gaits that torques turn."""
 
 import math
 from pathlib import Path
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from rigid_physics import heel_strike, potential_energy, rates
 from scipy.integrate import solve_ivp
-from test_step_derivatives import AGREEMENT, slope_of
+from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, slope_of, stepped
 
 from walkerlab.config import loader
 from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.shooting import EXACT, Shooting, StepEquations, coordinates_of, section_of
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
 
 
@@ -81,7 +82,7 @@ def test_a_driven_step_maps_derivative_is_its_slope(name):
     equations = StepEquations(Shooting(walker, EXACT), section_of(walker))
     z = coordinates_of(walker, gait.state)
     DP = equations(z).data.DP[0]
-    differences = slope_of(lambda z: equations(z).data.z[0], z, [1e-3] * z.size)
+    differences = slope_of(lambda z: equations(z).data.z[0], z, [5e-4] * z.size)
     np.testing.assert_allclose(DP, differences, rtol=0.0, atol=AGREEMENT)
 
 
@@ -119,3 +120,15 @@ def test_torques_that_turn_gravity_walk_a_passive_gait_on_any_slope(slope):
     swing = solve_ivp(rate, (0.0, gait.period), start, "DOP853", rtol=1e-11, atol=1e-12)
     assert heel_strike(turned, swing.y[:, -1]) == pytest.approx(start, abs=1e-6)
     assert math.fsum(swing.y[:2, -1]) == pytest.approx(-2.0 * slope, abs=1e-6)
+
+
+HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
+
+
+def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
+    """At a touch the torque leaps from one leg to the other: forgotten, that shows in the third digit."""
+    config = loader.load(Path("paper"), ["slope_deg=0.9", *HIP]).config
+    scene = contact_scene(config, RIGID_STEP, RIGID_STEP)
+    slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, NEAR_THE_GAIT, STEPS)
+    found = stepped(scene, NEAR_THE_GAIT, 1e-12).DP
+    np.testing.assert_allclose(found, slope, rtol=0.0, atol=AGREEMENT)

@@ -46,9 +46,11 @@ from walkerlab.hybrid.contact_events import (
 from walkerlab.hybrid.contact_knee import change_form
 from walkerlab.hybrid.contact_observer import (
     AT_HAND,
+    AT_TOUCH,
     CHANNEL_COUNT,
     MAX_PENETRATION,
     RESIDUAL,
+    SO_FAR,
     START_ENERGY,
     ContactObserver,
 )
@@ -136,6 +138,7 @@ class ContactWalkResult(WalkRecord):
     energy_balance_residual_J: float
     explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
+    driven_J: Floats  # (3,) given by push-off and hip in the steps taken, and what of the hip torque's is positive
     samples: ContactSamples | None
 
     @property
@@ -241,7 +244,7 @@ def new_observer(
     samples = times.size
     extremes = np.zeros(4)
     if track_energy:
-        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground), y)
+        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground, feet=walk_state.feet), y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
@@ -253,6 +256,7 @@ def new_observer(
         np.zeros((samples, CHANNEL_COUNT)),
         np.zeros(1, np.int64),
         np.zeros(CHANNEL_COUNT),
+        np.zeros((2, 3)),
         extremes,
         new_tangent(walker.size, directions),
     )
@@ -277,7 +281,8 @@ def walk_on(
     Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    system, tangent = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged), observer.tangent.Phi
+    system = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
+    tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
     y = folded(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
@@ -293,7 +298,7 @@ def walk_on(
         ended, event = walk(system, ground, method, finder, observer, walk_state, until)
         if ended != GOES_ON:
             break
-        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged)
+        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
         y = change_form(walker, before, system, event, observer, method.y)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
@@ -389,7 +394,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum() + np.abs(observer.work[SO_FAR]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
@@ -437,5 +442,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.dissipated.copy(),
+        driven_J=observer.work[AT_TOUCH].copy(),
         samples=samples,
     )
