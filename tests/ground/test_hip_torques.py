@@ -68,5 +68,5 @@ def test_the_energy_balance_of_a_driven_walk_closes():
     start = start_state(scene, (-0.2044455, 0.169539, -0.6057394, -0.861714))
     walk = scene.walk(start, 4, Tolerances("radau5", 1e-9, 1e-11, 10**6))
     assert walk.steps == 4
-    assert walk.driven_J[1] > 0.1
+    assert walk.driven.hip > 0.1
     assert walk.energy_balance_residual_J < 1e-6

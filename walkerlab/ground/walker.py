@@ -8,6 +8,7 @@ walks is an ordinary walker of fewer bodies. While the first stance foot is hing
 is that of the angles alone.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,6 +132,11 @@ class ContactWalker(NamedTuple):
     def gravity_down(self) -> float:
         """m/s^2, towards the slope."""
         return float(self.whole.gravity_down)
+
+    @property
+    def gravity(self) -> float:
+        """m/s^2."""
+        return math.hypot(self.gravity_along, self.gravity_down)
 
     @property
     def kneed(self) -> bool:

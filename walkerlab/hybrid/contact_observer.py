@@ -38,6 +38,7 @@ class ContactObserver(NamedTuple):
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
     sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
+    sampled_work: Any  # (samples, 2) J given so far by push-off and hip
     recorded: Any  # (1,)
     dissipated: Any  # (5,) J dissipated so far
     work: Any  # (2, 3) J that push-off and hip have given so far, and until the last step's touch
@@ -72,12 +73,14 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         fraction = (observer.times[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, observer.states[index])
-        damping, friction, stops, _, _ = work_until(method, system, fraction)
+        damping, friction, stops, hip, _ = work_until(method, system, fraction)
         for channel in range(CHANNEL_COUNT):
             observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
         observer.sampled_dissipation[index, DAMPING] += damping
         observer.sampled_dissipation[index, FRICTION] += friction
         observer.sampled_dissipation[index, KNEE_STOP] += stops
+        observer.sampled_work[index, PUSH_OFF] = observer.work[SO_FAR, PUSH_OFF]
+        observer.sampled_work[index, HIP] = observer.work[SO_FAR, HIP] + hip
         for k in range(2):
             observer.knees[index, k] = walk_state.knee[k]
             observer.has_ground[index, k] = walk_state.has_ground[k]

@@ -58,7 +58,7 @@ from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
 from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.walk_record import WalkRecord, WalkWork
+from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.solvers.registry import Tolerances, finder_for, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
@@ -125,6 +125,7 @@ class ContactSamples:
     stance: NDArray[np.int64]  # (samples,)
     knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
     dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
+    driven_J: Floats  # (samples, 2) given by push-off and hip
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +139,6 @@ class ContactWalkResult(WalkRecord):
     energy_balance_residual_J: float
     explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
-    driven_J: Floats  # (3,) given by push-off and hip in the steps taken, and what of the hip torque's is positive
     samples: ContactSamples | None
 
     @property
@@ -254,6 +254,7 @@ def new_observer(
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
         np.zeros((samples, CHANNEL_COUNT)),
+        np.zeros((samples, 2)),
         np.zeros(1, np.int64),
         np.zeros(CHANNEL_COUNT),
         np.zeros((2, 3)),
@@ -407,6 +408,12 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
+def driven_work(walker: ContactWalker, along: float, observer: ContactObserver) -> DrivenWork:
+    """What was given over the steps taken, which led so far along the slope (m)."""
+    gravity = walker.mass * walker.gravity_along * along
+    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.work[AT_TOUCH].tolist())
+
+
 def gather(
     stopped: Stopped,
     walk_state: WalkState,
@@ -425,6 +432,7 @@ def gather(
             observer.stance[:seen],
             observer.knees[:seen],
             observer.sampled_dissipation[:seen],
+            observer.sampled_work[:seen],
         )
     strikes = walk_state.knee_strike[:done]
     known = np.where(strikes < 0.0, np.nan, strikes)
@@ -442,6 +450,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.dissipated.copy(),
-        driven_J=observer.work[AT_TOUCH].copy(),
+        driven=driven_work(walker, float(walk_state.touch_along[done - 1]) if done else 0.0, observer),
         samples=samples,
     )

@@ -190,7 +190,7 @@ def take_step(
         if status != WALKED and status != KNEE_STRUCK:
             return status, method.clock[T]
         t = pass_event(method, Mode(model, phase), y)
-        observe_strike(observer, Mode(model, phase), method.y, y)
+        observe_strike(observer, Mode(model, phase), status == WALKED, method.y, y)
         if status == WALKED:
             return WALKED, t
         knee_time[step] = t

@@ -58,6 +58,8 @@ class Gait:
     max_impulse_ratio: float | None  # None if the ground pushes in neither
     trailing_foot_rises: bool  # after the heel strike
     knee_strike: float | None  # s; None for legs without knees
+    work: dict[str, float]  # J a step, by what gives it
+    cost_of_transport: float  # work given over weight and distance
     found_by: tuple[str, ...] = ()  # the searches that led here
 
     @property
@@ -108,6 +110,8 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
         min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
         max_impulse_ratio=step.max_impulse_ratio or None,
         trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
+        work={name: given * units.energy for name, given in step.driven.per_step(1).items()},
+        cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )
 

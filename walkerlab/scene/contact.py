@@ -209,8 +209,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 def resting(scene: ContactScene) -> RestingFoot:
     """How the walker stands on one foot."""
     walker, law = scene.walker, scene.walker.normal
-    weight = walker.mass * math.hypot(walker.gravity_along, walker.gravity_down)
-    return resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping)
+    return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:
