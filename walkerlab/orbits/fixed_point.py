@@ -14,7 +14,7 @@ import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
-from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
+from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
 from walkerlab.orbits.newton import Floats, NotConverged, newton
 from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, StepEquations, on_section, section_of
@@ -60,6 +60,7 @@ class Gait:
     knee_strike: float | None  # s; None for legs without knees
     work: dict[str, float]  # J a step, by what gives it
     cost_of_transport: float  # work given over weight and distance
+    swings: int = 1  # how often the swing leg passes the stance leg in a step
     found_by: tuple[str, ...] = ()  # the searches that led here
 
     @property
@@ -92,9 +93,11 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
     DP      (d, d) derivative of the step map there
     """
     start = on_section(walker, z)
-    step = take_walk(walker, tolerances, start, 1)
-    if step.steps == 0:
+    step = take_walk(walker, tolerances, start, 1, sampled=True)
+    if step.steps == 0 or step.samples is None:
         return None
+    swing = step.samples.state[step.samples.step == 0]
+    apart = swing[:, SWING] - swing[:, STANCE]
     rate, n = 1.0 / units.time, len(start) // 2
     return Gait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
@@ -112,6 +115,7 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
         trailing_foot_rises=bool(swing_foot_motion(walker, start)[2] >= 0.0),
         work={name: given * units.energy for name, given in step.driven.per_step(1).items()},
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
+        swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )
 
@@ -396,13 +400,21 @@ class Search:
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
 
 
+def preference(gait: Gait) -> tuple[bool, int, float]:
+    """Smallest of the gait to walk: a stable one, whose leg does not swing back and forth, soonest rid of disturbances.
+
+    A leg that swings back passes its foot through the ground, which the model does not see.
+    """
+    return not gait.stable, gait.swings, gait.spectral_radius
+
+
 def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
-    """Which gait to walk: of those that the ground can carry the one that forgets disturbances soonest; and why."""
+    """Which gait to walk of those that the ground can carry, by `preference`; and why."""
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
         return None, "the gaits there cannot be walked: " + "; ".join(objections)
-    best = min(walkable, key=lambda index: gaits[index].spectral_radius)
+    best = min(walkable, key=lambda index: preference(gaits[index]))
     if gaits[best].stable:
         return best, "it is stable"
     return best, "no gait is stable at this slope; of those that the ground can carry this one is the least unstable"
