@@ -6,7 +6,7 @@ from walkerlab.benchmarks.engines.experiments import Truth
 from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.walk_record import WalkWork
+from walkerlab.hybrid.walk_record import DrivenWork, WalkWork
 from walkerlab.stages import engines
 from walkerlab.stages.engines import EngineFindings
 
@@ -67,6 +67,7 @@ def truth():
         dissipated_J=np.zeros(5),
         knee_strike_time_s=None,
         work=WalkWork(0, 0, 0, 0),
+        driven=DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0),
         samples=None,
     )
     return Truth(2.0, np.zeros(8), times[:2], 2e-12, walk)

@@ -19,7 +19,8 @@ REPOSITORY = Path(__file__).parents[2] / "configs"
 def test_the_built_in_configs_are_these() -> None:
     others = ("kneed", "kneed-round-feet", "parts", "round-feet", "simplest", "torso")
     papers = ("contact-si", "paper", "paper-as-printed", "rigid-only", "sliding-feet", "slope-3deg")
-    assert builtin_names() == tuple(sorted((*others, *papers)))
+    driven = ("kneed-level", "kuo", "level")
+    assert builtin_names() == tuple(sorted((*others, *papers, *driven)))
 
 
 @pytest.mark.skipif(not REPOSITORY.is_dir(), reason="the repository's configs/ are not beside the tests")

@@ -46,7 +46,7 @@ class MisspeltConfig(Protocol):
 
 
 def test_a_type_has_the_keys_of_its_bases() -> None:
-    keys = ("walker", "gravity_m_s2", "slope_rad", "equations", "contact", "start")
+    keys = ("walker", "gravity_m_s2", "slope_rad", "push_off", "equations", "contact", "start")
     assert tuple(dotted_keys(SceneConfig)) == keys
     assert tuple(slice_of(CONFIG, SceneConfig)) == keys
 

@@ -290,6 +290,8 @@ def gait_with(radius, pull=0.0):
         0.2,
         True,
         None,
+        {},
+        0.0,
     )
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from walkerlab.config.basin import Basin
     from walkerlab.config.contact import Contact
     from walkerlab.config.continuation import Continuation
+    from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Ground
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
@@ -48,6 +49,13 @@ def only(config: Any, takes: type | None) -> Any:
     return SimpleNamespace(**{name: only(getattr(config, name), part) for name, part in keys_of(takes).items()})
 
 
+class PushOffAtOnce(Protocol):
+    """A push-off that takes no time."""
+
+    @property
+    def impulse_N_s(self) -> float: ...
+
+
 class RigidConfig(Protocol):
     """What the rigid model is made of."""
 
@@ -58,12 +66,16 @@ class RigidConfig(Protocol):
     @property
     def slope_rad(self) -> float: ...
     @property
+    def push_off(self) -> PushOffAtOnce: ...
+    @property
     def equations(self) -> schema.Equations: ...
 
 
 class ContactConfig(RigidConfig, Protocol):
     """What both models are made of."""
 
+    @property
+    def push_off(self) -> PushOff: ...
     @property
     def contact(self) -> Contact | None: ...
 
@@ -159,6 +171,8 @@ class CompassCasesConfig(Protocol):
 
     @property
     def walker(self) -> Walker: ...
+    @property
+    def push_off(self) -> PushOffAtOnce: ...
     @property
     def stability(self) -> OwnCases: ...
 

@@ -2,6 +2,7 @@
 
 import math
 from importlib.util import find_spec
+from types import SimpleNamespace
 from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
@@ -9,11 +10,19 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
+from walkerlab.config.drives import PushOff, drives_of
 from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.ground import Ground
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
-from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, rigid_bodies, too_light_for_contact
+from walkerlab.config.walkers import (
+    CompassWalker,
+    Walker,
+    is_plain_compass,
+    rigid_bodies,
+    too_light_for_contact,
+    why_no_push_off,
+)
 
 Equations = Literal["corrected", "as-printed"]
 Output = Literal["states", "energies", "forces"]
@@ -195,6 +204,7 @@ class Config(Block):
         gt=-RIGHT_ANGLE,
         lt=RIGHT_ANGLE,
     )
+    push_off: PushOff = PushOff()
     equations: Equations = key(
         "corrected",
         "",
@@ -237,9 +247,21 @@ class Config(Block):
     @field_validator("equations")
     @classmethod
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
+        if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
+            given = SimpleNamespace(**info.data)
+            if drives := drives_of(given):
+                raise wrong(f"is for a passive compass, and this walker has {', '.join(drives)}")
+            if not is_plain_compass(given):
+                raise wrong("is for a compass; this walker is another")
+        return value
+
+    @field_validator("push_off")
+    @classmethod
+    def _something_takes_it(cls, value: PushOff, info: ValidationInfo) -> PushOff:
         walker = info.data.get("walker")
-        if value == "as-printed" and walker is not None and not is_plain_compass(walker):
-            raise wrong("as-printed are a compass's equations; this walker is another")
+        why = "" if value.impulse_N_s == 0.0 or walker is None else why_no_push_off(walker)
+        if why:
+            raise wrong(why)
         return value
 
     @field_validator("contact")

@@ -4,10 +4,12 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
+from walkerlab.config.drives import QUICKEST, Hip, drives_of
 from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.numbers import same
 from walkerlab.errors import ConfigError
@@ -102,6 +104,18 @@ class _Legged(Block):
         """Angle of the line from hip to foot centre in an upright leg; of parts a start is taken as given."""
         return 0.0
 
+    @field_validator("hip", check_fields=False)
+    @classmethod
+    def _legs_can_follow(cls, value: Hip, info: ValidationInfo) -> Hip:
+        with suppress(AttributeError):  # what is wrong with the keys above is told
+            inertia = leg_inertia(SimpleNamespace(**info.data))
+            if value.too_quick_for(inertia):
+                reason = (
+                    f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: their inertia about the hip is"
+                )
+                raise wrong(f"{reason} {inertia:.3g} kg m^2, so a torque, spring or damper must be as small")
+        return value
+
 
 class CompassWalker(_Legged):
     """Two straight legs, each with a mass on it, and a mass at the hip."""
@@ -129,6 +143,7 @@ class CompassWalker(_Legged):
         ge=0.0,
     )
     torso: Torso | None = None
+    hip: Hip = Hip()
 
     _arc = below("half of leg_length_m", lambda data: data["leg_length_m"] / 2)
 
@@ -167,6 +182,7 @@ class StraightLegs(_Legged):
     )
     foot_centre_ahead_m: float = offset(0.0, "the arc's centre ahead of the leg's line", WISSE)
     torso: Torso | None = None
+    hip: Hip = Hip()
 
     _arc = below("leg_length_m", lambda data: data["leg_length_m"])
     _inertia = turns(
@@ -237,6 +253,7 @@ class Kneed(_Legged):
     )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
+    hip: Hip = Hip()
 
     _arc = below("shank.length_m", lambda data: data["shank"].length_m)
 
@@ -311,6 +328,7 @@ class PartsWalker(_Legged):
     leg_length_m: float = length(..., "hip to sole as the parts have it: what lengths and falls are measured by")
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
+    hip: Hip = Hip()
 
     @field_validator("leg_length_m")
     @classmethod
@@ -383,17 +401,53 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
     return found
 
 
-def is_plain_compass(walker: Any) -> bool:
+def is_plain_compass(config: Any) -> bool:
     """Whether this is the walker of Appendix A."""
-    return bool(walker.type == "compass" and walker.torso is None)
+    return bool(config.walker.type == "compass" and config.walker.torso is None and not drives_of(config))
 
 
-def is_the_papers(walker: Any) -> bool:
+def is_the_papers(config: Any) -> bool:
     """Whether this is the paper's own walker, up to rounding of its numbers."""
-    paper = CompassWalker()
-    return isinstance(walker, CompassWalker) and all(
+    walker, paper = config.walker, CompassWalker()
+    return is_plain_compass(config) and all(
         same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
     )
+
+
+def leg_inertia(walker: Any) -> float:
+    """Inertia (kg m^2) of one leg about the hip; of parts no less than that."""
+    if walker.type == "compass":
+        below = walker.leg_length_m - walker.foot_to_mass_m
+        return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
+    if walker.type == "straight-legs":
+        squared = walker.leg_mass_below_hip_m**2 + walker.leg_mass_ahead_m**2
+        return float(walker.leg_mass_kg * squared + walker.leg_inertia_kg_m2)
+    if walker.type == "kneed":
+        upper, lower = walker.thigh, walker.shank
+        squared = (upper.length_m + lower.mass_below_knee_m) ** 2 + lower.mass_ahead_m**2
+        thigh = upper.mass_kg * (upper.mass_below_hip_m**2 + upper.mass_ahead_m**2) + upper.inertia_kg_m2
+        return float(thigh + lower.mass_kg * squared + lower.inertia_kg_m2)
+    own = [body for body in walker.bodies if body.name in walker.legs[0]]
+    on_them = [one.mass_kg for one in walker.particles if one.body in walker.legs[0]]
+    mass = sum(on_them) + sum(body.mass_kg for body in own)
+    return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in own))
+
+
+def why_no_push_off(walker: Any) -> str:
+    """Why nothing can push a walker off along its trailing leg; empty if something can."""
+    if not isinstance(walker, CompassWalker | StraightLegs):
+        free = walker.knee.at_heel_strike == "free"
+        return (
+            "whose impulse needs a trailing knee that is locked, and walker.knee.at_heel_strike is free" if free else ""
+        )
+    if isinstance(walker, CompassWalker):
+        above, ahead = walker.foot_to_mass_m, 0.0
+    else:
+        above, ahead = walker.leg_length_m - walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
+    leading = walker.leg_mass_kg * (above**2 + ahead**2) + walker.leg_inertia_kg_m2
+    if walker.hip_mass_kg + torso_mass(walker.torso) + leading > 0.0:
+        return ""
+    return "whose impulse has nothing to push: the hip has no mass, and the leading leg's rests on its foot"
 
 
 def too_light_for_contact(walker: Any) -> str:

@@ -63,7 +63,9 @@ def contact_walker(
         for locked in range(4):
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
-    return ContactWalker(forms, normal, friction, rules.stop, legs_of(assembly))
+    legs = legs_of(assembly)
+    forms["uppers"] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
+    return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
 def refuse_what_cannot_walk(assembly: Assembly) -> None:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from walkerlab.ground.hip import hip_energy
 from walkerlab.ground.knees import knee_energy
 from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.walker import OF_BODIES, Form, OnGround, foot_force, half_size, one_foot_motion, sines_cosines
@@ -48,7 +49,7 @@ def total_energy(system: OnGround, y: Any) -> float:
     for foot in range(2):
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
-    return total + knee_energy(system, y)
+    return total + knee_energy(system, y) + hip_energy(system, y)
 
 
 @inlined

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from walkerlab.ground.hip import add_hip_gradients, add_hip_torque
 from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -48,7 +49,8 @@ def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -
 def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
     """Force of the ground along and normal to the slope (N); M (n, n) and all torques on the bodies (N m) into r (n,).
 
-    They are those of the ground, of the centrifugal terms, of the knees' stops and, about a hinge, of gravity.
+    They are those of the ground, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
+    gravity.
     """
     form = system.form
     n, half = form.bodies, half_size(form)
@@ -65,6 +67,7 @@ def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tupl
             along += push[0]
             normal += push[1]
     add_stop_torques(system, y, r)
+    add_hip_torque(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
     return along, normal
 
@@ -142,6 +145,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity_gradient(form, n, F, U, by_angle)
     add_stop_gradients(system, y, by_angle, by_rate)
+    add_hip_gradients(system, y, by_angle, by_rate)
     add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 

@@ -8,6 +8,7 @@ walks is an ordinary walker of fewer bodies. While the first stance foot is hing
 is that of the angles alone.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +55,11 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     hip_y: Floats
     thighs: Integers  # (2,) bodies of either leg; thigh and shank are the same one while they move as one
     shanks: Integers
+    uppers: Integers  # (2,) bodies of either leg at the hip
+    driven_hip: bool  # whether anything acts between the legs: see ground/hip.py
+    hip_stiffness: float  # N m/rad
+    hip_damping: float  # N m s/rad
+    hip_torque: float  # N m, on the swing leg
     onto: Integers  # (all bodies,) which of these bodies each is
     first: Integers  # (n,) the first of the bodies that each of these is
     mass: float  # kg
@@ -79,7 +85,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "E": (1, MAX_BODIES, MAX_BODIES),
     **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
-    **dict.fromkeys(("radius", "thighs", "shanks"), (2,)),
+    **dict.fromkeys(("radius", "thighs", "shanks", "uppers"), (2,)),
 }
 KINDS = {Integers: np.int64, int: np.int64, bool: np.bool_}
 FORM = np.dtype(
@@ -128,6 +134,11 @@ class ContactWalker(NamedTuple):
         return float(self.whole.gravity_down)
 
     @property
+    def gravity(self) -> float:
+        """m/s^2."""
+        return math.hypot(self.gravity_along, self.gravity_down)
+
+    @property
     def kneed(self) -> bool:
         """Whether it has knees."""
         return bool(self.whole.kneed)
@@ -151,17 +162,23 @@ class OnGround(NamedTuple):
     stop: Any
     has_ground: Any  # (2,) whether there is ground under a foot
     knee: Any  # (2,) what each knee is doing
+    feet: Any  # that of a walk state: the stance foot first
 
 
 def on_ground(
-    walker: ContactWalker, has_ground: Any, knee: Any = (RELEASED, RELEASED), hinged: bool = False
+    walker: ContactWalker,
+    has_ground: Any,
+    knee: Any = (RELEASED, RELEASED),
+    hinged: bool = False,
+    feet: Any = (1,),
 ) -> OnGround:
     """The walker in the form that its knees give it.
 
     has_ground  (2,) whether there is ground under a foot
     knee        (2,) what each knee is doing
+    feet        the stance foot, and what a walk state has behind it
     """
-    memory = (np.asarray(each, np.int8) for each in (has_ground, knee))
+    memory = (np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64))
     form = walker.forms[int(hinged), locked_knees(knee)]
     return OnGround(form, walker.normal, walker.friction, walker.stop, *memory)
 

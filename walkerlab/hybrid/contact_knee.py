@@ -31,6 +31,8 @@ def change_form(
 ) -> Floats:
     """The state in the form after an event that locked or released a knee; what it cost is noted, the tangent jumps.
 
+    So it does where a step's touch has the torque between the legs change them.
+
     A lock is a plastic impact; what a latch holds in its spring is lost; a release changes no velocity.
 
     y  the state in the form before
@@ -39,6 +41,8 @@ def change_form(
     size = int(2 * (whole.places + whole.bodies))
     x = unfolded(before.form, y, size)
     new, reset = x, np.eye(size)
+    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
+        before = before._replace(feet=1 - after.feet)
     if event >= EXTENSION:
         new, lost, reset = lock(whole, after.form, x)
         observer.dissipated[KNEE_STRIKES] += lost

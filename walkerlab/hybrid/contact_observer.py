@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
+from walkerlab.ground.hip import hip_power
 from walkerlab.ground.knees import knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
@@ -16,6 +17,9 @@ from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
 # indices into `dissipated`
 DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, CHANNEL_COUNT = 0, 1, 2, 3, 4, 5
+# indices into `work`: rows, and what drives the walker; the last is what of the torque's work is positive
+SO_FAR, AT_TOUCH = 0, 1
+PUSH_OFF, HIP, FORWARD = 0, 1, 2
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
 # the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
@@ -34,8 +38,10 @@ class ContactObserver(NamedTuple):
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
     sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
+    sampled_work: Any  # (samples, 2) J given so far by push-off and hip
     recorded: Any  # (1,)
     dissipated: Any  # (5,) J dissipated so far
+    work: Any  # (2, 3) J that push-off and hip have given so far, and until the last step's touch
     # (4,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
     # fixed origin, and from the slope below
     extremes: Any
@@ -67,12 +73,14 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         fraction = (observer.times[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, observer.states[index])
-        damping, friction, stops = work_until(method, system, fraction)
+        damping, friction, stops, hip, _ = work_until(method, system, fraction)
         for channel in range(CHANNEL_COUNT):
             observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
         observer.sampled_dissipation[index, DAMPING] += damping
         observer.sampled_dissipation[index, FRICTION] += friction
         observer.sampled_dissipation[index, KNEE_STOP] += stops
+        observer.sampled_work[index, PUSH_OFF] = observer.work[SO_FAR, PUSH_OFF]
+        observer.sampled_work[index, HIP] = observer.work[SO_FAR, HIP] + hip
         for k in range(2):
             observer.knees[index, k] = walk_state.knee[k]
             observer.has_ground[index, k] = walk_state.has_ground[k]
@@ -84,15 +92,25 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 @inlined
 def add_dissipation(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """What the last step dissipated, and how well the energy balances at its end."""
-    damping, friction, stops = work_until(method, system, 1.0)
+    damping, friction, stops, hip, forward = work_until(method, system, 1.0)
+    work = observer.work[SO_FAR]
+    work[HIP] += hip
+    work[FORWARD] += forward
     observer.dissipated[DAMPING] += damping
     observer.dissipated[FRICTION] += friction
     observer.dissipated[KNEE_STOP] += stops
-    lost = 0.0
+    lost = -work[PUSH_OFF] - work[HIP]
     for channel in range(CHANNEL_COUNT):
         lost += observer.dissipated[channel]
     residual = end_energy(method, system) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
+
+
+@inlined
+def note_work(observer: ContactObserver) -> None:
+    """A step has ended: what was given until now belongs to steps that were taken."""
+    for i in range(observer.work.shape[1]):
+        observer.work[AT_TOUCH, i] = observer.work[SO_FAR, i]
 
 
 @inlined
@@ -122,8 +140,11 @@ def end_energy(method: Any, system: OnGround) -> float:
 
 
 @by_type_or_default
-def work_until(method: Any, system: OnGround, fraction: float) -> tuple[float, float, float]:
-    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step."""
+def work_until(method: Any, system: OnGround, fraction: float) -> tuple[float, float, float, float, float]:
+    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step.
+
+    Then what the hip gave, and what of its torque's was positive.
+    """
     states = matrix(OF_STATES)
     for i in range(len(NODES)):
         interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
@@ -131,7 +152,7 @@ def work_until(method: Any, system: OnGround, fraction: float) -> tuple[float, f
 
 
 @inlined
-def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float, float]:
+def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float, float, float, float]:
     """`work_until` of a time `span` (s), with the states at its NODES."""
     damping, friction, stops = 0.0, 0.0, 0.0
     for foot in range(2):
@@ -142,7 +163,12 @@ def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float,
     if system.knee[0] == STOPPING or system.knee[1] == STOPPING:
         for i in range(1, len(NODES)):
             stops += span * WEIGHTS[i] * knee_power(system, states[i])
-    return damping, friction, stops
+    hip, forward = 0.0, 0.0
+    for i in range(1, len(NODES)):
+        power = hip_power(system, states[i])
+        hip += span * WEIGHTS[i] * power[0]
+        forward += span * WEIGHTS[i] * power[1]
+    return damping, friction, stops, hip, forward
 
 
 @inlined
@@ -170,7 +196,7 @@ def energy_of(system: OnGround, y: Any) -> float:
 
 
 @kernel
-def lost_work_of(system: OnGround, states: Any, span: float) -> tuple[float, float, float]:
+def lost_work_of(system: OnGround, states: Any, span: float) -> tuple[float, float, float, float, float]:
     """As `lost_work`."""
     return lost_work(system, states, span)
 
@@ -182,9 +208,9 @@ def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
 
 
 @work_until.case(ScipyMethod)
-def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> tuple[float, float, float]:
+def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> tuple[float, float, float, float, float]:
     """Likewise."""
-    damping, friction, stops = lost_work_of(
+    damping, friction, stops, hip, forward = lost_work_of(
         system, method.states_at(fraction * np.array(NODES)), fraction * (method.clock[T] - method.clock[T_OLD])
     )
-    return damping, friction, stops
+    return damping, friction, stops, hip, forward

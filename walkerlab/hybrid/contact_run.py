@@ -46,9 +46,11 @@ from walkerlab.hybrid.contact_events import (
 from walkerlab.hybrid.contact_knee import change_form
 from walkerlab.hybrid.contact_observer import (
     AT_HAND,
+    AT_TOUCH,
     CHANNEL_COUNT,
     MAX_PENETRATION,
     RESIDUAL,
+    SO_FAR,
     START_ENERGY,
     ContactObserver,
 )
@@ -56,7 +58,7 @@ from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
 from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.outcome import Outcome
-from walkerlab.hybrid.walk_record import WalkRecord, WalkWork
+from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.solvers.registry import Tolerances, finder_for, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
@@ -123,6 +125,7 @@ class ContactSamples:
     stance: NDArray[np.int64]  # (samples,)
     knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
     dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
+    driven_J: Floats  # (samples, 2) given by push-off and hip
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +244,7 @@ def new_observer(
     samples = times.size
     extremes = np.zeros(4)
     if track_energy:
-        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground), y)
+        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground, feet=walk_state.feet), y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
@@ -251,8 +254,10 @@ def new_observer(
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
         np.zeros((samples, CHANNEL_COUNT)),
+        np.zeros((samples, 2)),
         np.zeros(1, np.int64),
         np.zeros(CHANNEL_COUNT),
+        np.zeros((2, 3)),
         extremes,
         new_tangent(walker.size, directions),
     )
@@ -277,7 +282,8 @@ def walk_on(
     Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    system, tangent = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged), observer.tangent.Phi
+    system = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
+    tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
     y = folded(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
@@ -293,7 +299,7 @@ def walk_on(
         ended, event = walk(system, ground, method, finder, observer, walk_state, until)
         if ended != GOES_ON:
             break
-        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged)
+        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
         y = change_form(walker, before, system, event, observer, method.y)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
@@ -389,7 +395,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum() + np.abs(observer.work[SO_FAR]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
@@ -400,6 +406,12 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
     """
     closes = observer.extremes[RESIDUAL] <= explained_residual(observer, tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
+
+
+def driven_work(walker: ContactWalker, along: float, observer: ContactObserver) -> DrivenWork:
+    """What was given over the steps taken, which led so far along the slope (m)."""
+    gravity = walker.mass * walker.gravity_along * along
+    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.work[AT_TOUCH].tolist())
 
 
 def gather(
@@ -420,6 +432,7 @@ def gather(
             observer.stance[:seen],
             observer.knees[:seen],
             observer.sampled_dissipation[:seen],
+            observer.sampled_work[:seen],
         )
     strikes = walk_state.knee_strike[:done]
     known = np.where(strikes < 0.0, np.nan, strikes)
@@ -438,5 +451,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.dissipated.copy(),
+        driven=driven_work(walker, float(walk_state.touch_along[done - 1]) if done else 0.0, observer),
         samples=samples,
     )

@@ -19,7 +19,7 @@ from walkerlab.hybrid.contact_events import (
     is_switching,
     sample_event_functions,
 )
-from walkerlab.hybrid.contact_observer import ContactObserver, observe
+from walkerlab.hybrid.contact_observer import ContactObserver, note_work, observe
 from walkerlab.hybrid.contact_rules import GOES_ON, apply_event, is_above, is_to_lift, note_flexion
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
@@ -178,10 +178,13 @@ def walk_in_form(
             outcome = apply_event(system, ground.terrain, observer, walk_state, event, method.clock[T], method.y)
             if outcome != GOES_ON:
                 return outcome, event
-            released = is_hinged(system) and walk_state.feet[STEPS] > steps
-            if released or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
+            stepped = walk_state.feet[STEPS] > steps
+            if stepped:
+                note_work(observer)
+            if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
                 return WALKED, event
-            if locked_knees(walk_state.knee) != locked:
+            # where the motion jumps the tangent does, too: in another form, and where a hip's torque changes legs
+            if locked_knees(walk_state.knee) != locked or (stepped and system.form.hip_torque != 0.0):
                 return GOES_ON, event
             if not is_switching(event):
                 begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])

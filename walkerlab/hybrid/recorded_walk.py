@@ -15,6 +15,7 @@ from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
+    HIP,
     INTEGRAL,
     LATEST,
     MAX_FRICTION_RATIO,
@@ -22,12 +23,15 @@ from walkerlab.hybrid.rigid_observer import (
     MAX_SCUFF_DEPTH,
     MIN_IMPULSE,
     MIN_NORMAL_FORCE,
+    PUSH_OFF,
+    STRIKES,
+    TAKEN,
     Observer,
     new_observer,
     observe_start,
 )
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
-from walkerlab.hybrid.walk_record import Array, WalkRecord, WalkWork
+from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
@@ -35,6 +39,7 @@ from walkerlab.mechanics.standing import (
     STANCE,
     Mode,
     Standing,
+    energies,
     energy_at_touch,
     linked,
     step_length,
@@ -71,6 +76,8 @@ class RigidWalkResult(WalkRecord):
     max_scuff_depth: float  # m, of the swing foot below the slope
     min_normal_impulse: float | None  # N s, of the ground in a strike of knee or heel; None without a step
     max_impulse_ratio: float  # tangential over normal impulse, where the ground pushes; 0 if nowhere
+    energy_balance_residual: float  # J, of all energies, works and losses of the steps taken
+    lost_in_strikes: float  # J
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean; potential from the contact point at each step's touch
     samples: Samples | None
@@ -136,7 +143,7 @@ class Recorder:
         first = new_observer(np.zeros(0), self.numbers)
         observe_start(first, Mode(walker, BENT), start)
         self.energy_at_start = float(first.energy[LATEST])
-        self.extremes = first.extremes
+        self.extremes, self.driven = first.extremes, np.zeros_like(first.work[TAKEN])
         self.energy_integral, self.duration = 0.0, 0.0
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
@@ -162,6 +169,7 @@ class Recorder:
             worst[index] = min(worst[index], observer.extremes[index])
         for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MAX_IMPULSE_RATIO):
             worst[index] = max(worst[index], observer.extremes[index])
+        self.driven += observer.work[TAKEN]
         self.energy_integral += float(observer.energy[INTEGRAL])
         self.duration += float(observer.energy[DURATION])
         strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
@@ -184,6 +192,18 @@ class Recorder:
             return float(self.energy_at_start - zeros[0])
         durations = np.diff(strikes, prepend=0.0, append=max(self.duration, self.time))
         return float((self.energy_integral - zeros @ durations) / self.duration)
+
+    def _driven_work(self, gravity: float) -> DrivenWork:
+        """What was given over the steps taken, by gravity that much (J)."""
+        weight = float(self.walker.mass * self.walker.gravity)
+        return DrivenWork(weight, gravity, *self.driven[:STRIKES].tolist())
+
+    def _residual(self, gravity: float) -> float:
+        """How far the energy of the last state is off the start's (J), with all that was given and taken between."""
+        unsprung = self.walker.changed(hip_stiffness=0.0)  # what the spring gives is among the works
+        ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
+        given = gravity + self.driven[PUSH_OFF] + self.driven[HIP] - self.driven[STRIKES]
+        return float(abs(ends[1] - ends[0] - given))
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
@@ -212,6 +232,10 @@ class Recorder:
         for k, row in enumerate(map(np.ndarray.tolist, before)):  # between touches, and what the stance foot rolled
             lengths[k] = step_length(self.walker, begun, row)
             begun = after[k]
+        climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
+        gravity = float(self.walker.mass) * float(
+            self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
+        )
         return RigidWalkResult(
             outcome=outcome,
             touch_time_s=strikes,
@@ -220,6 +244,9 @@ class Recorder:
             end_time_s=end_time,
             work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
+            driven=self._driven_work(gravity),
+            energy_balance_residual=self._residual(gravity),
+            lost_in_strikes=float(self.driven[STRIKES]),
             start=self.start,
             before=before,
             after=after,

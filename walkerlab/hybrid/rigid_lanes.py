@@ -13,6 +13,7 @@ import numpy as np
 from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel, vector
+from walkerlab.mechanics.hinges import SpringDamper, hinge_torque
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import Standing
 from walkerlab.mechanics.trigonometry import sine_cosine
@@ -51,6 +52,7 @@ class TwoLegs(NamedTuple):
     B: tuple[float, ...]
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
+    hip: SpringDamper
     misprint: float  # kg m^2; numbers of the model by value, which loops need not load again
     mass: float  # kg
     radius: float  # m
@@ -79,6 +81,7 @@ def two_legs(model: Standing) -> TwoLegs | None:
         numbers(model.B),
         numbers(model.arm_x),
         numbers(model.arm_y),
+        SpringDamper(float(model.hip_stiffness), float(model.hip_damping), float(model.hip_torque)),
         float(model.misprint),
         float(model.mass),
         float(model.radius),
@@ -111,6 +114,8 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     turning = system.A[2] * sin_d - system.B[2] * cos_d
     r_2 = r_2 + squared_1 * (turning + system.misprint * sin_d)
     r_1 = r_1 - squared_2 * turning
+    hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).torque
+    r_1, r_2 = r_1 - hip, r_2 + hip
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
     alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)

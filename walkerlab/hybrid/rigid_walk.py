@@ -194,7 +194,7 @@ def take_step(
         if status != WALKED and status != KNEE_STRUCK:
             return status, method.clock[T]
         t = pass_event(method, system, y)
-        observe_strike(observer, system, method.y, y)
+        observe_strike(observer, system, status == WALKED, method.y, y)
         if status == WALKED:
             return WALKED, t
         strikes.knee_time[step] = t

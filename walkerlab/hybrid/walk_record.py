@@ -20,6 +20,24 @@ class WalkWork(NamedTuple):
     jacobians: int
 
 
+class DrivenWork(NamedTuple):
+    """Work of the steps taken, and the weight that it carries along."""
+
+    weight: float  # N
+    gravity: float  # J, of the weight along the slope from the first touch to the last
+    push_off: float  # J
+    hip: float  # J, of spring, damper and torque
+    forward: float  # J, what of the torque's is positive
+
+    def per_step(self, steps: int) -> dict[str, float]:
+        """Mean over the steps (J), by what gives it."""
+        return {name: getattr(self, name) / steps for name in ("gravity", "push_off", "hip")}
+
+    def cost_of_transport(self, distance: float) -> float:
+        """What was spent over weight times distance (m) along the slope; a spring gives back what it takes."""
+        return (self.gravity + self.push_off + self.forward) / (self.weight * distance)
+
+
 @dataclass(frozen=True, eq=False)
 class WalkRecord:
     """How a walk went: its steps, its fate and its cost, SI units. A step ends as the swing foot touches the ground."""
@@ -31,6 +49,7 @@ class WalkRecord:
     end_time_s: float  # of the walk, which may end after the last touch
     work: WalkWork
     foothold_height_m: Array | None  # (steps,) over the slope, where each touch is; None on even ground
+    driven: DrivenWork
 
     @property
     def advice(self) -> str:

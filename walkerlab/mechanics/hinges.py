@@ -6,7 +6,7 @@ one forward; what it loses is (torque - elastic part) times the rate.
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import by_type_or_default, inlined
+from walkerlab.kernels import always_inline, by_type_or_default, inlined
 
 
 class HingeTorque(NamedTuple):
@@ -30,7 +30,28 @@ def hinge_energy(law: Any, angle: float) -> float:
     return 0.0
 
 
-@inlined
+class SpringDamper(NamedTuple):
+    """A spring that is relaxed at an angle of zero, a damper, and a constant torque that turns the first body on."""
+
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
+    torque: float  # N m
+
+
+@hinge_torque.case(SpringDamper, always_inline=True)
+def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeTorque:
+    """Linear in both."""
+    elastic = law.stiffness * angle
+    return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
+
+
+@hinge_energy.case(SpringDamper, always_inline=True)
+def spring_energy(law: SpringDamper, angle: float) -> float:
+    """That of the spring."""
+    return 0.5 * law.stiffness * angle * angle
+
+
+@always_inline
 def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
     """Add a hinge's torques (N m) on both bodies to r (n,)."""
     r[body] -= now.torque

@@ -7,15 +7,17 @@ normal to it, and the bodies' angular velocities.
 Source: (A.57) of the paper with the impulse projected away.
 """
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, Standing, equations, hip_height
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, equations, hip_height
 from walkerlab.mechanics.tree import projections, sines_cosines
+from walkerlab.mechanics.trigonometry import sine_cosine
 
 
 @inlined
@@ -62,6 +64,9 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
             factors[k, l] = M[k, l]
     factor_linked(model, phase, factors, p)
     momenta(model, M, F, U, new[n : 2 * n], along, upward, p)
+    pushed = other_foot and model.push_off != 0.0
+    if pushed:
+        p[STANCE] += push_off(model, s[SWING], c[SWING], s[STANCE], c[STANCE]).angular
     gathered(model, phase, p)
     solve_linked(model, phase, factors, p)
     jump, turned = vector(like), vector(like)
@@ -82,10 +87,55 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         mass_change(model, s, c, new[at : at + n], jump, jump_along, jump_upward, turned)
         for k in range(n):
             p[k] -= turned[k]
+        if pushed:
+            push = push_off(model, s[SWING], c[SWING], s[STANCE], c[STANCE])
+            p[STANCE] += push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         gathered(model, phase, p)
         solve_linked(model, phase, factors, p)
         for k in range(n):
             new[at + n + k] = p[k]
+
+
+class PushOff(NamedTuple):
+    """An impulse at the trailing foot, along the line from there to the hip."""
+
+    along: float  # N s, along the slope
+    upward: float  # N s, normal to it
+    angular: float  # N m s, on the leading leg about its foot: an impulse through the hip turns nothing else
+    by_trailing: float  # N m s, its derivatives by the angles of both legs
+    by_leading: float
+
+
+@inlined
+def push_off_of(model: Standing, new: Any) -> PushOff:
+    """The push-off of a heel strike, by the state after it."""
+    s_t, c_t = sine_cosine(new[SWING] + model.slope)
+    s_l, c_l = sine_cosine(new[STANCE] + model.slope)
+    return push_off(model, s_t, c_t, s_l, c_l)
+
+
+@inlined
+def push_off_work(model: Standing, new: Any) -> float:
+    """Work (J) of the push-off of a heel strike, by the state after it.
+
+    The foot rested before; so it is half of the impulse times the velocity after it, along the leg that of the hip.
+    """
+    return 0.5 * push_off_of(model, new).angular * new[len(model.arm_x) + STANCE]
+
+
+@inlined
+def push_off(model: Standing, s_t: float, c_t: float, s_l: float, c_l: float) -> PushOff:
+    """The push-off, by sines and cosines of the angles from the slope's normal of trailing and leading leg."""
+    R = model.radius
+    # from where each foot touches to the hip, along the slope and normal to it
+    x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
+    x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
+    length = math.hypot(x_t, y_t)
+    share = model.push_off / length
+    angular = share * (x_l * y_t - y_l * x_t)
+    by_trailing = share * (x_l * x_t + y_l * (y_t - R)) - angular * x_t * R / (length * length)
+    by_leading = -share * ((y_l - R) * y_t + x_l * x_t)
+    return PushOff(share * x_t, share * y_t, angular, by_trailing, by_leading)
 
 
 def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:

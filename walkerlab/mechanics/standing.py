@@ -22,6 +22,14 @@ from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
+from walkerlab.mechanics.hinges import (
+    HingeTorque,
+    SpringDamper,
+    add_hinge_gradients,
+    add_hinge_torque,
+    hinge_energy,
+    hinge_torque,
+)
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
 from walkerlab.mechanics.tree import (
     add_gravity,
@@ -58,6 +66,11 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     coordinates: int  # [d] of the section
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
+    driven_hip: bool  # whether anything acts between the legs
+    hip_stiffness: float  # N m/rad, of what acts between the legs: see `hip_law`
+    hip_damping: float  # N m s/rad
+    hip_torque: float  # N m, on the swing leg
+    push_off: float  # N s, along the trailing leg in the heel strike
     misprint: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_misprint`
     mass: float  # kg
     radius: float  # [R] m, of either foot; 0 is a point
@@ -80,6 +93,16 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     def kneed(self) -> bool:
         """Whether the swing leg has a knee."""
         return bool(self.shank != NO_SHANK)
+
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return bool(self.push_off != 0.0 or self.hip_torque != 0.0)
+
+    @property
+    def passive(self) -> bool:
+        """Whether nothing but gravity acts on it, not even a spring or a damper."""
+        return not self.driven_hip and not self.driven
 
     def __eq__(self, other: object) -> bool:
         """Whether all numbers are the same."""
@@ -114,7 +137,7 @@ def new_standing(n: int, **fields: Any) -> Standing:
         "E": (3, n, n),
         "zero_state": (2 * n,),
     }
-    whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": ()}
+    whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": (), "driven_hip": ()}
     layout = [
         (name, np.int64, whole[name]) if name in whole else (name, np.float64, shapes.get(name, ()))
         for name in Standing.__annotations__
@@ -159,6 +182,8 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
         r[k] = 0.0
     add_gravity(model, n, F, U, r)
     add_inertia(model, n, s, c, omega, M, r)
+    if model.driven_hip:
+        add_hinge_torque(hip_torque(model, y), SWING, STANCE, r)
     add_misprint(model, s, c, omega, r)
     if R != 0.0:
         pulled = model.mass * model.gravity_along
@@ -168,6 +193,19 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
             M[k, STANCE] += R * U[k]
         r[STANCE] -= R * pulled
         M[STANCE, STANCE] += model.mass * R * R
+
+
+@always_inline
+def hip_law(model: Standing) -> SpringDamper:
+    """What acts between the legs."""
+    return SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
+
+
+@always_inline
+def hip_torque(model: Standing, y: Any) -> HingeTorque:
+    """The torque between the legs, by how far the swing leg is ahead."""
+    n = len(model.arm_x)
+    return hinge_torque(hip_law(model), y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
 
 
 @always_inline
@@ -231,6 +269,8 @@ def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_ang
         by_angle[k, k] = -R * F[k] * alpha[STANCE]
     add_gravity_gradient(model, n, F, U, by_angle)
     add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
+    if model.driven_hip:
+        add_hinge_gradients(hip_torque(model, y), SWING, STANCE, by_angle, by_rate)
     add_misprint_gradients(model, s, c, omega, by_angle, by_rate)
     if R != 0.0:
         for l in range(n):
@@ -296,7 +336,10 @@ def momentum(model: Standing, y: Any) -> tuple[float, float]:
 
 @inlined
 def energies(model: Standing, y: Any) -> tuple[float, float]:
-    """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope."""
+    """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope.
+
+    The potential energy is gravity's and that of the spring between the legs.
+    """
     n = len(model.arm_x)
     s, c, F, U, r, M = (
         vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
@@ -304,7 +347,8 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     )  # fmt: skip
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
-    return tree.kinetic_energy(n, M, y[n : 2 * n]), tree.potential_energy(model, n, rolled, model.radius, F, U)
+    potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + hinge_energy(hip_law(model), y[SWING] - y[STANCE])
 
 
 def energy_at_touch(model: Standing, touched: Any) -> Any:

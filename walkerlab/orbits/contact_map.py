@@ -171,7 +171,7 @@ def step_from_section(
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     if derived:  # the flow's, less how it shifts the moment at which the feet pass
-        system = on_ground(walker, walk_state.has_ground, walk_state.knee)
+        system = on_ground(walker, walk_state.has_ground, walk_state.knee, feet=walk_state.feet)
         rate = rate_of(system, folded(system.form, end), end.size)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]

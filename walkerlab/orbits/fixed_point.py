@@ -2,21 +2,22 @@
 
 Followed: the two gaits of the small-slope theory are followed to the walker's slope. Drawn: the step map is solved from
 random starting values, the paper's way (section 3.3), and from many more where those find nothing: of some walkers few
-starts reach a heel strike at all. All of it happens with the similar walker of unit size.
+starts reach a heel strike at all. Led: where none is drawn of a driven walker, gaits of the passive one are followed as
+its drive grows. All of it happens with the similar walker of unit size.
 """
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
-from walkerlab.mechanics.standing import Standing, on_slope, swing_foot_motion
+from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
 from walkerlab.orbits.newton import Floats, NotConverged, newton
-from walkerlab.orbits.shooting import EXACT, NEW, Shooting, StepEquations, on_section, section_of
+from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, StepEquations, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.orbits.step_map import multipliers_of
@@ -57,6 +58,9 @@ class Gait:
     max_impulse_ratio: float | None  # None if the ground pushes in neither
     trailing_foot_rises: bool  # after the heel strike
     knee_strike: float | None  # s; None for legs without knees
+    work: dict[str, float]  # J a step, by what gives it
+    cost_of_transport: float  # work given over weight and distance
+    swings: int = 1  # how often the swing leg passes the stance leg in a step
     found_by: tuple[str, ...] = ()  # the searches that led here
 
     @property
@@ -89,9 +93,11 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
     DP      (d, d) derivative of the step map there
     """
     start = on_section(walker, z)
-    step = take_walk(walker, tolerances, start, 1)
-    if step.steps == 0:
+    step = take_walk(walker, tolerances, start, 1, sampled=True)
+    if step.steps == 0 or step.samples is None:
         return None
+    swing = step.samples.state[step.samples.step == 0]
+    apart = swing[:, SWING] - swing[:, STANCE]
     rate, n = 1.0 / units.time, len(start) // 2
     return Gait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
@@ -107,6 +113,9 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, 
         min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
         max_impulse_ratio=step.max_impulse_ratio or None,
         trailing_foot_rises=bool(swing_foot_motion(walker, start, start[len(start) // 2 :])[2] >= 0.0),
+        work={name: given * units.energy for name, given in step.driven.per_step(1).items()},
+        cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
+        swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
     )
 
@@ -130,6 +139,11 @@ class SearchSettings:
     residual: float = 1e-11
 
 
+FOLLOWED = "followed from a vanishing slope"
+LED_FROM = (0.02, 0.05)  # rad, slopes on which walkers are looked for a passive gait to lead to a driven one
+LED = f"led from passive gaits where nothing else finds one (slopes of {', '.join(map(str, LED_FROM))} rad)"
+
+
 @dataclass(frozen=True)
 class GaitSearch:
     """What was found.
@@ -139,7 +153,8 @@ class GaitSearch:
     reason         why this one, or why none
     random_hits    for each gait, how many random starts led to it
     random_starts  how many were drawn
-    lost           what became of the gaits of the small-slope theory that do not reach this slope
+    lost           what became of the gaits that were followed and do not reach this walker
+    followed       from where, in words
     """
 
     gaits: tuple[Gait, ...]
@@ -148,12 +163,13 @@ class GaitSearch:
     random_hits: tuple[int, ...] = ()
     random_starts: int = 0
     lost: tuple[str, ...] = ()
+    followed: str = FOLLOWED
 
     @property
     def sought(self) -> str:
         """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
         return (
-            f"followed from a vanishing slope, and by Newton's method from {self.random_starts} random starts (legs up "
+            f"{self.followed}, and by Newton's method from {self.random_starts} random starts (legs up "
             f"to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L), steps of at most "
             f"{LONGEST_SWING:g} sqrt(L/g))"
         )
@@ -169,12 +185,14 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
 
     seed  of the random starting values
     """
-    if walker.slope <= 0.0 and walker.misprint == 0.0:
+    if walker.slope <= 0.0 and walker.misprint == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker, settings)
     generator = np.random.default_rng(seed)
     search.follow_seeds()
     search.draw(generator, settings.random_starts)
+    if not search.found and not search.walker.passive:
+        search.lead(generator)
     if not search.found:
         search.draw(generator, settings.further_starts)
     return search.result()
@@ -184,7 +202,11 @@ NO_DESCENT = (
     "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
     "standing still is no gait"
 )
-NONE_TO_FOLLOW = "the theory of small slopes has no gait of this walker to follow"
+NONE_TO_FOLLOW = {
+    True: "the theory of small slopes has no gait of this walker to follow",
+    False: "without its drive this walker has no gait to lead to this slope",
+}
+POINTS_OF_A_LEAD = 60
 
 
 class SlopeBranch:
@@ -256,6 +278,13 @@ def branches(walker: Standing, settings: SearchSettings) -> tuple[SlopeBranch, .
     return tuple(SlopeBranch(looking, walker, seed) for seed in seeds(walker))
 
 
+def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
+    """The walker with a share of what drives it, on a slope (rad) as much nearer to its own; passive at 0."""
+    parts = {name: share * walker[name] for name in ("hip_stiffness", "hip_damping", "hip_torque", "push_off")}
+    driven_hip = walker.driven_hip and share > 0.0
+    return on_slope(walker.changed(**parts, driven_hip=driven_hip), slope + share * (walker.slope - slope))
+
+
 @dataclass
 class FoundGait:
     """A gait with what led to it."""
@@ -276,12 +305,13 @@ class Search:
         self.found: list[FoundGait] = []
         self.lost: list[str] = []
         self.drawn = 0
+        self.followed = FOLLOWED if walker.passive else LED
         self.looking = Shooting(self.walker, settings.looking)
         self.equations = StepEquations(Shooting(self.walker, settings.solving), section_of(self.walker))
 
     def follow_seeds(self) -> None:
-        """Follow the gaits of the small-slope theory to the walker's slope."""
-        if self.walker.slope <= 0.0:
+        """Follow the gaits of the small-slope theory, which is of passive walkers, to the walker's slope."""
+        if self.walker.slope <= 0.0 or not self.walker.passive:
             return
         for branch in branches(on_slope(self.walker, 0.0), self.settings):
             (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
@@ -289,6 +319,26 @@ class Search:
                 self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
             elif not self.keep(z, name):
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
+
+    def lead(self, generator: np.random.Generator) -> None:
+        """Follow gaits of the passive walker on slopes that it may walk down to this one, as what drives it grows."""
+        # Imported here: gaits that are found otherwise do without.
+        from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan
+
+        goal = self.walker
+        own = (goal.slope,) if goal.slope > 0.0 else ()
+        for slope in (*own, *LED_FROM):
+            passive = Search(partly_driven(goal, slope, 0.0), self.settings)
+            passive.follow_seeds()
+            passive.draw(generator, self.settings.random_starts)
+            family = RigidMap(partial(partly_driven, goal, slope), 1.0, goal)
+            follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=POINTS_OF_A_LEAD)
+            for branch in follower.family([Seed(found.z, 0.0) for found in passive.found], 1):
+                end, name = max(branch.points, key=lambda point: point.value), f"passive gait at {slope:.3g} rad"
+                if end.value < 1.0 - SAME or not self.keep(end.z, name):
+                    self.lost.append(f"the {name} is lost at {end.value:.0%} of the way to this slope and drive")
+            if self.found:
+                return
 
     def draw(self, generator: np.random.Generator, count: int) -> None:
         """Solve the step map from random starting values, unless they lead to a gait that was found before."""
@@ -342,21 +392,29 @@ class Search:
         hits = tuple(each.by.count(RANDOM_START) for each in found)
         chosen, reason = choice(gaits)
         if not gaits:
-            followed = f"followed from a vanishing slope, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW
+            followed = f"{self.followed}, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW[self.walker.passive]
             reason = (
                 f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MAX_START[0]:g} "
                 f"rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
             )
-        return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost))
+        return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
+
+
+def preference(gait: Gait) -> tuple[bool, int, float]:
+    """Smallest of the gait to walk: a stable one, whose leg does not swing back and forth, soonest rid of disturbances.
+
+    A leg that swings back passes its foot through the ground, which the model does not see.
+    """
+    return not gait.stable, gait.swings, gait.spectral_radius
 
 
 def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
-    """Which gait to walk: of those that the ground can carry the one that forgets disturbances soonest; and why."""
+    """Which gait to walk of those that the ground can carry, by `preference`; and why."""
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
         return None, "the gaits there cannot be walked: " + "; ".join(objections)
-    best = min(walkable, key=lambda index: gaits[index].spectral_radius)
+    best = min(walkable, key=lambda index: preference(gaits[index]))
     if gaits[best].stable:
         return best, "it is stable"
     return best, "no gait is stable at this slope; of those that the ground can carry this one is the least unstable"

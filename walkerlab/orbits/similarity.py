@@ -35,12 +35,16 @@ class Units(NamedTuple):
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""
     length, mass = float(walker.leg_length), float(walker.mass)
+    units = Units(length, mass, math.sqrt(length / walker.gravity))
     inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
     scales = {
         **dict.fromkeys(("A", "B", "misprint"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
+        **dict.fromkeys(("hip_stiffness", "hip_torque"), 1.0 / units.energy),
+        "hip_damping": 1.0 / (units.energy * units.time),
+        "push_off": 1.0 / units.impulse,
         **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
     }
     scaled = {name: scale * walker[name] for name, scale in scales.items()}
     unit = walker.changed(mass=1.0, leg_length=1.0, gravity=1.0, **scaled)
-    return on_slope(unit, walker.slope), Units(length, mass, math.sqrt(length / walker.gravity))
+    return on_slope(unit, walker.slope), units

@@ -5,6 +5,7 @@ from dataclasses import fields
 from typing import Any, Final
 
 from walkerlab.config.contact import Contact
+from walkerlab.config.drives import drives_of
 from walkerlab.config.numbers import same
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Config
@@ -25,10 +26,12 @@ def departures(config: ContactConfig, start_moved: bool) -> Departures:
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []
+    if drives := drives_of(config):
+        rigid.append(f"the walker is driven by {' and '.join(drives)}")
     if not isinstance(walker, CompassWalker):
         rigid.append(said("walker.type", walker.type, paper.type))
     else:
-        compass = [name for name in CompassWalker.model_fields if name not in PHYSICAL_MODEL_ONLY]
+        compass = [name for name in CompassWalker.model_fields if name not in (*PHYSICAL_MODEL_ONLY, "hip")]
         rigid += [*different(walker, paper, compass), *different(config, Config(), ["gravity_m_s2"])]
         slope, rounding = slope_of(*X_P[:2])
         if abs(config.slope_rad - slope) > rounding:

@@ -81,7 +81,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
 
 def lead(config: Config, run: str) -> str:
     """What was run: the walker, its slope and what it was to do."""
-    equations = config.equations if is_plain_compass(config.walker) else ""
+    equations = config.equations if is_plain_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
     return words("lead.scene", config, change, math.degrees(config.slope_rad), equations)
 

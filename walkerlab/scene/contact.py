@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkerlab.config.drives import Hip
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import (
@@ -20,7 +21,7 @@ from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
-from walkerlab.ground.walker import ContactWalker, floating_state
+from walkerlab.ground.walker import ContactWalker, changed_forms, floating_state
 from walkerlab.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, walk_contact
 from walkerlab.mechanics.parts import Assembly
@@ -69,7 +70,7 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     """
     contact = with_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
-    return assembled_scene(
+    scene = assembled_scene(
         assembly_of(config.walker),
         config.walker.leg_length_m,
         contact,
@@ -77,6 +78,20 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
         config.slope_rad,
         pitch,
         knee_rules(config.walker),
+    )
+    return replace(scene, walker=with_hip(scene.walker, config.walker.hip))
+
+
+def with_hip(walker: ContactWalker, hip: Hip) -> ContactWalker:
+    """The walker with what a config has between its legs."""
+    if hip == Hip():
+        return walker
+    return changed_forms(
+        walker,
+        driven_hip=True,
+        hip_stiffness=hip.spring_N_m_per_rad,
+        hip_damping=hip.damping_N_m_s_per_rad,
+        hip_torque=hip.torque_N_m,
     )
 
 
@@ -194,8 +209,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 def resting(scene: ContactScene) -> RestingFoot:
     """How the walker stands on one foot."""
     walker, law = scene.walker, scene.walker.normal
-    weight = walker.mass * math.hypot(walker.gravity_along, walker.gravity_down)
-    return resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping)
+    return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:

@@ -84,16 +84,16 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
 def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     """What the adjustment of another walker than the paper's compass does without."""
     found = []
-    if not of_the_compass(config.walker):
+    if not of_the_compass(config):
         found.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
-    if not of_the_paper(config.walker):
+    if not of_the_paper(config):
         found.append(left_out("the paper's start of its ADAMS model", "it is of the paper's own compass", "a walk"))
     return tuple(found)
 
 
 def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
     """What the verification of another walker than the paper's compass does without."""
-    if of_the_paper(config.walker):
+    if of_the_paper(config):
         return ()
     return (
         left_out(
@@ -112,18 +112,18 @@ def angles_of_a_step(walker: Walker) -> int:
     return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
 
 
-def of_the_compass(walker: object) -> bool:
-    """Whether a walker is the one of Appendix A."""
+def of_the_compass(config: object) -> bool:
+    """Whether the walker of a config is the one of Appendix A."""
     from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
 
-    return is_plain_compass(walker)
+    return is_plain_compass(config)
 
 
-def of_the_paper(walker: object) -> bool:
-    """Whether a walker is the paper's own."""
+def of_the_paper(config: object) -> bool:
+    """Whether the walker of a config is the paper's own."""
     from walkerlab.config.walkers import is_the_papers  # not for the help of the command line
 
-    return is_the_papers(walker)
+    return is_the_papers(config)
 
 
 def of_legs(config: RigidConfig) -> Iterator[Entry]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from walkerlab.config.drives import Hip
 from walkerlab.config.ground import Ground
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
@@ -65,7 +66,14 @@ def rigid_scene(config: SimulateConfig) -> RigidScene:
 
 def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
-    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
+    hip = config.walker.hip
+    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad).changed(
+        driven_hip=hip != Hip(),
+        hip_stiffness=hip.spring_N_m_per_rad,
+        hip_damping=hip.damping_N_m_s_per_rad,
+        hip_torque=hip.torque_N_m,
+        push_off=config.push_off.impulse_N_s,
+    )
     return as_printed(model) if equations == "as-printed" else model
 
 
@@ -97,7 +105,7 @@ def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
 
 def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
     """`compass`, or None for another walker."""
-    return compass(config, equations) if is_plain_compass(config.walker) else None
+    return compass(config, equations) if is_plain_compass(config) else None
 
 
 def coordinates(config: RigidConfig) -> tuple[str, ...]:
@@ -108,4 +116,4 @@ def coordinates(config: RigidConfig) -> tuple[str, ...]:
 
 def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
     """The sets of equations that a config's walker has: Appendix A is a compass's."""
-    return ("corrected", "as-printed") if is_plain_compass(config.walker) else ("corrected",)
+    return ("corrected", "as-printed") if is_plain_compass(config) else ("corrected",)

@@ -38,7 +38,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     trials: list[Trial] = []
     seconds: list[End] = []
     climbs: list[Ascent] = []
-    compass = is_plain_compass(config.walker)
+    compass = is_plain_compass(config)
     left_out = hinge_left_out(config, "methods") + ([] if compass or config.contact is None else list(LESS))
     for trial in scenes(config, inputs):
         progress.start(f"accuracy: {trial.name}", len(trial.methods))
@@ -106,7 +106,7 @@ def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial
 
     length = float(inputs["fixedpoint"].summary["step_length_m"]) if "fixedpoint" in inputs else None
     given = tuple(float(x) for x in state)
-    if not is_plain_compass(config.walker):
+    if not is_plain_compass(config):
         yield contact_trial(config, given, length, OTHERS_CONTACT_STEPS)
         return
     yield contact_trial(config, given, length, CONTACT_STEPS)

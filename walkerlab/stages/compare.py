@@ -71,7 +71,7 @@ MEANINGS = {
 
 def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
-    papers = is_the_papers(config.walker)
+    papers = is_the_papers(config)
     progress.start("compare", 3 if papers else 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}

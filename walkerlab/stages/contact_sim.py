@@ -225,6 +225,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     system = on_ground(scene.walker, (False, False))
     sampled_energies(system, samples.states, samples.has_ground, samples.knees, energies)
     kinetic, potential, total = energies.T
+    given = samples.driven_J.T
     lost, at_foothold = samples.dissipated_J, -scene.walker.mass * scene.walker.gravity_along * foothold
     return over_time(
         kinetic_J=kinetic,
@@ -234,5 +235,6 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         dissipated_damping_J=lost[:, 0],
         dissipated_friction_J=lost[:, 1],
         lost_at_edges_J=lost[:, 2],
-        residual_J=total + lost.sum(axis=1) - total[:1],
+        **({"push_off_J": given[0], "hip_J": given[1]} if given.any() else {}),
+        residual_J=total + lost.sum(axis=1) - given.sum(axis=0) - total[:1],
     )

@@ -23,6 +23,7 @@ NUMBERS = {
     "residual": Label("rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
     "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
     "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
+    "cost_of_transport": Label("1", "work given over weight and distance"),
     "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
     "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
     "min_normal_impulse": Label(
@@ -62,7 +63,8 @@ def advice(config: RigidConfig) -> str:
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
     )
     if config.slope_rad <= 0.0:
-        return f"Let the slope descend in walking direction (slope_deg above 0); {walk_anyway}."
+        driven = "drive the walker (push_off.impulse_N_s or walker.hip.torque_N_m)"
+        return f"Let the slope descend in walking direction (slope_deg above 0), or {driven}; {walk_anyway}."
     return f"Gaits on other slopes are followed by `walkerlab continuation`; {walk_anyway}."
 
 
@@ -100,6 +102,7 @@ def gait_summary(gait: Gait) -> dict[str, Any]:
         "state": list(gait.state),
         "multipliers": [[value.real, value.imag] for value in gait.multipliers],
         **printed(gait, numbers_of(gait)),
+        "work_per_step_J": gait.work,
         "found_by": list(gait.found_by),
     }
 

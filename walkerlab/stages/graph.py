@@ -41,7 +41,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 def known_and_start(config: SceneConfig) -> tuple[str, ...]:
     """The known problems, and for other walkers than the paper's compass, judged in their own scene, its start."""
-    return ("known-problems", *(() if of_the_paper(config.walker) else gait_for_start_or_pads(config)))
+    return ("known-problems", *(() if of_the_paper(config) else gait_for_start_or_pads(config)))
 
 
 def engines_installed() -> Mapping[str, str]:
@@ -112,7 +112,7 @@ class Stage:
 
     def takes_under(self, config: RigidConfig) -> type | None:
         """What its result depends on under a config."""
-        return self.takes if self.takes_of_scene is None or of_the_paper(config.walker) else self.takes_of_scene
+        return self.takes if self.takes_of_scene is None or of_the_paper(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
         """The stages whose results it gets: those that it needs, and those that it takes if they are current."""

@@ -50,6 +50,8 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,
+        "energy_balance_residual_J": walk.energy_balance_residual,
+        "lost_in_strikes_J": walk.lost_in_strikes,
         "mean_energy_J": walk.mean_energy,
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio or None,

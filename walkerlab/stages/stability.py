@@ -52,7 +52,7 @@ def run(
 
 def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
     """Whether the walker is another one than the paper's compass."""
-    return not is_the_papers(config.walker)
+    return not is_the_papers(config)
 
 
 def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:

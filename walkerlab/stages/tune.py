@@ -103,7 +103,7 @@ class TuneRun:
         self.names, self.steps = coordinates(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: Standing = rigid_walker(config, config.equations)
-        self.hinge = is_plain_compass(config.walker)
+        self.hinge = is_plain_compass(config)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
@@ -139,7 +139,7 @@ class TuneRun:
             self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
-        if is_the_papers(self.config.walker):
+        if is_the_papers(self.config):
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:

@@ -27,7 +27,7 @@ from walkerlab.orbits.rigid_limit import (
     observed_orders,
 )
 from walkerlab.paper.printed import ANGLE_ERROR
-from walkerlab.scene.contact import ContactScene, knee_rules, start_state
+from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_hip
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
@@ -109,10 +109,10 @@ def limit_findings(
         RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
-        1 if is_plain_compass(config.walker) else OTHERS_EVERY,
+        1 if is_plain_compass(config) else OTHERS_EVERY,
     )
     walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
-    gaits = COMPASS_GAITS if is_plain_compass(config.walker) else GAITS
+    gaits = COMPASS_GAITS if is_plain_compass(config) else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
     def start(walker: ContactWalker) -> State:
@@ -124,6 +124,7 @@ def limit_findings(
         if name != ALL:  # points for feet, as the rigid model has them
             parts, rules = assembly_of(config.walker, rigid=True), knee_rules(config.walker)
             walker = contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
+            walker = with_hip(walker, config.walker.hip)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:

@@ -66,7 +66,9 @@ OVER_TIME: Final = {
     "dissipated_damping_J": Label("J", "dissipated in normal direction so far"),
     "dissipated_friction_J": Label("J", "dissipated in friction so far"),
     "lost_at_edges_J": Label("J", "elastic energy lost at pads' edges so far"),
-    "residual_J": Label("J", "book energy plus what was lost, less the start's"),
+    "push_off_J": Label("J", "given by the push-off so far"),
+    "hip_J": Label("J", "given by torque and damper of the hip so far"),
+    "residual_J": Label("J", "book energy plus what was lost less what was given, less the start's"),
 }
 OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
 """What the numbers of outcomes on a map mean."""
@@ -196,6 +198,15 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
     return of_steps(walk.touch_time_s, **known, **values)
 
 
+def driven_by(walk: WalkRecord) -> dict[str, Any]:
+    """What drives a walk, and its cost of transport; of a walk that came nowhere nothing is known."""
+    distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
+    if distance <= 0.0:
+        return {}
+    driven = walk.driven
+    return {"work_per_step_J": driven.per_step(walk.steps), "cost_of_transport": driven.cost_of_transport(distance)}
+
+
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
     """What `--json` says of a walk of either model; of legs without knees it says nothing about knees."""
     strikes = walk.knee_strike_time_s
@@ -208,6 +219,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "step_lengths_m": walk.lengths_m.tolist(),
         "touch_times_s": walk.touch_time_s.tolist(),
         **known,
+        **driven_by(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,
         "accepted_steps": walk.work.accepted,

@@ -71,7 +71,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     None if the case has no start or moves nowhere, if no equation without events describes its ground, or for another
     walker than a compass: a script without events describes no knee that locks, and Appendix A no other walker.
     """
-    if not is_plain_compass(config.walker):
+    if not is_plain_compass(config):
         return ()
     short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
     start = prepared(config, short)

@@ -1,0 +1,134 @@
+"""Gaits of driven walkers: published ones, those of the level, and passive gaits that torques turn."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rigid_physics import heel_strike, potential_energy, rates
+from scipy.integrate import solve_ivp
+from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, slope_of, stepped
+
+from walkerlab.config import loader
+from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.shooting import EXACT, Shooting, StepEquations, coordinates_of, section_of
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.scene.contact import contact_scene
+from walkerlab.scene.rigid import rigid_walker
+
+
+def walker_of(name, **drives):
+    """A built-in walker, its numbers changed."""
+    config = loader.load(Path(name)).config
+    return rigid_walker(config, config.equations).changed(**drives)
+
+
+# Kuo (2002): push-off over hip mass, spring over (foot mass l^2), slope; stance angle from the normal and its rate just
+# after the strike, period, multipliers; recomputed by a complex-step code
+KUO = {
+    "normal": (
+        (0.1877, 2.5127, 0.0), (0.355459547231, -0.505619296924, 1.740269471592),
+        (0.8467907426 + 0.1104214821j, 0.8467907426 - 0.1104214821j),
+    ),
+    "slow": (
+        (0.04, 0.0, 0.0), (0.194588844511, -0.202960538673, 3.827812909213),
+        (0.2801872273 + 0.6233069519j, 0.2801872273 - 0.6233069519j),
+    ),
+    "weak": (
+        (0.001, 0.125, 0.0), (0.030700474348, -0.032562552483, 3.525040599575), (0.9647881696, 0.5330053778)
+    ),
+    "passive": (
+        (0.0, 0.0, 0.009), (0.200310900544, -0.199832473005, 3.882463752851),
+        (-0.1900998411 + 0.5575987767j, -0.1900998411 - 0.5575987767j),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", KUO)
+def test_kuos_gaits(name):
+    (push, spring, slope), (angle, rate, period), multipliers = KUO[name]
+    simplest = walker_of("simplest", push_off=push)
+    foot_mass = float(simplest.A[SWING, SWING])
+    walker = on_slope(simplest.changed(driven_hip=spring != 0.0, hip_stiffness=spring * foot_mass), slope)
+    gait = min(find_gaits(walker).gaits, key=lambda each: abs(each.period - period))
+    assert gait.state[STANCE] + slope == pytest.approx(angle, abs=1e-9)
+    assert gait.state[2 + STANCE] == pytest.approx(rate, abs=1e-9)
+    assert gait.period == pytest.approx(period, abs=1e-9)
+    assert gait.multipliers[:2] == pytest.approx(multipliers, abs=1e-9)
+
+
+def test_the_papers_compass_on_the_level():
+    """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0), 0.0)
+    gait = find_gaits(walker).gait
+    assert gait.stable
+    assert gait.state == pytest.approx((-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402), abs=1e-9)
+    assert (gait.period, gait.step_length) == pytest.approx((0.5791508912, 0.3839097737), abs=1e-9)
+
+
+DRIVEN = {
+    "torso": {"push_off": 4.0, "driven_hip": True, "hip_damping": 0.005},
+    "round-feet": {"push_off": 0.12, "driven_hip": True, "hip_stiffness": 0.3},
+    "kneed": {"push_off": 0.2, "driven_hip": True, "hip_torque": 0.15, "hip_damping": 0.005},
+    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip_torque": 0.15},
+}
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_a_driven_step_maps_derivative_is_its_slope(name):
+    walker, _ = unit_walker(on_slope(walker_of(name, **DRIVEN[name]), 0.0))
+    gait = find_gaits(walker).gait
+    equations = StepEquations(Shooting(walker, EXACT), section_of(walker))
+    z = coordinates_of(walker, gait.state)
+    DP = equations(z).data.DP[0]
+    differences = slope_of(lambda z: equations(z).data.z[0], z, [5e-4] * z.size)
+    np.testing.assert_allclose(DP, differences, rtol=0.0, atol=AGREEMENT)
+
+
+NEAR = 0.03  # of m sqrt(g L): a push-off that level gaits of most walkers go with
+
+
+@pytest.mark.parametrize("name", ["paper", "rigid-only", "contact-si", "torso", "round-feet", "simplest"])
+def test_a_walker_that_is_pushed_off_has_a_stable_gait_on_the_level(name):
+    walker = on_slope(walker_of(name), 0.0)
+    gait = find_gaits(walker.changed(push_off=NEAR * unit_walker(walker)[1].impulse)).gait
+    assert gait.stable
+    assert not gait.objections
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.1])
+def test_torques_that_turn_gravity_walk_a_passive_gait_on_any_slope(slope):
+    """Controlled symmetry: Spong, Bullo (2005)."""
+    passive = walker_of("paper")
+    gait, turned = find_gaits(passive).gait, on_slope(passive, slope)
+    lean = slope - passive.slope
+    h, unit = 1e-4, np.eye(2)
+
+    def pull(model, theta, k):
+        ends = [potential_energy(model, (*(theta + sign * h * unit[k]), 0.0, 0.0)) for sign in (1.0, -1.0)]
+        return (ends[0] - ends[1]) / (2.0 * h)
+
+    def rate(_, x):
+        theta = x[:2]
+        torques = [pull(turned, theta, k) - pull(passive, theta + lean, k) for k in range(2)]
+        both = [kinetic_energy(turned, (*theta, *w)) for w in (unit[0], unit[1], unit[0] + unit[1])]
+        M = [[2.0 * both[0], both[2] - both[0] - both[1]], [both[2] - both[0] - both[1], 2.0 * both[1]]]
+        return (*x[2:], *(np.array(rates(turned, STRAIGHT, tuple(x))) + np.linalg.solve(M, torques)))
+
+    start = np.array(gait.state) - (lean, lean, 0.0, 0.0)
+    swing = solve_ivp(rate, (0.0, gait.period), start, "DOP853", rtol=1e-11, atol=1e-12)
+    assert heel_strike(turned, swing.y[:, -1]) == pytest.approx(start, abs=1e-6)
+    assert math.fsum(swing.y[:2, -1]) == pytest.approx(-2.0 * slope, abs=1e-6)
+
+
+HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
+
+
+def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
+    """At a touch the torque leaps from one leg to the other: forgotten, that shows in the third digit."""
+    config = loader.load(Path("paper"), ["slope_deg=0.9", *HIP]).config
+    scene = contact_scene(config, RIGID_STEP, RIGID_STEP)
+    slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, NEAR_THE_GAIT, STEPS)
+    found = stepped(scene, NEAR_THE_GAIT, 1e-12).DP
+    np.testing.assert_allclose(found, slope, rtol=0.0, atol=AGREEMENT)

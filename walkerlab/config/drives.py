@@ -1,0 +1,52 @@
+"""What drives a walker: keys of the blocks `walker.hip` and `push_off`."""
+
+from typing import Any, Final
+
+from walkerlab.config.fields import Block, key
+from walkerlab.config.numbers import short
+
+KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
+STRONGEST: Final = 1e9
+QUICKEST: Final = 1e4  # rad/s, of a leg at its spring: legs with next to no inertia would swing infinitely fast
+
+
+class Hip(Block):
+    """Torques between the legs, of legs with knees between the thighs."""
+
+    spring_N_m_per_rad: float = key(
+        0.0, "N m/rad", "stiffness of a spring that pulls the legs together", KUO, ge=0.0, le=STRONGEST
+    )
+    damping_N_m_s_per_rad: float = key(0.0, "N m s/rad", "damping of the angle between the legs", ge=0.0, le=STRONGEST)
+    torque_N_m: float = key(
+        0.0,
+        "N m",
+        "constant torque on the swing leg, its opposite on the stance leg; above 0 it swings the free leg forward",
+        ge=-STRONGEST,
+        le=STRONGEST,
+    )
+
+    def too_quick_for(self, inertia: float) -> bool:
+        """Whether it would swing legs of an inertia about the hip (kg m^2) faster than anything can follow."""
+        steady = max(self.spring_N_m_per_rad, abs(self.torque_N_m))
+        return steady > QUICKEST**2 * inertia or self.damping_N_m_s_per_rad > QUICKEST * inertia
+
+
+class PushOff(Block):
+    """An impulse along the trailing leg, from foot to hip, as the other foot lands."""
+
+    impulse_N_s: float = key(0.0, "N s", "impulse at the trailing foot, 0 for none", KUO, ge=0.0, le=STRONGEST)
+    duration_s: float = key(
+        0.005, "s", "how long it lasts in the contact model; the rigid model's acts at once", ge=1e-9, le=10.0
+    )
+
+
+def drives_of(config: Any) -> tuple[str, ...]:
+    """What acts on the walker of a config beside gravity and ground, in words; nothing on a passive one."""
+    hip = config.walker.hip
+    acting = {
+        f"a push-off of {short(config.push_off.impulse_N_s)} N s": config.push_off.impulse_N_s,
+        f"a hip torque of {short(hip.torque_N_m)} N m": hip.torque_N_m,
+        f"a hip spring of {short(hip.spring_N_m_per_rad)} N m/rad": hip.spring_N_m_per_rad,
+        f"a hip damper of {short(hip.damping_N_m_s_per_rad)} N m s/rad": hip.damping_N_m_s_per_rad,
+    }
+    return tuple(words for words, value in acting.items() if value != 0.0)
