@@ -42,7 +42,7 @@ from walkerlab.mechanics.standing import (
     energies,
     energy_at_touch,
     linked,
-    step_length,
+    step_lengths,
 )
 from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
@@ -228,10 +228,7 @@ class Recorder:
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
-        lengths, begun = np.zeros(self.steps), self.start
-        for k, row in enumerate(map(np.ndarray.tolist, before)):  # between touches, and what the stance foot rolled
-            lengths[k] = step_length(self.walker, begun, row)
-            begun = after[k]
+        lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed

@@ -392,15 +392,11 @@ def feet_on_slope(model: Standing, y: Any) -> float:
     return y[SWING] + y[STANCE] + 2.0 * (model.slope + model.lean)
 
 
-@inlined
-def rolled_distance(model: Standing, start: Any, end: Any) -> float:
-    """How far (m) the stance foot's point of contact has moved along the slope between two states of one step."""
-    return -model.radius * (end[STANCE] - start[STANCE])
-
-
-def step_length(model: Standing, start: Any, end: Any) -> float:
-    """Distance (m) along the slope between a step's touch and the next one, by its first and its last state."""
-    return float(swing_foot(model, end)[1] + rolled_distance(model, start, end))
+def step_lengths(model: Standing, starts: Any, ends: Any) -> Floats:
+    """Distances (steps,) in m along the slope from touch to touch, by first and last states (steps, 2 n) of steps."""
+    psi = ends[:, : len(model.arm_x)] + model.slope
+    ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
+    return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
 
 
 def kinetic_energy(model: Standing, y: Any) -> float:

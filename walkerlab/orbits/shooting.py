@@ -21,7 +21,7 @@ from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_length, swing_foot
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_lengths, swing_foot
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
@@ -319,10 +319,8 @@ class RigidMap(StepMap):
             z = coordinates_of(walker, pushed_at_hip(walker, on_section(walker, z), push_N_s / units.impulse))
         rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
         walked = self._exact.walk(section, z, rises.size - 1, derived=False, rises=rises)
-        begun, lengths = on_section(walker, z), np.zeros(len(walked.time))
-        for k in range(lengths.size):
-            lengths[k] = step_length(walker, begun, walked.strikes.before[k])
-            begun = walked.strikes.after[k]
+        before, after = (states[: len(walked.time)] for states in (walked.strikes.before, walked.strikes.after))
+        lengths = step_lengths(walker, np.vstack((on_section(walker, z), after))[:-1], before)
         durations = np.diff(walked.time, prepend=0.0) * units.time
         return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z)
 

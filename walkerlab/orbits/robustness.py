@@ -1,0 +1,213 @@
+"""What a gait stands: its sensitivity to a drop of the floor and to a push, the largest of both, and rough ground.
+
+Gait sensitivity norm: with z the section's coordinates after a step and e a measure of it, less the gait's,
+
+    z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
+
+for a disturbance d of one step. A drop leads off the even section for two steps; so the first steps of the sum are
+difference quotients of exact walks, and from the even section on its own derivative carries the rest.
+
+Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
+Transactions on Robotics 23 (2007).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.hybrid.outcome import Outcome
+from walkerlab.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
+
+Floats = NDArray[np.float64]
+Disturbance = Literal["floor-drop", "hip-push"]
+DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
+INDICATORS = ("step_period", "step_length", "speed")
+DIRECT = 3  # steps whose change is a difference quotient
+QUOTIENT_STEP = 32.0  # of a difference quotient, in square roots of the steps' relative tolerance
+FOURTH_ORDER = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
+GRID, CLOSE = 1.0 / 5000.0, 1e-6  # in units of the disturbance: its search, and how closely it is bisected
+MOST = 0.5  # of a disturbance, in its unit
+
+
+class Scales(NamedTuple):
+    """Units of what is disturbed and measured, SI: those of the walker's leg, mass and gravity."""
+
+    length: float
+    time: float
+    impulse: float
+
+    def of_disturbance(self, disturbance: Disturbance) -> float:
+        """Of a drop (m) or of a push (N s)."""
+        return self.length if disturbance == "floor-drop" else self.impulse
+
+    @property
+    def of_indicators(self) -> Floats:
+        """(3,) of period, length and speed."""
+        return np.array((self.time, self.length, self.length / self.time))
+
+
+class Standpoint(NamedTuple):
+    """A gait of one step: its step map at a value, its section coordinates and the derivative there."""
+
+    step_map: StepMap
+    p: float
+    z: Floats  # (d,)
+    A: Floats  # (d, d)
+    scales: Scales
+
+
+class Quotient(NamedTuple):
+    """A difference quotient of fourth order, and how far that of twice the step is off it."""
+
+    value: Floats
+    error: Floats
+
+
+def quotient(function: Callable[[float], Floats | None], step: float) -> Quotient | None:
+    """The derivative at 0 of a function; None where it has no value near there."""
+    values = {k: function(k * step) for k in (-4, -2, -1, 1, 2, 4)}
+    if any(value is None for value in values.values()):
+        return None
+    fine, coarse = (
+        np.asarray(sum(weight * np.asarray(values[of * k]) for k, weight in FOURTH_ORDER)) / (of * step)
+        for of in (1, 2)
+    )
+    return Quotient(fine, np.abs(fine - coarse))
+
+
+def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
+    """Norms (indicators,) of e' = C z + D d, z' = A z + B d; None of an unstable gait, whose sum has no end.
+
+    A  (d, d)
+    B  (d,)
+    C  (indicators, d)
+    D  (steps, indicators) changes of the steps before the section carries the rest
+    """
+    if np.abs(multipliers_of(A)).max() >= 1.0:
+        return None
+    # z z' summed over all steps: X = A X A' + B B'
+    d = len(B)
+    summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
+    carried = np.einsum("ij,jk,ik->i", C, summed, C)
+    return np.asarray(np.sqrt((D**2).sum(axis=0) + np.maximum(carried, 0.0)))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How period, length and speed answer a disturbance, SI: (3,) each.
+
+    direct  of the disturbed step itself
+    error   of the norm, from difference quotients of two steps
+    """
+
+    norm: Floats
+    direct: Floats
+    error: Floats
+
+
+def indicators(durations: Floats, lengths: Floats) -> Floats:
+    """(steps, 3) period, length and speed."""
+    return np.column_stack((durations, lengths, lengths / durations))
+
+
+def disturbed(at: Standpoint, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
+    """A walk from the gait, disturbed in its first step; a drop (m) is down for the rest, a push in N s."""
+    if disturbance == "hip-push":
+        return at.step_map.disturbed(at.z, at.p, np.zeros(steps + 1), size)
+    return at.step_map.disturbed(at.z, at.p, np.append(0.0, np.full(steps, -size)))
+
+
+def sensitivity(at: Standpoint, disturbance: Disturbance) -> Sensitivity | None:
+    """Norms of a gait for a disturbance; None if it is unstable, or steps near it end."""
+    step_map, d = at.step_map, at.z.size
+    h = QUOTIENT_STEP * math.sqrt(step_map.tolerances.rtol)
+
+    def after(size: float) -> Floats | None:
+        walk = disturbed(at, disturbance, size, DIRECT)
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        return np.append(indicators(walk.durations_s, walk.lengths_m), walk.z[1])
+
+    def second_step(move: Floats) -> Floats | None:
+        walk = step_map.disturbed(at.z + move, at.p, np.zeros(DIRECT))
+        return indicators(walk.durations_s, walk.lengths_m)[1] if walk.outcome is Outcome.WALKED else None
+
+    changed = quotient(after, h * at.scales.of_disturbance(disturbance))
+    columns = [quotient(lambda size, i=i: second_step(size * np.eye(d)[i]), h) for i in range(d)]  # type: ignore[misc]
+    if changed is None or any(column is None for column in columns):
+        return None
+
+    def norm(off: float) -> Floats | None:
+        seen = changed.value + off * changed.error
+        C = np.column_stack([column.value + off * column.error for column in columns if column is not None])
+        return sensitivity_norm(at.A, seen[-d:], C, seen[:-d].reshape(DIRECT, len(INDICATORS)))
+
+    value, other = norm(0.0), norm(1.0)
+    if value is None or other is None:
+        return None
+    return Sensitivity(value, changed.value[: len(INDICATORS)], np.abs(other - value))
+
+
+def largest(stands: Callable[[float], bool], unit: float) -> tuple[float, bool]:
+    """The largest disturbance that is stood with every smaller one, and whether a larger one was looked for in vain.
+
+    unit  of the disturbance: the grid is a part of it, and it is not sought beyond half of it
+    """
+    steps = round(MOST / GRID)
+    low = next((k - 1 for k in range(1, steps + 1) if not stands(k * GRID * unit)), steps)
+    if low == steps:
+        return MOST * unit, True
+    below, above = low * GRID * unit, (low + 1) * GRID * unit
+    while above - below > CLOSE * unit:
+        middle = 0.5 * (below + above)
+        below, above = (middle, above) if stands(middle) else (below, middle)
+    return below, False
+
+
+def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> tuple[float, bool]:
+    """The largest drop (m) or push (N s) of one sign after which so many more steps are taken; see `largest`."""
+
+    def stands(size: float) -> bool:
+        return disturbed(at, disturbance, sign * size, steps + 1).outcome is Outcome.WALKED
+
+    return largest(stands, at.scales.of_disturbance(disturbance))
+
+
+def steps_on_rough_ground(at: Standpoint, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
+    """Steps of a walk from the gait over footholds of normal heights, `most` if it goes on."""
+    heights = np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, most))
+    return int(at.step_map.disturbed(at.z, at.p, heights).durations_s.size)
+
+
+@dataclass(frozen=True)
+class RoughWalks:
+    """How long walks on rough ground last.
+
+    mean, standard_error  steps, as far as they can be told
+    capped                walks that went on to the last step that was looked at
+    method                all-failed: the mean of all; censored: steps over failures; lower-bound: none failed
+    """
+
+    mean: float
+    standard_error: float | None
+    walks: int
+    capped: int
+    method: Literal["all-failed", "censored", "lower-bound"]
+
+
+def rough_walks(steps: Floats, most: int) -> RoughWalks:
+    """What walks of so many steps (walks,) say, those of `most` steps having been cut off."""
+    capped = int(np.count_nonzero(steps >= most))
+    failed, total = steps.size - capped, float(steps.sum())
+    if failed == 0:
+        return RoughWalks(total, None, steps.size, capped, "lower-bound")
+    if capped:
+        return RoughWalks(total / failed, total / failed / math.sqrt(failed), steps.size, capped, "censored")
+    error = float(steps.std(ddof=1)) / math.sqrt(failed) if failed > 1 else None
+    return RoughWalks(total / failed, error, steps.size, 0, "all-failed")
