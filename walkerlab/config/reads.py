@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from walkerlab.config.continuation import Continuation
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Ground
+    from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
 
@@ -212,6 +213,13 @@ class BasinConfig(FixedPointConfig, GroundConfig, Protocol):
     def basin(self) -> Basin: ...
 
 
+class RobustnessConfig(FixedPointConfig, ContactConfig, Protocol):
+    """What `robustness` takes."""
+
+    @property
+    def robustness(self) -> Robustness: ...
+
+
 class NamedConfig(Protocol):
     """What `plot` takes."""
 
@@ -222,9 +230,9 @@ class NamedConfig(Protocol):
 if TYPE_CHECKING:
     OfEachType = tuple[
         SimulateConfig, ContactSimConfig, TuneConfig, CompassCasesConfig, SceneCasesConfig, MapsConfig,
-        ContinuationConfig, BasinConfig, NamedConfig,
+        ContinuationConfig, BasinConfig, RobustnessConfig, NamedConfig,
     ]  # fmt: skip
 
     def of_each_type(config: schema.Config) -> OfEachType:
         """Let mypy see that a config is."""
-        return config, config, config, config, config, config, config, config, config
+        return config, config, config, config, config, config, config, config, config, config

@@ -13,6 +13,7 @@ from walkerlab.config.continuation import Continuation
 from walkerlab.config.drives import PushOff, drives_of
 from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.ground import Ground
+from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
@@ -227,6 +228,7 @@ class Config(Block):
     tune: Tune = Tune()
     continuation: Continuation = Continuation()
     basin: Basin = Basin()
+    robustness: Robustness = Robustness()
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(
         OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces", sequence=True

@@ -30,7 +30,10 @@ DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
 INDICATORS = ("step_period", "step_length", "speed")
 DIRECT = 3  # steps whose change is a difference quotient
 QUOTIENT_STEP = 32.0  # of a difference quotient, in square roots of the steps' relative tolerance
-FOURTH_ORDER = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
+CENTRAL = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
+FORWARD = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
+FORMULAS = (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD))
+"""Offsets and weights of formulas of fourth order for a first derivative."""
 GRID, CLOSE = 1.0 / 5000.0, 1e-6  # in units of the disturbance: its search, and how closely it is bisected
 MOST = 0.5  # of a disturbance, in its unit
 
@@ -70,15 +73,33 @@ class Quotient(NamedTuple):
 
 
 def quotient(function: Callable[[float], Floats | None], step: float) -> Quotient | None:
-    """The derivative at 0 of a function; None where it has no value near there."""
-    values = {k: function(k * step) for k in (-4, -2, -1, 1, 2, 4)}
-    if any(value is None for value in values.values()):
-        return None
-    fine, coarse = (
-        np.asarray(sum(weight * np.asarray(values[of * k]) for k, weight in FOURTH_ORDER)) / (of * step)
-        for of in (1, 2)
-    )
-    return Quotient(fine, np.abs(fine - coarse))
+    """The derivative at 0 of a function, one-sided where it has no value on one side; None where it has none."""
+    seen: dict[int, Floats | None] = {}
+    for formula in FORMULAS:
+        both = [derivative(function, step, formula, every, seen) for every in (1, 2)]
+        if both[0] is not None and both[1] is not None:
+            return Quotient(both[0], np.abs(both[0] - both[1]))
+    return None
+
+
+def derivative(
+    function: Callable[[float], Floats | None],
+    step: float,
+    formula: tuple[tuple[int, float], ...],
+    every: int,
+    seen: dict[int, Floats | None],
+) -> Floats | None:
+    """A formula over so many steps at once; `seen` are the function's values by steps from 0."""
+    total: Floats | None = None
+    for offset, weight in formula:
+        if every * offset not in seen:
+            seen[every * offset] = function(every * offset * step)
+        value = seen[every * offset]
+        if value is None:
+            return None
+        part = weight / (every * step) * value
+        total = part if total is None else total + part
+    return total
 
 
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:

@@ -29,6 +29,11 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
         "cascades.0.accumulates_at", "attractors.0.aperiodic_from", "attractors.0.lost_at",
     ),
     "basin": ("share_walking", "share_walking_gaussian", "margin", "unsettled_cells", "outcomes."),
+    "robustness": (
+        "gaits.0.spectral_radius", "gait_sensitivity_norm.0.value", "largest_step.0.down_m", "largest_step.0.up_m",
+        "largest_push.0.forward_N_s", "largest_push.0.backward_N_s", "rough_ground.0.mean_steps",
+        "rough_ground.1.mean_steps", "rough_ground.2.mean_steps",
+    ),
     "plot": (),
     "report": (),
 }  # fmt: skip

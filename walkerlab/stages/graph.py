@@ -216,14 +216,19 @@ PIPELINE = Graph(
         reads.BasinConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
     ),
     Stage(
+        "robustness", "walkerlab.stages.robustness",
+        "Ask what a gait stands: drops, pushes, rough ground, and which number of the walker moves it most.",
+        reads.RobustnessConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
+    ),
+    Stage(
         "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,
         results_of(*WALKED, "compare"), draws=True,
-        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin"),
+        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
     ),
     Stage(
         "report", "walkerlab.stages.report", "Write the report, one HTML file.", None,
         results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), draws=True, early_with=WALKED,
-        if_current=("engines", "stability-maps", "continuation", "basin"),
+        if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
     ),
 )  # fmt: skip
 STAGES = PIPELINE.stages

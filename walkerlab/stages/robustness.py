@@ -1,0 +1,300 @@
+"""What a gait stands, in both models, and which numbers of the config move it; walks are kept piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.fields import leaves
+from walkerlab.config.reads import RobustnessConfig
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import without_contact
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.labels import Label
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
+from walkerlab.orbits.robustness import (
+    DISTURBANCES,
+    INDICATORS,
+    Scales,
+    Sensitivity,
+    Standpoint,
+    largest_disturbance,
+    rough_walks,
+    sensitivity,
+    steps_on_rough_ground,
+)
+from walkerlab.orbits.shooting import EXACT, QUICK
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.scene.families import rigid_map
+from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.pieces import Piece, complete
+from walkerlab.stages.progress import Progress
+from walkerlab.store.columns import rows_group
+from walkerlab.store.content import Content
+from walkerlab.store.parts import Parts
+from walkerlab.workers import in_order
+
+Floats = NDArray[np.float64]
+Rows = list[dict[str, Any]]
+
+RIGID: Final = "rigid"
+WALKS_AT_ONCE: Final = 25
+MAX_STEPS: Final = {RIGID: 2_000_000, "contact": 40_000}
+"""On one rough ground, all walks together."""
+SLOPE: Final = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
+UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
+OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
+LABELS: Final[dict[str, dict[str, Label]]] = {
+    "gait_sensitivity_norm": {
+        "model": Label("", "which model walks"),
+        "disturbance": Label("", "what the first step is disturbed by"),
+        "indicator": Label("", "what of the steps is measured"),
+        "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
+        "direct": Label("SI", "change of the disturbed step itself"),
+        "error": Label("SI", "of the norm, from quotients over two step sizes"),
+    },
+    "largest_step": {
+        "model": Label("", "which model walks"),
+        "down_m": Label("m", "largest step down after which the walk goes on"),
+        "up_m": Label("m", "largest step up after which the walk goes on"),
+    },
+    "largest_push": {
+        "model": Label("", "which model walks"),
+        "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
+        "backward_N_s": Label("N s", "largest push backward"),
+    },
+    "rough_ground": {
+        "model": Label("", "which model walks"),
+        "roughness_m": Label("m", "standard deviation of the footholds' heights"),
+        "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
+        "walks": Label("1", "walks"),
+        "capped": Label("1", "walks that were cut off"),
+        "method": Label("", "how the mean was found"),
+    },
+    "sensitivity": {
+        "model": Label("", "which model walks"),
+        "of": Label("", "what changes"),
+        "to": Label("", "number of the config"),
+        "value": Label("SI", "derivative, in the units of both", absent=np.nan),
+    },
+}
+"""What is stored, row by row, of each part of the answer."""
+
+
+def run(
+    config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+) -> Content:
+    """Ask each model; raises NoAnswer, with what there is, for an unstable gait, which has no norm.
+
+    parts  walks that an earlier run has left, and where new ones are kept
+    jobs   processes
+
+    Raises ConfigError for a question that cannot be meant.
+    """
+    refuse(config)
+    found: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
+    unstable = []
+    for subject in subjects(config, inputs, progress):
+        here = subject.at()
+        numbers = gait_numbers(here)
+        assert numbers is not None, "a gait that was found walks"
+        found["gaits"].append({"model": subject.model, **numbers})
+        found["sensitivity"] += sensitivities(subject, numbers, progress, jobs)
+        if numbers["spectral_radius"] >= 1.0:
+            unstable.append(subject.model)
+            continue
+        found["gait_sensitivity_norm"] += norms(subject.model, here)
+        pieces = [*single(subject, config), *rough(subject, config)]
+        complete(pieces, parts, f"robustness: {subject.model} model", progress, jobs)
+        for name, rows in walked(subject.model, config, parts).items():
+            found[name] += rows
+    groups = {name: rows_group(found[name], labels, "row", "row") for name, labels in LABELS.items() if found[name]}
+    content = Content(groups, {**found, "steps": config.robustness.steps})
+    if unstable:
+        why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
+        raise NoAnswer(
+            why, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
+        )
+    return content
+
+
+def refuse(config: RobustnessConfig) -> None:
+    """Raise ConfigError for what cannot be meant."""
+    asked = config.robustness
+    if asked.model in ("contact", "both") and config.contact is None:
+        raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
+    for key in asked.to:
+        parameter_of(key, config)
+    half = 0.5 * config.walker.leg_length_m
+    for roughness in asked.roughness_m:
+        if roughness > half:
+            raise ConfigError(
+                f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
+                "Give millimetres as 0.001.",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A model whose gait is disturbed, as other processes are handed it.
+
+    config  whose scene it walks in
+    z       (d,) the gait on the section
+    scales  of the walker
+    """
+
+    model: str
+    config: RobustnessConfig
+    z: Floats
+    scales: Scales
+
+    def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
+        """The gait on the step map over a parameter."""
+        p = parameter.value_in(self.config)
+        step_map = rigid_map(self.config, parameter, 1.0).at(EXACT if exact else QUICK)
+        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, self.scales)
+
+
+def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
+    """The models that are asked for."""
+    progress.start("robustness: gaits")
+    gait = inputs["fixedpoint"].summary
+    walker: Standing = rigid_walker(config, config.equations)
+    _, units = unit_walker(walker)
+    z = np.array(gait["state"])[walker.section[: walker.coordinates]]
+    z[1:] *= units.time
+    yield Subject(RIGID, config, z, Scales(units.length, units.time, units.impulse))
+
+
+def norms(model: str, here: Standpoint) -> Rows:
+    """Rows of sensitivity norms."""
+    rows: Rows = []
+    for disturbance in DISTURBANCES:
+        answer = sensitivity(here, disturbance)
+        if answer is not None:
+            rows += norm_rows(model, disturbance, answer, here.scales)
+    return rows
+
+
+def norm_rows(model: str, disturbance: Any, answer: Sensitivity, scales: Scales) -> Rows:
+    """A row for each indicator of a disturbance."""
+    to_pure = scales.of_disturbance(disturbance) / scales.of_indicators
+    return [
+        {
+            "model": model,
+            "disturbance": disturbance,
+            "indicator": indicator,
+            "value": float(answer.norm[k]),
+            "direct": float(answer.direct[k]),
+            "unit": f"{unit}/({UNITS[disturbance]})" if " " in UNITS[disturbance] else f"{unit}/{UNITS[disturbance]}",
+            "scaled": float(answer.norm[k] * to_pure[k]),
+            "error": float(answer.error[k]),
+        }
+        for k, (indicator, unit) in enumerate(OF.items())
+    ]
+
+
+def single(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
+    """The search for the largest drop and push of either sign."""
+    for disturbance in DISTURBANCES:
+        for sign in (1.0, -1.0):
+            run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
+            yield Piece(f"{subject.model} {disturbance} {sign:g}", 1, run)
+
+
+def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
+    """The largest disturbance of a sign, and whether none larger was looked for."""
+    size, beyond = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
+    return [size, float(beyond)]
+
+
+def rough(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
+    """The walks on rough ground, some at a time."""
+    asked, most = config.robustness, cap(subject.model, config)
+    for roughness in asked.roughness_m:
+        for first in range(0, asked.walks, WALKS_AT_ONCE):
+            walks = range(first, min(first + WALKS_AT_ONCE, asked.walks))
+            run = partial(rough_of, subject, roughness, config.seed, walks, most)
+            yield Piece(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
+
+
+def cap(model: str, config: RobustnessConfig) -> int:
+    """Steps after which a walk on rough ground is cut off."""
+    return min(config.robustness.max_steps, max(1, MAX_STEPS[model] // config.robustness.walks))
+
+
+def rough_of(subject: Subject, roughness: float, seed: int, walks: range, most: int) -> list[float]:
+    """Steps of some of the walks; each has a ground of its own, whoever walks it."""
+    here = subject.at(exact=False)
+    return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
+
+
+def walked(model: str, config: RobustnessConfig, parts: Parts) -> dict[str, Rows]:
+    """What the pieces of a model came to."""
+    asked, kept = config.robustness, parts.kept
+    (down, up), (forward, backward) = (
+        tuple(kept[f"{model} {disturbance} {sign:g}"][0] for sign in (1.0, -1.0)) for disturbance in DISTURBANCES
+    )
+    most, grounds = cap(model, config), []
+    for roughness in asked.roughness_m:
+        steps = [kept[f"{model} rough {roughness:g} {first}"] for first in range(0, asked.walks, WALKS_AT_ONCE)]
+        seen = rough_walks(np.concatenate(steps), most)
+        error = {} if seen.standard_error is None else {"standard_error": seen.standard_error}
+        told = {"mean_steps": seen.mean, **error, "walks": seen.walks, "capped": seen.capped, "method": seen.method}
+        grounds.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
+    return {
+        "largest_step": [{"model": model, "down_m": down, "up_m": up, "steps": asked.steps}],
+        "largest_push": [{"model": model, "forward_N_s": forward, "backward_N_s": backward, "steps": asked.steps}],
+        "rough_ground": grounds,
+    }
+
+
+def sensitivities(subject: Subject, numbers: Mapping[str, float], progress: Progress, jobs: int) -> Rows:
+    """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
+    keys = subject.config.robustness.to or numbers_read(subject)
+    progress.start(f"robustness: gradients of the {subject.model} model", len(keys))
+    rows: Rows = []
+    found = in_order([partial(gradients_of, subject, key) for key in keys], jobs, (0,))
+    for key, of_key in zip(keys, found, strict=True):
+        parameter = parameter_of(key, subject.config)
+        value = parameter.value_in(subject.config)
+        for name, gradient in of_key.items():
+            if name in numbers:
+                told = {} if gradient.value is None else relative_effect(gradient, value, numbers[name])
+                unit = QUANTITIES[name] if parameter.unit == "1" else f"{QUANTITIES[name]} per {parameter.unit}"
+                rows.append(
+                    {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
+                    | ({"why": gradient.why} if gradient.why else {})
+                )
+        progress.advance()
+    return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
+
+
+def relative_effect(gradient: Gradient, parameter: float, quantity: float) -> dict[str, float]:
+    """Error of a derivative, and its relative effect where the parameter is not 0."""
+    assert gradient.value is not None
+    share = relative(gradient.value, parameter, quantity)
+    return {"error": float(gradient.error or 0.0)} | ({} if share is None else {"relative": share})
+
+
+def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
+    """Derivatives by one key."""
+    parameter = parameter_of(key, subject.config)
+    value = parameter.value_in(subject.config)
+    return gradients(subject.at(parameter), abs(value) or 1e-2)
+
+
+def numbers_read(subject: Subject) -> tuple[str, ...]:
+    """Every number that the model reads, dotted."""
+    own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
+    every = (key for key in own if not why_no_parameter(key, subject.config, own))
+    return tuple(
+        key for key in every if subject.model != RIGID or not key.startswith(("contact.", "push_off.duration"))
+    )
