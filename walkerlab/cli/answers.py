@@ -10,7 +10,7 @@ from walkerlab.labels import unit_by_name
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import CHANNELS, MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
-from walkerlab.report.sections import adjustment, families, gaits, stability, walks
+from walkerlab.report.sections import adjustment, families, gaits, robustness, stability, walks
 from walkerlab.report.sections.families import parameter
 from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
@@ -212,6 +212,11 @@ def starts(summary: Summary) -> list[str | Table]:
     return [*told, families.attractors(summary)]
 
 
+def stood(summary: Summary) -> list[str | Table]:
+    """What the gait stands, and what moves it."""
+    return [*robustness.findings(summary), *robustness.tables(summary)]
+
+
 def engines(summary: Summary) -> list[str | Table]:
     """What was concluded of each scene; every run is in `show`."""
     told = [
@@ -244,6 +249,7 @@ ANSWERS: dict[str, Answer] = {
     "stability": extreme_cases,
     "continuation": continuation,
     "basin": starts,
+    "robustness": stood,
     "engines": engines,
     "plot": plot,
     "report": report,

@@ -1,0 +1,73 @@
+"""What a gait stands, and which number of the walker moves it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.report.numbers import length, number, whole
+from walkerlab.report.results import Results
+from walkerlab.report.tables import Column, Table, table
+from walkerlab.report.words import words
+
+SHOWN = 12
+"""Derivatives in the table."""
+MODEL = Column("model", "model")
+NORMS = (
+    MODEL,
+    Column("disturbance", "disturbance"),
+    Column("of the", lambda row: row["indicator"].replace("_", " ")),
+    Column("norm", lambda row: f"{number(row['value'], 6)} {row['unit']}", numeric=True),
+    Column("direct", "direct", lambda value: number(value, 5), numeric=True),
+    Column("scaled", "scaled", lambda value: number(value, 6), numeric=True),
+)
+ROUGH = (
+    MODEL,
+    Column("roughness", "roughness_m", length, numeric=True),
+    Column(
+        "mean steps",
+        lambda row: ("> " if row["method"] == "lower-bound" else "") + number(row["mean_steps"], 4),
+        numeric=True,
+    ),
+    Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
+    Column("walks", "walks", whole, numeric=True),
+    Column("cut off", "capped", whole, numeric=True),
+    Column("method", "method"),
+)
+MOVES = (
+    MODEL,
+    Column("number of the config", "to"),
+    Column("of the gait", "of"),
+    Column("derivative", lambda row: f"{number(row['value'], 5)} {row['unit']}", numeric=True),
+    Column("% per %", "relative", lambda value: number(value, 3), numeric=True),
+)
+
+
+def section(results: Results) -> Section | None:
+    """The answer; None if it was not asked for."""
+    summary = results.summary("robustness")
+    if not summary.get("gaits"):
+        return None
+    first, *others = findings(summary) or [""]
+    blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
+    return Section("robustness", "What the gait stands", (*blocks, *tables(summary)), first)
+
+
+def findings(summary: Mapping[str, Any]) -> list[str]:
+    """What there is to say, sentence by sentence."""
+    return words.parts("robustness.findings", summary)
+
+
+def tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Norms, rough ground and what moves the gait."""
+    found = []
+    if summary["gait_sensitivity_norm"]:
+        found.append(
+            table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms"))
+        )
+    if summary["rough_ground"]:
+        found.append(table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")))
+    moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]
+    if moving:
+        left = len(summary["sensitivity"]) - len(moving[:SHOWN])
+        found.append(table("What moves the gait", MOVES, moving[:SHOWN], note=words("robustness.moves", left)))
+    return found
