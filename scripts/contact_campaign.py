@@ -45,7 +45,7 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
 from walkerlab.hybrid.contact_run import UNEXPLAINED, ContactWalkResult
 from walkerlab.hybrid.contact_walk import EVENT_TIME
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.solvers.registry import Tolerances
 

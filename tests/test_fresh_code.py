@@ -225,7 +225,7 @@ def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after
 
 
 @pytest.mark.parametrize(
-    "path", ["solvers/dop853_tableau.py", "solvers/stepping.py", "hybrid/outcome.py", "kernels.py", "compiler.py"]
+    "path", ["solvers/dop853_tableau.py", "solvers/stepping.py", "outcome.py", "kernels.py", "compiler.py"]
 )
 def test_an_edit_of_what_kernels_are_made_of_compiles_them_anew(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)

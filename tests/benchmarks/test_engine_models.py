@@ -10,7 +10,7 @@ from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.walker import BENT, LOCKED
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 
 
 @pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])

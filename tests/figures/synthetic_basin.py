@@ -4,8 +4,8 @@ import numpy as np
 from synthetic_walks import stored
 
 from walkerlab.config.loader import load
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import NONE
+from walkerlab.outcome import Outcome
 from walkerlab.stages.basin import WalkEnds, group_of, summary, window_of
 
 CONFIG = load(None, ["basin.cells=[4,3]"]).config

@@ -2,7 +2,7 @@
 
 from synthetic_walks import stored
 
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.stages.stability_maps import step_group, stiction_group, summary_of
 from walkerlab.verification.maps import NONE, VERDICTS
 

@@ -4,7 +4,7 @@ import numpy as np
 from synthetic_walks import motion, stored
 
 from walkerlab.figures.costs import ERRORS, LIMITS, WALL
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.stages.walk import over_time
 from walkerlab.store.content import Group, Variable
 

@@ -20,11 +20,10 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 from walkerlab.cli.exports import COLUMNS
 from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.maps import ATTRACTORS
-from walkerlab.figures.maps import COLOURS as OF_OUTCOMES
 from walkerlab.figures.registry import FIGURES
 from walkerlab.figures.style import CONTACT, LEGS, POINT, RIGID
 from walkerlab.figures.walks import AT_SAME_TIME, IN_PHASE, PAPER
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import TOLD, Outcome
 
 RESULTS = {
     "both models": both_models(),
@@ -143,7 +142,7 @@ def test_legend_names_everything_once(drawn):
 
 
 def test_what_becomes_of_walks_has_a_colour_of_its_own_in_every_map():
-    failures = [OF_OUTCOMES[one] for one in Outcome if one is not Outcome.WALKED]
+    failures = [TOLD[one].colour for one in Outcome if one is not Outcome.WALKED]
     every = [tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in (*failures, *ATTRACTORS)]
     for one, other in itertools.combinations(every, 2):
         assert max(abs(a - b) for a, b in zip(one, other, strict=True)) > TOLD_APART
@@ -162,7 +161,7 @@ def brightness(colour):
 )
 def test_lines_on_one_another_differ_in_brightness_and_in_style(looks):
     one, other = looks
-    assert abs(brightness(one.colour) - brightness(other.colour)) > VISIBLE
+    assert abs(brightness(TOLD[one].colour) - brightness(other.colour)) > VISIBLE
     assert one.style != other.style
 
 

@@ -17,10 +17,10 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import feet_motion, on_ground
 from walkerlab.hybrid.contact_events import farthest_slide
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 

@@ -7,14 +7,14 @@ from contact_walks import FIXED_POINT, RIGID_STEP, scene_of, settings
 
 from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.hybrid import contact_run
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import walk_contact
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import find_gait_from
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.scaled_starts import scaled_starts
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import start_state
 from walkerlab.stages import contact_sim
 from walkerlab.stages.progress import Silent

@@ -7,8 +7,8 @@ import plain_walk
 import pytest
 from contact_walks import scene_of, settings
 
-from walkerlab.ground.compliant import STANCE_FOOT
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.ground.terrain import STANCE_FOOT
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import start_state
 
 MEASURE = 0.5  # m, of steps, and of pads

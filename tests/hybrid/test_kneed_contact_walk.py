@@ -31,11 +31,11 @@ from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
 from walkerlab.hybrid.contact_run import by_channel
 from walkerlab.hybrid.contact_walk import walk_in_form
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.mechanics.parts import Assembly, Particle
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.orbits.contact_gait import find_gait_from, section_points
 from walkerlab.orbits.contact_map import coordinates_of, state_on_section, step_from_section
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.registry import Tolerances
 

@@ -5,9 +5,9 @@ import pytest
 from kneed_walks import AT_TOUCH, RIGID_ANGLES, RIGID_RATES, STEP, scene_of
 
 from walkerlab.ground.compliant import KneeRules
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import section_points
 from walkerlab.orbits.contact_map import step_from_section
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import start_state
 from walkerlab.solvers.registry import Tolerances
 

@@ -8,7 +8,7 @@ import pytest
 from contact_walks import FIXED_POINT, scene_of, walked
 
 from walkerlab.hybrid.contact_run import sampled_feet
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 
 GLUE = ("contact.static_friction=100", "contact.dynamic_friction=100")
 ROUND = ("walker.foot_radius_m=0.3", "contact.terrain=after-mid-swing")

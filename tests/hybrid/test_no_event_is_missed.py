@@ -9,9 +9,9 @@ from kneed_walks import RIGID_ANGLES, RIGID_RATES
 
 from walkerlab.config.loader import load
 from walkerlab.hybrid.contact_events import leaves_side
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.events import new_crossing_finder

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from contact_walks import scene_of
 
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_events import HEIGHT, PASSING, PER_FOOT
 from walkerlab.hybrid.contact_rules import GOES_ON, apply_event

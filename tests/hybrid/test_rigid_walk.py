@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, far_from
 from walkerlab.hybrid.recorded_walk import take_walk as take_walk_of_model
 from walkerlab.hybrid.rigid_measures import energies as energies_of_model
 from walkerlab.hybrid.rigid_measures import reactions as reactions_of_model
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import (
     AS_PRINTED,
     CORRECTED,

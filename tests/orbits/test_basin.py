@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.orbits.basin import (
@@ -18,6 +17,7 @@ from walkerlab.orbits.basin import (
     inside_cell,
     on_section,
 )
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import Tolerances
 

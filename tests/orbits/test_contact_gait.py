@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits import contact_gait as search
 from walkerlab.orbits.contact_gait import GaitAnswer, gait_near
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import NotConverged
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances

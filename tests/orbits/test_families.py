@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.attractors import (
     Lyapunov,
     close_returns,
@@ -29,6 +28,7 @@ from walkerlab.orbits.plane import curve_through
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import multipliers_of, walk_steps
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
 A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81

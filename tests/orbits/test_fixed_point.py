@@ -10,7 +10,6 @@ from rigid_physics import momentum_of_masses
 
 from walkerlab.config.loader import load
 from walkerlab.config.walkers import StraightLegs, Torso
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.orbits.fixed_point import (
@@ -27,6 +26,7 @@ from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.newton import NotConverged, newton
 from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, StepEquations, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import Tolerances

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.newton import Evaluated, NotConverged, Solution, newton
+from walkerlab.outcome import Outcome
 
 
 class Counted:

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Solution, newton
 from walkerlab.orbits.shooting import Shooting, StepEquations, on_section, section_of
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
 ROUND_FEET = straight_legs(Limb(0.4, 1.0, 0.1, 0.0, 0.01), 0.0, Arc(0.1))

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.newton import newton
 from walkerlab.orbits.shooting import Shooting, StepEquations, section_of
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.contact import contact_scene
 from walkerlab.solvers.registry import Tolerances

@@ -3,15 +3,17 @@
 from pathlib import Path
 
 from walkerlab.config.loader import load
-from walkerlab.hybrid.outcome import Outcome
-from walkerlab.scene.endings import WALKED, WHAT, Pads, causes, endings
+from walkerlab.outcome import TOLD, Outcome
+from walkerlab.scene.endings import Pads, causes, endings
 
 PAPER = load().config
 COUNTS = {"walked": 150, "off-pad": 178, "fell": 32, "no-answer": 7}
 
 
-def test_every_outcome_of_a_walk_has_its_words():
-    assert {outcome.label for outcome in Outcome} == {*WHAT, WALKED}
+def test_every_outcome_has_its_words_and_its_colour():
+    for told in ("does", "did", "advice", "colour"):
+        assert len({getattr(TOLD[outcome], told) for outcome in Outcome}) == len(Outcome)
+    assert all(TOLD[outcome].why for outcome in Outcome if outcome is not Outcome.WALKED)
 
 
 def test_walks_that_pads_end_are_told_from_limits_of_the_walker():

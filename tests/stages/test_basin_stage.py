@@ -8,8 +8,8 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.basin import ATOL, RTOL
+from walkerlab.outcome import Outcome
 from walkerlab.stages import basin
 from walkerlab.stages.basin import RigidQuestion
 from walkerlab.stages.graph import PIPELINE

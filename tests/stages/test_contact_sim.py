@@ -10,8 +10,8 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
+from walkerlab.outcome import Outcome
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent

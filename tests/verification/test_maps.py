@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.stages import stability_maps
 from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.progress import Silent

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from walkerlab.config.stability import Case
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.judge import LIBRARY_BUDGET, judge, others, second_walk
 from walkerlab.verification.verdict import promised

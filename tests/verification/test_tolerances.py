@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.starts import configured, prepared
 

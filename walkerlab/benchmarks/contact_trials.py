@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.config.reads import ContactConfig
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from walkerlab.benchmarks import taylor_reference
 from walkerlab.benchmarks.trials import RigidTrial, Trial
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 
 Floats = NDArray[np.float64]

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.standing import Standing
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import METHODS, Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts

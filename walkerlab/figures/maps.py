@@ -21,7 +21,7 @@ from walkerlab.figures.canvas import add_legend, blank, entry, label_of, label_t
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import TOLD, Outcome
 from walkerlab.store.content import Group
 
 WHITE: Final = "#FFFFFF"
@@ -76,20 +76,7 @@ MAP = Need(
     TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no start was walked"
 )
 
-COLOURS: Final = {
-    Outcome.WALKED: SKY,
-    Outcome.FELL: PALE,
-    Outcome.OFF_PAD: "#F7CF85",
-    Outcome.LIFTED_OFF: "#DDB3CC",
-    Outcome.SLID: "#A6D3B4",
-    Outcome.NO_HEEL_STRIKE: GREY,
-    Outcome.BUDGET_EXHAUSTED: BLACK,
-    Outcome.SOLVER_FAILED: "#5B3A1E",
-    Outcome.REJECTED: WHITE,
-    Outcome.BENT_KNEE: "#A9B8E0",
-}
-"""Of what becomes of a walk, in every map: full for what walks, as attractors' colours are, and pale for what fails."""
-OUTCOMES: Final = discrete([COLOURS[one] for one in Outcome])
+OUTCOMES: Final = discrete([TOLD[one].colour for one in Outcome])
 MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
@@ -118,7 +105,7 @@ def draw_starts(results: Results) -> Drawn:
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
     key: list[Artist] = [
-        Patch(facecolor=COLOURS[one], edgecolor=GREY, linewidth=0.3, label=one.label)
+        Patch(facecolor=TOLD[one].colour, edgecolor=GREY, linewidth=0.3, label=one.label)
         for one in map(Outcome, np.unique([cells[f"{model}outcome"] for model, _ in MODELS]).tolist())
     ]
     for label, marker, size, face, (x, y) in marks:
@@ -196,9 +183,9 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
         for number in range(len(attractors))
     ]
     said = "never repeats itself" if summary["aperiodic"] else "walks, not settled"
-    kinds.append((COLOURS[Outcome.WALKED], said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)))
+    kinds.append((TOLD[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)))
     failures = [one for one in Outcome if one is not Outcome.WALKED]
-    kinds += [(COLOURS[one], one.label, outcome == one) for one in failures]
+    kinds += [(TOLD[one].colour, one.label, outcome == one) for one in failures]
     return [kind for kind in kinds if kind[2].any()]
 
 
@@ -274,7 +261,7 @@ def draw_stiction(results: Results) -> Drawn:
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) ends otherwise", ~compared & ~unanswered)
     made.draw_errors(cells, compared, SHARP, [(BLACK, "", unanswered), otherwise])
-    seen = [(COLOURS[one], one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+    seen = [(TOLD[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
     seen += [otherwise[:2]] if otherwise[2].any() else []
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
     for axes in (made.left, made.right):

@@ -11,12 +11,12 @@ import walkerlab.ground.motion  # noqa: F401 (registers the equations of what is
 from walkerlab.ground.friction import FrictionLaw
 from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.normal_force import NormalLaw
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import FORM, MAX_BODIES, NO_FOOT, ContactWalker
 from walkerlab.mechanics.assembly import Anchor, Tree, levers, tree_about, tree_about_centre
 from walkerlab.mechanics.parts import Assembly, Position
 
 Floats = NDArray[np.float64]
-SWING_FOOT, STANCE_FOOT = 0, 1  # of the first step; body k carries foot k
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,16 @@ from typing import Any
 from walkerlab.ground.hip import hip_energy
 from walkerlab.ground.knees import knee_energy
 from walkerlab.ground.normal_force import elastic_energy
-from walkerlab.ground.walker import OF_BODIES, Form, OnGround, foot_force, half_size, one_foot_motion, sines_cosines
+from walkerlab.ground.walker import (
+    OF_BODIES,
+    Form,
+    OnGround,
+    foot_force,
+    half_size,
+    one_foot_motion,
+    over_ground,
+    sines_cosines,
+)
 from walkerlab.kernels import inlined, matrix, vector
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.tree import add_inertia, projections
@@ -39,7 +48,7 @@ def potential_energy(form: Form, y: Any) -> float:
 @inlined
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
     """Elastic energy (J) in the ground under a foot that it carries."""
-    return elastic_energy(-one_foot_motion(system.form, foot, y).height, system.normal)
+    return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
 
 
 @inlined
@@ -55,7 +64,7 @@ def total_energy(system: OnGround, y: Any) -> float:
 @inlined
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
     """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
-    motion = one_foot_motion(system.form, foot, y)
+    motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
     force = foot_force(system, motion)

@@ -11,6 +11,7 @@ from walkerlab.ground.walker import (
     foot_force,
     foot_motion,
     half_size,
+    over_ground,
     sines_cosines,
 )
 from walkerlab.kernels import always_inline, inlined, matrix, vector
@@ -35,7 +36,7 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
     """Force along and normal to the slope (N) on a foot with ground; its torques (N m) are added to r (n,)."""
     form = system.form
-    motion = foot_motion(form, foot, s, c, y)
+    motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
     if motion.height >= 0.0:
         return 0.0, 0.0
     force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)
@@ -115,7 +116,7 @@ def motion_gradient(form: Form, foot: int, F: Any, U: Any, y: Any, j: int) -> tu
 def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
     """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
     form = system.form
-    motion = foot_motion(form, foot, s, c, y)
+    motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
     if motion.height >= 0.0:
         return
     force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)

@@ -6,11 +6,16 @@ pads.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from walkerlab.kernels import inlined
 
 FAR = 1e9  # m, an edge out of reach
+STANCE_FOOT = 1  # which carries the first step
+EVEN = np.zeros(1)
+EVEN.flags.writeable = False
 
 
 class Terrain(NamedTuple):
@@ -20,21 +25,41 @@ class Terrain(NamedTuple):
     lanes: tuple[float, float]  # m, where each foot's pad number 0 is centred
     has_pads: bool  # with edges, which a foot can trip over; else it is a plane
     order_matters: bool  # a foot can touch only once it has been above the ground ahead of the other foot
+    heights: Any  # (footholds,) m over the slope, the start's first; those beyond lie at the last
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
     """Pads of the length of a step, `pitch` (m), for either leg in turn; nothing between them."""
-    return Terrain(pitch, lanes, True, False)
+    return Terrain(pitch, lanes, True, False, EVEN)
 
 
 def after_mid_swing(stride_measure: float) -> Terrain:
     """A plane that a foot can touch only once it has been above the ground ahead of the other foot."""
-    return Terrain(stride_measure, (0.0, 0.0), False, True)
+    return Terrain(stride_measure, (0.0, 0.0), False, True, EVEN)
 
 
 def plane(stride_measure: float) -> Terrain:
     """Ordinary ground: it carries any foot that touches it."""
-    return Terrain(stride_measure, (0.0, 0.0), False, False)
+    return Terrain(stride_measure, (0.0, 0.0), False, False, EVEN)
+
+
+@inlined
+def is_uneven(terrain: Terrain) -> bool:
+    """Whether footholds have heights of their own."""
+    return terrain.heights.size > 1
+
+
+@inlined
+def foothold_height(terrain: Terrain, foothold: int) -> float:
+    """Height (m) of a foothold over the slope; the start's is number 0, and what lies behind it is level."""
+    return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
+
+
+@inlined
+def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
+    """Height (m) of the pad that is a cell of a foot's lane."""
+    apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.stride_measure
+    return foothold_height(terrain, cell + math.floor(apart + 0.5))
 
 
 @inlined

@@ -163,6 +163,7 @@ class OnGround(NamedTuple):
     has_ground: Any  # (2,) whether there is ground under a foot
     knee: Any  # (2,) what each knee is doing
     feet: Any  # that of a walk state: the stance foot first
+    level: Any  # (2,) m, height over the slope of the ground for each foot
 
 
 def on_ground(
@@ -171,14 +172,18 @@ def on_ground(
     knee: Any = (RELEASED, RELEASED),
     hinged: bool = False,
     feet: Any = (1,),
+    level: Any = (0.0, 0.0),
 ) -> OnGround:
     """The walker in the form that its knees give it.
 
     has_ground  (2,) whether there is ground under a foot
     knee        (2,) what each knee is doing
     feet        the stance foot, and what a walk state has behind it
+    level       (2,) m, height of the ground for each foot
     """
-    memory = (np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64))
+    memory = (
+        np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64), np.asarray(level, float)
+    )  # fmt: skip
     form = walker.forms[int(hinged), locked_knees(knee)]
     return OnGround(form, walker.normal, walker.friction, walker.stop, *memory)
 
@@ -239,6 +244,12 @@ def feet_motion(form: Form, y: Any) -> tuple[FootMotion, FootMotion]:
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
+
+
+@inlined
+def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
+    """A foot's motion with its height over the ground that is there for it."""
+    return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
 
 
 class FootForce(NamedTuple):

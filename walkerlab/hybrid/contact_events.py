@@ -12,7 +12,17 @@ from walkerlab.ground.friction import sample_switching, switching_count
 from walkerlab.ground.knees import extension, extension_rate
 from walkerlab.ground.normal_force import grip
 from walkerlab.ground.terrain import Terrain, cell_edges
-from walkerlab.ground.walker import BENT, OF_BODIES, STOPPING, FootMotion, Form, OnGround, foot_motion, sines_cosines
+from walkerlab.ground.walker import (
+    BENT,
+    OF_BODIES,
+    STOPPING,
+    FootMotion,
+    Form,
+    OnGround,
+    foot_motion,
+    over_ground,
+    sines_cosines,
+)
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
@@ -55,9 +65,11 @@ class WalkState(NamedTuple):
 
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
+    touch_height: Any  # (steps,) m, of the foothold over the slope
     slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
     rolling: Any  # (steps,) m, how far it rolled
     has_ground: Any  # (2,) whether there is ground under a foot
+    level: Any  # (2,) m, height over the slope of the ground for each foot
     cells: Any  # (2,) which cell of its lane a foot is over
     left_cells: Any  # (2,) the cell where it last stood
     foothold: Any  # (2,) m, where it touched
@@ -110,12 +122,12 @@ def sample_event_functions(
     sines_cosines(form, y, s, c)
     values[PASSING, node] = 0.0
     for foot in range(2):
-        first, motion = foot * PER_FOOT, foot_motion(form, foot, s, c, y)
+        first, motion = foot * PER_FOOT, over_ground(system, foot, foot_motion(form, foot, s, c, y))
         sample_foot(system, motion, cell_edges(terrain, foot, walk_state.cells[foot]), first, node, finder)
         values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[PASSING, node] += motion.along if foot == 1 else -motion.along
-    values[FALL, node] = hip_height(form, s, c, y) - FALLEN_HIP * ground.frame.leg_length
     stance = walk_state.feet[STANCE]
+    values[FALL, node] = hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
     away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
     values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
     for knee in range(2):

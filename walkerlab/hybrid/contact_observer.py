@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
 from walkerlab.ground.hip import hip_power
 from walkerlab.ground.knees import knee_power
-from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, store_whole
+from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.kernels import by_reference, by_type_or_default, inlined, kernel, matrix, vector
@@ -37,6 +37,7 @@ class ContactObserver(NamedTuple):
     has_ground: Any  # (samples, 2)
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
+    level: Any  # (samples, 2) m, height of the ground for each foot
     sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
     sampled_work: Any  # (samples, 2) J given so far by push-off and hip
     recorded: Any  # (1,)
@@ -84,6 +85,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         for k in range(2):
             observer.knees[index, k] = walk_state.knee[k]
             observer.has_ground[index, k] = walk_state.has_ground[k]
+            observer.level[index, k] = walk_state.level[k]
         observer.stance[index] = walk_state.feet[STANCE]
         index += 1
     observer.recorded[0] = index
@@ -122,7 +124,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
         y = vector(OF_STATES)[: method.y.size]
         interpolate(method, system, min(at, 1.0), y)
-        deepest = max(deepest, -one_foot_motion(system.form, foot, y).height)
+        deepest = max(deepest, -over_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
     observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
 
 

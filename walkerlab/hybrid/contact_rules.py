@@ -3,8 +3,25 @@
 from typing import Any
 
 from walkerlab.ground.knees import FLEXED, IdealLock, extension
-from walkerlab.ground.terrain import Terrain, has_ground_in_air, has_ground_in_cell
-from walkerlab.ground.walker import BENT, LOCKED, RELEASED, STOPPING, FootMotion, Form, OnGround, feet_motion
+from walkerlab.ground.terrain import (
+    Terrain,
+    foothold_height,
+    has_ground_in_air,
+    has_ground_in_cell,
+    height_of_pad,
+    is_uneven,
+)
+from walkerlab.ground.walker import (
+    BENT,
+    LOCKED,
+    RELEASED,
+    STOPPING,
+    FootMotion,
+    Form,
+    OnGround,
+    feet_motion,
+    over_ground,
+)
 from walkerlab.hybrid.contact_events import (
     EXTENSION,
     EXTENSION_RATE,
@@ -24,14 +41,14 @@ from walkerlab.hybrid.contact_events import (
     material_along,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type_or_default, inlined
+from walkerlab.outcome import Outcome
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
 TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
-BENT_KNEE = int(Outcome.BENT_KNEE)
+BENT_KNEE, STUBBED = int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
 GOES_ON = -1
 
 
@@ -48,9 +65,21 @@ def apply_event(
     if event >= EXTENSION:
         knee_stops(system.stop, walk_state, event, t)
         return GOES_ON
-    feet = feet_motion(system.form, y)
+    first, second = feet_motion(system.form, y)
+    feet = over_ground(system, 0, first), over_ground(system, 1, second)
     if event == PASSING:
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
+        swing = 1 - walk_state.feet[STANCE]
+        if is_uneven(terrain) and not terrain.has_pads and is_ahead(walk_state, swing):
+            # its next foothold counts from now on, and carries it once it has been above it
+            level = foothold_height(terrain, walk_state.feet[STEPS] + 1)
+            set_level(system, observer, walk_state, feet[swing], swing, level, y)
+            if not is_above(walk_state, swing):
+                walk_state.has_ground[swing] = 0
+                return GOES_ON if terrain.order_matters else STUBBED
+            walk_state.has_ground[swing] = 1
+            find_ground(terrain, walk_state, 1 - swing, is_above(walk_state, 1 - swing))
+            return GOES_ON
         for foot in range(2):
             # equal legs of a hinged step pass each other on the surface: rounding neither lifts a foot nor holds one
             at_surface = abs(feet[foot].height) < AT_SURFACE
@@ -72,7 +101,10 @@ def apply_event(
         if not has_ground_in_cell(walk_state.cells[foot]):
             observe_edge(observer, system, foot, y)
             walk_state.has_ground[foot] = 0
-        elif is_above(walk_state, foot):
+            return GOES_ON
+        pad = height_of_pad(terrain, foot, walk_state.cells[foot])
+        set_level(system, observer, walk_state, feet[foot], foot, pad, y)
+        if is_above(walk_state, foot):
             walk_state.has_ground[foot] = 1
         else:
             return OFF_PAD
@@ -80,6 +112,27 @@ def apply_event(
         walk_state.at_zero[event] = 0
         release(walk_state, 1 - foot)
     return GOES_ON
+
+
+@inlined
+def set_level(
+    system: OnGround,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    motion: FootMotion,
+    foot: int,
+    level: float,
+    y: Any,
+) -> None:
+    """The ground for a foot, in whose ground it moves so, gets another height (m); what its spring held is lost."""
+    height = motion.height + walk_state.level[foot] - level
+    if level == walk_state.level[foot]:
+        return
+    if not is_above(walk_state, foot):
+        observe_edge(observer, system, foot, y)
+    walk_state.level[foot] = level
+    walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if height > 0.0 else -1
+    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
 
 
 @inlined
@@ -174,6 +227,7 @@ def touch(
     step = walk_state.feet[STEPS]
     walk_state.touch_time[step] = t
     walk_state.touch_along[step] = feet[foot].along
+    walk_state.touch_height[step] = walk_state.level[foot]
     if not is_above(walk_state, stance):
         note_slip(form, walk_state, feet, stance, y)
         walk_state.leaving[stance] = 1

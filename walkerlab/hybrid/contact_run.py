@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.knees import FLEXED, extension
-from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
+from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
 from walkerlab.ground.walker import (
     BENT,
     LOCKED,
@@ -57,9 +57,9 @@ from walkerlab.hybrid.contact_observer import (
 from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
 from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.solvers.system import State
@@ -88,30 +88,34 @@ class Stopped:
 
 
 @kernel
-def sampled_energies(system: OnGround, states: Any, has_ground: Any, knees: Any, energies: Any) -> None:
+def sampled_energies(system: OnGround, states: Any, has_ground: Any, knees: Any, level: Any, energies: Any) -> None:
     """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3).
 
     system  with all bodies, free; its ground and its knees are set to those of each sample
     """
     for i in range(states.shape[0]):
         for k in range(2):
-            system.has_ground[k], system.knee[k] = has_ground[i, k], knees[i, k]
+            system.has_ground[k], system.knee[k], system.level[k] = has_ground[i, k], knees[i, k], level[i, k]
         energies[i, 0] = kinetic_energy(system.form, states[i])
         energies[i, 1] = potential_energy(system.form, states[i])
         energies[i, 2] = total_energy(system, states[i])
 
 
 @kernel
-def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, feet: Any) -> None:
-    """Position along, height (m), normal force, friction (N) and slip (m/s) of both feet into feet (samples, 2, 5)."""
+def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, level: Any, feet: Any) -> None:
+    """Position along and height over the ground (m), forces (N) and slip (m/s) of both feet into feet (samples, 2, 5).
+
+    Of the forces the normal one comes first, then friction.
+    """
     for i in range(states.shape[0]):
         motions = feet_motion(walker.forms[0, 0], states[i])
         for foot in range(2):
-            motion = motions[foot]
-            feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = motion.along, motion.height, motion.slip
+            along, height, slip, vertical_velocity = motions[foot]
+            height -= level[i, foot]
+            feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = along, height, slip
             feet[i, foot, 2], feet[i, foot, 3] = 0.0, 0.0
-            if has_ground[i, foot] != 0 and motion.height < 0.0:
-                force = foot_force(walker, motion)
+            if has_ground[i, foot] != 0 and height < 0.0:
+                force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
                 feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
 
 
@@ -124,6 +128,7 @@ class ContactSamples:
     has_ground: NDArray[np.int8]  # (samples, 2)
     stance: NDArray[np.int64]  # (samples,)
     knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
+    level: Floats  # (samples, 2) m, height over the slope of the ground for each foot
     dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
     driven_J: Floats  # (samples, 2) given by push-off and hip
 
@@ -165,9 +170,11 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
     return WalkState(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
+        touch_height=np.zeros(steps),
         slip=np.zeros(steps),
         rolling=np.zeros(steps),
         has_ground=has_ground,
+        level=np.zeros(2),
         cells=cells,
         left_cells=cells.copy(),
         foothold=np.array([motion.along for motion in feet]),
@@ -244,7 +251,8 @@ def new_observer(
     samples = times.size
     extremes = np.zeros(4)
     if track_energy:
-        extremes[START_ENERGY] = total_energy(on_ground(walker, walk_state.has_ground, feet=walk_state.feet), y)
+        here = on_ground(walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level)
+        extremes[START_ENERGY] = total_energy(here, y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
@@ -253,6 +261,7 @@ def new_observer(
         np.zeros((samples, 2), np.int8),
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
+        np.zeros((samples, 2)),
         np.zeros((samples, CHANNEL_COUNT)),
         np.zeros((samples, 2)),
         np.zeros(1, np.int64),
@@ -282,7 +291,8 @@ def walk_on(
     Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    system = on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
+    memory = walk_state.has_ground, walk_state.knee, hinged, walk_state.feet, walk_state.level
+    system = on_ground(walker, *memory)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
     y = folded(system.form, (*start[root:half], *start[half + root :]))
@@ -299,7 +309,7 @@ def walk_on(
         ended, event = walk(system, ground, method, finder, observer, walk_state, until)
         if ended != GOES_ON:
             break
-        before, system = system, on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.feet)
+        before, system = system, on_ground(walker, *memory)
         y = change_form(walker, before, system, event, observer, method.y)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
@@ -333,7 +343,7 @@ def walk_contact(
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
         here = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
-        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
+        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
     room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
@@ -341,7 +351,7 @@ def walk_contact(
         observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
         stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
         if room == 0 or observer.recorded[0] < room:
-            return gather(stopped, walk_state, observer, walker, tolerances)
+            return gather(stopped, walk_state, observer, walker, ground.terrain, tolerances)
         room *= 2
 
 
@@ -408,9 +418,9 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
-def driven_work(walker: ContactWalker, along: float, observer: ContactObserver) -> DrivenWork:
-    """What was given over the steps taken, which led so far along the slope (m)."""
-    gravity = walker.mass * walker.gravity_along * along
+def driven_work(walker: ContactWalker, along: float, up: float, observer: ContactObserver) -> DrivenWork:
+    """What was given over the steps taken, which led so far along the slope and up (m)."""
+    gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     return DrivenWork(walker.mass * walker.gravity, gravity, *observer.work[AT_TOUCH].tolist())
 
 
@@ -419,6 +429,7 @@ def gather(
     walk_state: WalkState,
     observer: ContactObserver,
     walker: ContactWalker,
+    terrain: Terrain,
     tolerances: Tolerances,
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
@@ -431,13 +442,17 @@ def gather(
             observer.has_ground[:seen],
             observer.stance[:seen],
             observer.knees[:seen],
+            observer.level[:seen],
             observer.sampled_dissipation[:seen],
             observer.sampled_work[:seen],
         )
     strikes = walk_state.knee_strike[:done]
+    along, up = (
+        (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)
+    )
     known = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
-        foothold_height_m=None,
+        foothold_height_m=walk_state.touch_height[:done] if is_uneven(terrain) else None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],
@@ -451,6 +466,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.dissipated.copy(),
-        driven=driven_work(walker, float(walk_state.touch_along[done - 1]) if done else 0.0, observer),
+        driven=driven_work(walker, along, up, observer),
         samples=samples,
     )

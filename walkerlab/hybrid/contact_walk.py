@@ -5,6 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
+from walkerlab.ground.terrain import is_uneven
 from walkerlab.ground.walker import OF_STATES, OnGround, locked_knees
 from walkerlab.hybrid.contact_events import (
     AIRBORNE_SINCE,
@@ -21,8 +22,8 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, note_work, observe
 from walkerlab.hybrid.contact_rules import GOES_ON, apply_event, is_above, is_to_lift, note_flexion
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
@@ -122,7 +123,7 @@ def walk_in_form(
     arriving, refinements, rewinds, event = False, 0, 0, -1
     target = deadline(ground.frame, walk_state)
     latest = target  # the end of the step in which an event was found: it is not sought beyond
-    watch_order = ground.terrain.order_matters or until >= 0
+    watch_order = ground.terrain.order_matters or until >= 0 or is_uneven(ground.terrain)
     locked = locked_knees(walk_state.knee)
     while walk_state.feet[STEPS] < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state)):
         status = advance(method, system, target)

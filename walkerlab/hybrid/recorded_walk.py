@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
@@ -44,6 +43,7 @@ from walkerlab.mechanics.standing import (
     linked,
     step_lengths,
 )
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
 from walkerlab.solvers.system import State

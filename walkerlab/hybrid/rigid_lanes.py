@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel, vector
 from walkerlab.mechanics.hinges import SpringDamper, hinge_torque
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import Standing
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of

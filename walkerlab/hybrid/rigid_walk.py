@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start, observe_strike
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
@@ -27,6 +26,7 @@ from walkerlab.mechanics.standing import (
     hip_height,
     swing_foot_motion,
 )
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import FALLING, NO_CROSSING, RISING, CrossingFinder, first_crossing, value_at
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 
 Array = NDArray[np.float64]
 

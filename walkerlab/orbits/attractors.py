@@ -15,11 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.bifurcations import eigenvector
 from walkerlab.orbits.families import GaitPoint, Seed
 from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.step_map import StepMap
+from walkerlab.outcome import Outcome
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
 REPEATS = 1e-5  # distance of points that are called the same

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.rigid_lanes import (
     GOES_ON,
     REJECTED,
@@ -28,6 +27,7 @@ from walkerlab.hybrid.rigid_walk import hip_above_fall
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import Shooting, section_of
 from walkerlab.orbits.shooting import on_section as state_on_section
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
 Floats = NDArray[np.float64]

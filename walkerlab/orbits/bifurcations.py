@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.continuation import Segment, Solved, root_along
 from walkerlab.orbits.newton import Evaluated, Floats
 from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
+from walkerlab.outcome import Outcome
 
 Kind = Literal["fold", "flip", "torus"]
 KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.contact_map import SectionStep, coordinates_of, step_from_section
 from walkerlab.orbits.continuation import Follower, Strides, Way
 from walkerlab.orbits.newton import Evaluated, NotConverged, newton
 from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 

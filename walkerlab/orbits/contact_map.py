@@ -21,15 +21,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.compliant import STANCE_FOOT
 from walkerlab.ground.knees import IdealLock
-from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, has_ground_in_air
+from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker, feet_motion, folded, on_ground
 from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, MappedStep, Monitor, StepMap, no_step
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -171,7 +170,7 @@ def step_from_section(
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     if derived:  # the flow's, less how it shifts the moment at which the feet pass
-        system = on_ground(walker, walk_state.has_ground, walk_state.knee, feet=walk_state.feet)
+        system = on_ground(walker, walk_state.has_ground, walk_state.knee, feet=walk_state.feet, level=walk_state.level)
         rate = rate_of(system, folded(system.form, end), end.size)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]

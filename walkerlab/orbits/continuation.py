@@ -14,8 +14,8 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, Floats, NotConverged, newton
+from walkerlab.outcome import Outcome
 
 D = TypeVar("D")
 FEW_CORRECTIONS = 3

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.bifurcations import (
     KINDS,
     Bifurcation,
@@ -27,6 +26,7 @@ from walkerlab.orbits.bifurcations import (
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
 from walkerlab.orbits.newton import Floats, NotConverged
 from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, multipliers_of, strike_to_strike
+from walkerlab.outcome import TOLD, Outcome
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
@@ -374,18 +374,5 @@ def why_lost(lost: NotConverged) -> str:
     """Why a branch goes no further, in words."""
     if lost.outcome is Outcome.WALKED:
         return "Newton's method finds no further gait"
-    if lost.outcome is Outcome.REJECTED:
-        return "no walker has the parameter's next value"
-    return f"{lost.outcome.label}: {WHY[lost.outcome]}"
-
-
-WHY = {
-    Outcome.FELL: "the walker falls before the foot comes down",
-    Outcome.OFF_PAD: "the swinging foot meets a pad's flank, or its own pad again",
-    Outcome.LIFTED_OFF: "the ground would have to pull",
-    Outcome.SLID: "the stance foot slides away",
-    Outcome.NO_HEEL_STRIKE: "the swinging foot does not come down",
-    Outcome.BUDGET_EXHAUSTED: "a step takes more right-hand sides than it may",
-    Outcome.SOLVER_FAILED: "the solver's step fell to rounding, or the energy balance does not close",
-    Outcome.BENT_KNEE: "the foot comes down on a knee that has not locked",
-}
+    aside = "" if lost.outcome is Outcome.REJECTED else f"{lost.outcome.label}: "
+    return f"{aside}{TOLD[lost.outcome].why}"

@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.robustness import Standpoint, quotient, sensitivity
 from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.outcome import Outcome
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 
 Floats = NDArray[np.float64]
 D = TypeVar("D")

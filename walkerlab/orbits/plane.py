@@ -19,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.attractors import settled
 from walkerlab.orbits.bifurcations import Bifurcation, Kind, critical_value, eigenvector
 from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
 from walkerlab.orbits.families import BranchEnd, BranchFollower, GaitBranch, ValueSpan, why_lost
 from walkerlab.orbits.newton import Equations, Evaluated, Floats, NotConverged
 from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
+from walkerlab.outcome import Outcome
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
 CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)

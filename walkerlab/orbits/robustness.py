@@ -21,8 +21,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
+from walkerlab.outcome import Outcome
 
 Floats = NDArray[np.float64]
 Disturbance = Literal["floor-drop", "hip-push"]

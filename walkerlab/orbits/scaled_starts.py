@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import Standing
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.stepping import RHS
 from walkerlab.solvers.system import State

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
@@ -25,6 +24,7 @@ from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Sta
 from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for

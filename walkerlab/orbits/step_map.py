@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.orbits.newton import Evaluated, NotConverged, newton
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
 Floats = NDArray[np.float64]

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from walkerlab.ground.walker import ContactWalker, on_ground
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
+from walkerlab.outcome import Outcome
 from walkerlab.paper.measured import TIGHT
 from walkerlab.paper.printed import adams_start_as_printed
 from walkerlab.paper.prose import prose
@@ -132,7 +132,7 @@ def forces_of(
     if samples is None:
         raise ValueError("the walk was not sampled")
     feet, dissipated = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
-    sampled_feet(walker, samples.states, samples.has_ground, feet)
+    sampled_feet(walker, samples.states, samples.has_ground, samples.level, feet)
     system = on_ground(walker, (False, False))
-    sampled_energies(system, samples.states, samples.has_ground, samples.knees, dissipated)
+    sampled_energies(system, samples.states, samples.has_ground, samples.knees, samples.level, dissipated)
     return samples.time_s, feet[:, :, 2], dissipated[:, 0] + dissipated[:, 1]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from walkerlab.outcome import TOLD, Outcome, outcome_of
 from walkerlab.report.numbers import count, listed, quantity
 from walkerlab.report.tables import Tone
 
@@ -10,26 +11,13 @@ RIGID, CONTACT = "simulate", "contact-sim"
 MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
 """The stages that walk, and what they walk."""
 
-WALKED = "walked"
-
-ENDS = {
-    "walked": "walks to the end",
-    "fell": "falls",
-    "off-pad": "trips on a pad",
-    "lifted-off": "leaves the ground",
-    "slid": "slides away",
-    "no-heel-strike": "never reaches a heel strike",
-    "bent-knee": "lands on a bent knee",
-    "budget-exhausted": "exhausts its evaluation budget",
-    "solver-failed": "makes the solver fail",
-    "rejected": "starts in a state that is not allowed",
-}
-"""What a walker does in the end, by the outcome of its walk."""
+WALKED = Outcome.WALKED.label
 
 
 def ends(outcome: str) -> str:
     """What a walker does in the end; an outcome that this version does not know keeps its name."""
-    return ENDS.get(outcome, f"ends as {outcome}")
+    known = outcome_of(outcome)
+    return f"ends as {outcome}" if known is None else TOLD[known].does
 
 
 def walks(steps: int, outcome: str) -> str:

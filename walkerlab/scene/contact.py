@@ -12,15 +12,11 @@ import numpy as np
 from walkerlab.config.drives import Hip
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
-from walkerlab.ground.compliant import (
-    STANCE_FOOT,
-    KneeRules,
-    contact_walker,
-)
+from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import RestingFoot, resting_foot
-from walkerlab.ground.terrain import Terrain, after_mid_swing, checkerboard, plane
+from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker, changed_forms, floating_state
 from walkerlab.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, walk_contact
@@ -56,10 +52,21 @@ class ContactScene:
         return JudgedGround(self.terrain, self.frame)
 
     def walk(
-        self, start: State, steps: int, tolerances: Tolerances, sampling: float | Floats | None = None
+        self,
+        start: State,
+        steps: int,
+        tolerances: Tolerances,
+        sampling: float | Floats | None = None,
+        heights: Floats | None = None,
     ) -> ContactWalkResult:
-        """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`."""
-        return walk_contact(self.walker, self.ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
+        """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
+
+        heights  (footholds,) m over the slope, the start's first; even ground without
+        """
+        ground = (
+            self.ground if heights is None else self.ground._replace(terrain=self.terrain._replace(heights=heights))
+        )
+        return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:

@@ -7,23 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from walkerlab.config.walkers import Kneed
+from walkerlab.outcome import TOLD, Outcome, outcome_of
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-WALKED: Final = "walked"
-WHAT: Final = {
-    "fell": "fell",
-    "off-pad": "met the flank of a pad or tripped over the pad they had left (off-pad)",
-    "lifted-off": "left the ground (lifted-off)",
-    "slid": "slid away (slid)",
-    "no-heel-strike": "never came to a heel strike (no-heel-strike)",
-    "bent-knee": "came down on a bent knee (bent-knee)",
-    "budget-exhausted": "exhausted their budget of right-hand sides (budget-exhausted)",
-    "solver-failed": "made the solver fail (solver-failed)",
-    "rejected": "began in a state that is not allowed (rejected)",
-}
-"""What walks did in the end, by outcome."""
 GROUNDS: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",
@@ -63,12 +51,14 @@ def endings(
 
     Returns for each `outcome`, `walks`, `of`, whether the `ground` has to do with it, and all that in words: `said`.
     """
-    total = sum(walks for outcome, walks in outcomes.items() if outcome in WHAT or outcome == WALKED)
+    total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
     rows = []
     for outcome, walks in sorted(outcomes.items(), key=lambda one: -one[1]):
-        if outcome in WHAT:
+        known = outcome_of(outcome)
+        if known is not None and known is not Outcome.WALKED:
             why = causes(outcome, config, contact, pads)
-            said = " ".join([f"{walks:,} of {total:,} walks {WHAT[outcome]}.", *why])
+            aside = "" if TOLD[known].did == outcome else f" ({outcome})"
+            said = " ".join([f"{walks:,} of {total:,} walks {TOLD[known].did}{aside}.", *why])
             rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": said})
     return rows
 

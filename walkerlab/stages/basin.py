@@ -15,7 +15,6 @@ from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.reads import BasinConfig, RigidConfig
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.mechanics.standing import Standing
@@ -36,6 +35,7 @@ from walkerlab.orbits.basin import (
 from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker

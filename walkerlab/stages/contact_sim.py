@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
+from walkerlab.ground.compliant import hinge_of
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
@@ -25,6 +26,7 @@ from walkerlab.scene.contact import (
     wants_own_pitch,
     with_contact,
 )
+from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
@@ -54,11 +56,12 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     start, steps = start_state(scene, rigid_state), 2 * config.strides
     tolerances = tolerances_of(config, steps)
     interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
+    heights = foothold_heights(config.ground, steps + 1)
     tell_unresolved_slip(tolerances.atol, scene, progress)
 
     def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
-        taken = scene.walk(start, steps, tolerances, interval if sampled else None)
+        taken = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
         progress.advance()
         return taken
 
@@ -169,14 +172,14 @@ def trajectory_group(
     """Samples of the walk: what `outputs` asks for."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
     feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
+    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
-        variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1])
+        variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
     if "energies" in config.outputs:
         footholds = np.append(feet[:1, STANCE_FOOT, 0], walk.touch_along_m)
         step = np.searchsorted(walk.touch_time_s, samples.time_s, side="right")
-        variables |= energy_variables(scene, samples, footholds[step])
+        variables |= energy_variables(scene, samples, footholds[step], walk.ground_m[step])
     if "forces" in config.outputs:
         depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
         variables |= over_time(
@@ -216,17 +219,18 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     return found
 
 
-def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats) -> dict[str, Variable]:
+def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats, up: Floats) -> dict[str, Variable]:
     """Energies as the paper plots them, from the current foothold, and the energy balance from a fixed origin.
 
-    foothold  (samples,) m, where along the slope the stance foot touched
+    foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
     """
     energies = np.zeros((samples.time_s.size, 3))
     system = on_ground(scene.walker, (False, False))
-    sampled_energies(system, samples.states, samples.has_ground, samples.knees, energies)
+    sampled_energies(system, samples.states, samples.has_ground, samples.knees, samples.level, energies)
     kinetic, potential, total = energies.T
     given = samples.driven_J.T
-    lost, at_foothold = samples.dissipated_J, -scene.walker.mass * scene.walker.gravity_along * foothold
+    lost, walker = samples.dissipated_J, scene.walker
+    at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
     return over_time(
         kinetic_J=kinetic,
         potential_J=potential - at_foothold,

@@ -49,7 +49,8 @@ from walkerlab.orbits.plane import BifurcationCurve, Regions, curve_through, reg
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, gait_near, strike_to_strike
-from walkerlab.scene.endings import WHAT, causes, without_pads
+from walkerlab.outcome import outcome_of
+from walkerlab.scene.endings import causes, without_pads
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.parts import assembly_of
@@ -578,7 +579,7 @@ def ending_rows(followed: Followed, parameter: Parameter, config: ContactConfig)
         gait = f"the {followed.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
             outcome = end.reason.partition(":")[0]
-            if outcome in WHAT:
+            if outcome_of(outcome) is not None:
                 why = causes(outcome, config, followed.model == CONTACT)
                 said = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
                 yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": said}

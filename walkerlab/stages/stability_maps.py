@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.reads import MapsConfig
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.stages.pieces import complete
 from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import OUTCOMES, counted

@@ -9,10 +9,9 @@ import numpy as np
 
 from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
-from walkerlab.ground.compliant import STANCE_FOOT
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
@@ -20,6 +19,7 @@ from walkerlab.orbits import scaled_starts
 from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
 from walkerlab.orbits.contact_map import angled_bodies, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
+from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from walkerlab.config.reads import SceneConfig, SimulateConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import WalkRecord
 from walkerlab.labels import Label
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.numerical_error import numerical_error

@@ -9,7 +9,7 @@ import numpy as np
 
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import METHODS, Method, method_named
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.ordinary import Choice, choices

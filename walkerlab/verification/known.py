@@ -24,9 +24,9 @@ from walkerlab.ground.walker import ContactWalker, one_foot_motion
 from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.labels import Label
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import normal_law
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State

@@ -128,7 +128,7 @@ def unsettled(times: Array, rate: Array) -> Array:
 def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig) -> Array:
     """Force along and up from the slope (N), and torque about a point of the slope (N m), of ground and gravity."""
     feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, feet)
+    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
     along, height, normal, friction = np.moveaxis(feet[:, :, :4], 2, 0)
     slope = config.slope_rad
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult
-from walkerlab.hybrid.outcome import Outcome
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import Gait, find_gaits
+from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker

@@ -21,7 +21,7 @@ from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.walker import folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import derivative
 

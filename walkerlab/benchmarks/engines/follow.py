@@ -19,7 +19,7 @@ from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_k
 from walkerlab.hybrid import contact_events, contact_rules
 from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.solvers.scipy_methods import entry_point
 
 Floats = NDArray[np.float64]

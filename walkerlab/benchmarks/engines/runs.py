@@ -15,7 +15,7 @@ from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.hybrid.contact_events import STEPS
 from walkerlab.hybrid.contact_rules import steps_with_lift
-from walkerlab.hybrid.outcome import Outcome
+from walkerlab.outcome import Outcome
 
 Floats = NDArray[np.float64]
 ROUNDING = 1e-9

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
-from walkerlab.ground.compliant import STANCE_FOOT, hinge_of
+from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.knees import IdealLock
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import knees_at_start

@@ -20,12 +20,13 @@ NORMS = (
     Column("direct", "direct", lambda value: number(value, 5), numeric=True),
     Column("scaled", "scaled", lambda value: number(value, 6), numeric=True),
 )
+BOUND = {"lower-bound": "> "}
 ROUGH = (
     MODEL,
     Column("roughness", "roughness_m", length, numeric=True),
     Column(
         "mean steps",
-        lambda row: ("> " if row["method"] == "lower-bound" else "") + number(row["mean_steps"], 4),
+        lambda row: BOUND.get(row["method"], "") + number(row["mean_steps"], 4),
         numeric=True,
     ),
     Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
@@ -60,10 +61,8 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Norms, rough ground and what moves the gait."""
     found = []
-    if summary["gait_sensitivity_norm"]:
-        found.append(
-            table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms"))
-        )
+    if norms := summary["gait_sensitivity_norm"]:
+        found.append(table("Gait sensitivity norms", NORMS, norms, note=words("robustness.norms")))
     if summary["rough_ground"]:
         found.append(table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")))
     moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]

@@ -1,0 +1,141 @@
+"""How a walk ends: a value with its words, advice and colour, never an exception."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class Outcome(IntEnum):
+    """Fate of a walk; the number is what kernels return, and TOLD what is said of it."""
+
+    WALKED = 0
+    FELL = 1
+    OFF_PAD = 2
+    LIFTED_OFF = 3
+    SLID = 4
+    NO_HEEL_STRIKE = 5
+    BUDGET_EXHAUSTED = 6
+    SOLVER_FAILED = 7
+    REJECTED = 8
+    BENT_KNEE = 9
+    STUBBED = 10
+
+    @property
+    def label(self) -> str:
+        """The outcome as it is written in tables and JSON."""
+        return self.name.lower().replace("_", "-")
+
+    @property
+    def answered(self) -> bool:
+        """Whether the question was answered: a walker that falls is an answer, a failed solver is not."""
+        return self not in (Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
+
+    @property
+    def stumbled(self) -> bool:
+        """Whether the walker itself could not go on."""
+        return self.answered and self not in (Outcome.WALKED, Outcome.REJECTED)
+
+    @property
+    def advice(self) -> str:
+        """What the outcome means and what to try next."""
+        return TOLD[self].advice
+
+
+def outcome_of(label: str) -> Outcome | None:
+    """The outcome of a label; None if this version knows none."""
+    return next((one for one in Outcome if one.label == label), None)
+
+
+class Told(NamedTuple):
+    """What is said of an outcome."""
+
+    does: str  # what a walker does in the end
+    did: str  # what walks did, behind how many
+    why: str  # why a family of gaits ends there
+    colour: str  # on maps: full for what walks, pale for what fails
+    advice: str  # what it means and what to try next
+
+
+TOLD = {
+    Outcome.WALKED: Told(
+        "walks to the end",
+        "walked on",
+        "",
+        "#56B4E9",
+        "The walker took every step it was asked for.",
+    ),
+    Outcome.FELL: Told(
+        "falls",
+        "fell",
+        "the walker falls before the foot comes down",
+        "#EDEDED",
+        "The hip came below half a leg above the slope; start nearer to a gait (start: fixed-point).",
+    ),
+    Outcome.OFF_PAD: Told(
+        "trips on a pad",
+        "met the flank of a pad or tripped over the pad they had left",
+        "the swinging foot meets a pad's flank, or its own pad again",
+        "#F7CF85",
+        "A foot met the flank of a pad below its top, or tripped over the pad it had left: the steps do not fit the "
+        "pads; try contact.terrain: after-mid-swing, or another contact.pad_pitch.",
+    ),
+    Outcome.LIFTED_OFF: Told(
+        "leaves the ground",
+        "left the ground",
+        "the ground would have to pull",
+        "#DDB3CC",
+        "The walker left the ground: no foot was in contact for a quarter of a pendulum time or, in the rigid model, "
+        "the ground would have had to pull; slow the start down, or stiffen or damp the contact.",
+    ),
+    Outcome.SLID: Told(
+        "slides away",
+        "slid away",
+        "the stance foot slides away",
+        "#A6D3B4",
+        "The stance foot slid by more than a quarter of a step; raise friction or lower the stiction velocity.",
+    ),
+    Outcome.NO_HEEL_STRIKE: Told(
+        "never reaches a heel strike",
+        "never came to a heel strike",
+        "the swinging foot does not come down",
+        "#7F7F7F",
+        "The swing foot did not come down within ten pendulum times; the start is far from walking.",
+    ),
+    Outcome.BUDGET_EXHAUSTED: Told(
+        "exhausts its evaluation budget",
+        "exhausted their budget of right-hand sides",
+        "a step takes more right-hand sides than it may",
+        "#000000",
+        "The run exhausted its evaluation budget; loosen solver.*.rtol, soften the contact, or ask for fewer strides.",
+    ),
+    Outcome.SOLVER_FAILED: Told(
+        "makes the solver fail",
+        "made the solver fail",
+        "the solver's step fell to rounding, or the energy balance does not close",
+        "#5B3A1E",
+        "The step size fell to rounding, or the energy balance does not close; choose another solver.*.rtol or "
+        "solver.*.method.",
+    ),
+    Outcome.REJECTED: Told(
+        "starts in a state that is not allowed",
+        "began in a state that is not allowed",
+        "no walker has the parameter's next value",
+        "#FFFFFF",
+        "The start is not a state this walker can be in.",
+    ),
+    Outcome.BENT_KNEE: Told(
+        "lands on a bent knee",
+        "came down on a bent knee",
+        "the foot comes down on a knee that has not locked",
+        "#A9B8E0",
+        "A foot came down on a knee that had not locked; start nearer to a gait (start: fixed-point), or, on compliant "
+        "ground, release the trailing knee by compression (walker.knee.release).",
+    ),
+    Outcome.STUBBED: Told(
+        "stubs its foot",
+        "stubbed a foot",
+        "the swinging foot is below its next foothold as the feet pass",
+        "#E7C9A9",
+        "The swing foot was below its next foothold when the feet passed each other; lower the footholds (ground), or "
+        "try contact.terrain: after-mid-swing.",
+    ),
+}
