@@ -22,11 +22,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.ground.knees import IdealLock
-from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
-from walkerlab.ground.walker import ContactWalker, feet_motion, folded, on_ground
-from walkerlab.hybrid.contact_events import PASSING, JudgedGround, WalkState, material_along
+from walkerlab.ground.terrain import (
+    STANCE_FOOT,
+    Terrain,
+    after_mid_swing,
+    checkerboard,
+    foothold_height,
+    has_ground_in_air,
+)
+from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded, on_ground, sines_cosines, unfolded
+from walkerlab.hybrid.contact_events import HEIGHT as HEIGHT_OF_FOOT
+from walkerlab.hybrid.contact_events import PASSING, PER_FOOT, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
-from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_observer import ContactObserver
+from walkerlab.hybrid.contact_run import Stopped, new_observer, new_walk_state, walk_on
+from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.mechanics.tree import add_inertia
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, MappedStep, Monitor, StepMap, no_step
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
@@ -55,6 +66,8 @@ class SectionStep:
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     touch_s: float  # from the section to the touch
     spacing_m: float  # between the feet at the touch
+    reach_m: float  # from where the stance foot is on the section to the touch
+    advance_m: float  # of the foot that touched, from its touch to the section
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
@@ -146,24 +159,32 @@ def step_from_section(
     z: Floats,
     pitch_m: float,
     derived: bool = True,
+    rise: float = 0.0,
+    push: float = 0.0,
 ) -> SectionStep:
     """Walk from the section to the section.
 
-    z        section coordinates
+    z        section coordinates, the height over the present foothold
     pitch_m  what the pads are laid for
     derived  whether the derivative is wanted
+    rise     m, of the next foothold over the present one
+    push     N s, an impulse at the hip along the slope as the foot touches; on the ground of one's own, not derived
     """
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
     if ground.terrain.has_pads:  # the standing foot in the middle of one
         foothold = feet_motion(walker.whole, start)[stance].along
         laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
+    if rise != 0.0:
+        laid = laid._replace(terrain=laid.terrain._replace(heights=np.array([0.0, rise])))
     walk_state = new_walk_state(walker, laid.terrain, stance, 2, start)
     stand_on_section(walk_state, walker, laid, start, stance)
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
         observer.tangent.Phi[:, :] = directions(walker, start, stance)
-    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    stopped = Stopped(Outcome.STUBBED, 0.0, start, np.zeros(4, np.int64))
+    if rise == 0.0 or walk_state.has_ground[1 - stance] != 0 or laid.terrain.order_matters:
+        stopped = walk_pushed(walker, laid, tolerances, walk_state, observer, start, push)
     end, landed = np.array(stopped.state), 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
@@ -179,6 +200,8 @@ def step_from_section(
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
     lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
+    foothold = feet_motion(walker.whole, start)[stance].along
+    end[HEIGHT] -= rise
     return SectionStep(
         stopped.outcome,
         coordinates_of(walker, end, landed),
@@ -192,7 +215,56 @@ def step_from_section(
         stopped.work,
         float(walk_state.touch_time[0]),
         float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
+        float(walk_state.touch_along[0] - foothold),
+        float(along - walk_state.foothold[landed]),
     )
+
+
+def walk_pushed(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    walk_state: WalkState,
+    observer: ContactObserver,
+    start: State,
+    push: float,
+) -> Stopped:
+    """Walk from the section to the section, with an impulse (N s) at the hip along the slope at the touch between."""
+    if push == 0.0:
+        return walk_on(walker, ground, tolerances, walk_state, observer, start, 1)
+    until_touch = resized(walk_state, 1)
+    touched = walk_on(walker, ground, tolerances, until_touch, observer, start)
+    if touched.outcome is not Outcome.WALKED:
+        return touched
+    for before, after in zip(until_touch, walk_state, strict=True):
+        after[: len(before)] = before
+    pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, touched.state, push)
+    return walk_on(walker, ground, tolerances, walk_state, new_observer(walker, walk_state, pushed), pushed, 1)
+
+
+def resized(walk_state: WalkState, steps: int) -> WalkState:
+    """The walk state with room for fewer steps; what is not counted in steps is a copy."""
+    of_steps = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
+    room = {name: getattr(walk_state, name)[:steps] for name in of_steps}
+    return WalkState(**{**{k: v.copy() for k, v in walk_state._asdict().items()}, **room})
+
+
+def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
+    """A state of the free walker, its velocities changed by an impulse (N s) at the hip along the slope."""
+    form, new = system.form, np.array(state)
+    y = folded(form, new)
+    n, half = int(form.bodies), int(form.places + form.bodies)
+    s, c, r = np.zeros((3, n))
+    M = np.zeros((n, n))
+    sines_cosines(form, y, s, c)
+    add_inertia(form, n, s, c, y[half + 2 :], M, r)
+    r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M, r)
+    solve_linked(links, 0, M, r)
+    y[half] += impulse / form.mass
+    y[half + 2 :] += r
+    return tuple(unfolded(form, y, walker.size).tolist())
 
 
 def stand_on_section(
@@ -204,7 +276,10 @@ def stand_on_section(
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
-    above = feet[swing].height > 0.0
+    walk_state.level[swing] = foothold_height(ground.terrain, 1)
+    above = feet[swing].height > walk_state.level[swing]
+    if walk_state.level[swing] != 0.0:
+        walk_state.sides[swing * PER_FOOT + HEIGHT_OF_FOOT] = 1 if above else -1
     walk_state.has_ground[swing] = above and has_ground_in_air(
         ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
@@ -261,12 +336,20 @@ class ContactMap(StepMap):
         """Coordinates of a point of the section in SI."""
         return np.asarray(z / self._units)
 
-    def _walk(self, here: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+    def _walk(
+        self,
+        here: WalkerOnGround,
+        z: Floats,
+        derived: bool,
+        terrain: Terrain | None = None,
+        rise: float = 0.0,
+        push: float = 0.0,
+    ) -> SectionStep:
         own, frame = here.ground
         terrain = terrain or (after_mid_swing(self._measure) if own.has_pads else own)
         measure = terrain.stride_measure if terrain.has_pads else self._measure
         ground = JudgedGround(terrain, frame)
-        return step_from_section(here.walker, ground, self.tolerances, z * self._units, measure, derived)
+        return step_from_section(here.walker, ground, self.tolerances, z * self._units, measure, derived, rise, push)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """One step, with its exact derivative along the section."""
@@ -301,8 +384,25 @@ class ContactMap(StepMap):
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m), after a push as the feet pass."""
-        raise NotImplementedError
+        """Walk over footholds (m); a push comes with a first touch that is not among the steps."""
+        here = self._at(p)
+        assert here is not None, "what is disturbed has a gait"
+        rises, before = np.diff(heights_m).tolist(), self._walk(here, z, False)
+        durations, lengths, points = list[float](), list[float](), list[Floats]()
+        if push_N_s != 0.0:
+            before = self._walk(here, z, False, push=push_N_s)
+            z = before.z / self._units
+        for rise in rises:
+            if before.outcome is not Outcome.WALKED:
+                break
+            step = self._walk(here, z, False, rise=rise)
+            if step.outcome is Outcome.WALKED:
+                durations.append(before.period_s - before.touch_s + step.touch_s)
+                lengths.append(before.advance_m + step.reach_m)
+                z = step.z / self._units
+                points.append(z)
+            before = step
+        return DisturbedWalk(before.outcome, np.array(durations), np.array(lengths), np.array(points))
 
     def at(self, tolerances: Tolerances) -> ContactMap:
         """The same map, its steps integrated otherwise."""

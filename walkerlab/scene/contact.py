@@ -30,6 +30,7 @@ from walkerlab.solvers.system import State
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact
     from walkerlab.config.reads import ContactConfig
+    from walkerlab.config.schema import Config
 
 GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
@@ -157,6 +158,14 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
+
+
+def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+    """`contact_gait` on a plane that lets scuffing feet through where the config has pads."""
+    contact = with_contact(config)
+    if contact.terrain == "checkerboard":
+        config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
+    return contact_gait(config, rigid_step_length_m, rigid_state)
 
 
 def wants_own_pitch(contact: Contact) -> bool:

@@ -344,7 +344,7 @@ def rigid_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed,
 
 def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followed, BranchFollower | None]:
     """The branch of the contact model's gait, and the cascade beyond its flips."""
-    from walkerlab.scene.contact import contact_gait
+    from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
     for value in asked.looked_at():
@@ -352,10 +352,7 @@ def contact_branches(asked: FamilyQuestion, progress: Progress) -> tuple[Followe
         rigid = None if changed is None else find_gaits(rigid_walker(changed, changed.equations), changed.seed).gait
         if changed is None or changed.contact is None or rigid is None:
             continue
-        contact = changed.contact
-        if contact.terrain == "checkerboard":
-            contact = contact.model_copy(update={"terrain": "after-mid-swing"})
-        found = contact_gait(changed.model_copy(update={"contact": contact}), rigid.step_length, rigid.state)
+        found = gait_off_pads(changed, rigid.step_length, rigid.state)
         if found.gait is None:
             progress.note(f"contact model at {value:g} {asked.parameter.unit}: {found.reason}")
             continue

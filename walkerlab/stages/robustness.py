@@ -15,6 +15,7 @@ from walkerlab.config.reads import RobustnessConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
@@ -31,9 +32,11 @@ from walkerlab.orbits.robustness import (
 )
 from walkerlab.orbits.shooting import EXACT, QUICK
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.scene.families import rigid_map
+from walkerlab.orbits.step_map import StepMap
+from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.pieces import Piece, complete
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import rows_group
@@ -45,6 +48,7 @@ Floats = NDArray[np.float64]
 Rows = list[dict[str, Any]]
 
 RIGID: Final = "rigid"
+QUICK_CONTACT: Final = Tolerances("radau5", 1e-6, 1e-8, 1_000_000)  # of one step
 WALKS_AT_ONCE: Final = 25
 MAX_STEPS: Final = {RIGID: 2_000_000, "contact": 40_000}
 """On one rough ground, all walks together."""
@@ -145,20 +149,27 @@ def refuse(config: RobustnessConfig) -> None:
 class Subject:
     """A model whose gait is disturbed, as other processes are handed it.
 
-    config  whose scene it walks in
-    z       (d,) the gait on the section
-    scales  of the walker
+    config    whose scene it walks in
+    z         (d,) the gait on the section
+    scales    of the walker
+    length_m  of its steps
     """
 
     model: str
     config: RobustnessConfig
     z: Floats
     scales: Scales
+    length_m: float
 
     def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
         """The gait on the step map over a parameter."""
         p = parameter.value_in(self.config)
-        step_map = rigid_map(self.config, parameter, 1.0).at(EXACT if exact else QUICK)
+        step_map: StepMap
+        if self.model == RIGID:
+            step_map = rigid_map(self.config, parameter, 1.0).at(EXACT if exact else QUICK)
+        else:
+            whole = contact_map(self.config, parameter, 1.0, self.length_m)
+            step_map = whole if exact else whole.at(QUICK_CONTACT)
         return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, self.scales)
 
 
@@ -170,7 +181,31 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
     _, units = unit_walker(walker)
     z = np.array(gait["state"])[walker.section[: walker.coordinates]]
     z[1:] *= units.time
-    yield Subject(RIGID, config, z, Scales(units.length, units.time, units.impulse))
+    scales, length = Scales(units.length, units.time, units.impulse), float(gait["step_length_m"])
+    asked = config.robustness.model or ("rigid" if config.contact is None else "both")
+    if asked != "contact":
+        yield Subject(RIGID, config, z, scales, length)
+    if asked != RIGID:
+        yield contact_subject(config, gait, scales, length, progress)
+
+
+def contact_subject(
+    config: RobustnessConfig, gait: Mapping[str, Any], scales: Scales, length: float, progress: Progress
+) -> Subject:
+    """The contact model, off its pads; raises NoAnswer if it has no gait."""
+    # Imported here: the rigid model alone does without.
+    from walkerlab.scene.contact import gait_off_pads, with_contact
+
+    own = SLOPE.config_at(config, config.slope_rad)
+    assert own is not None, "a config keeps its slope"
+    found = gait_off_pads(own, length, as_state(gait["state"]))
+    if found.gait is None:
+        raise NoAnswer(f"no gait of the contact model: {found.reason}", found.advice)
+    if with_contact(config).terrain == "checkerboard":
+        progress.note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
+    length = found.gait.step.length_m
+    z = contact_map(config, SLOPE, 1.0, length).of_section(found.gait.z)
+    return Subject("contact", config, z, scales, length)
 
 
 def norms(model: str, here: Standpoint) -> Rows:
