@@ -59,12 +59,15 @@ def test_kuos_gaits(name):
     assert gait.multipliers[:2] == pytest.approx(multipliers, abs=1e-9)
 
 
+LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
+
+
 def test_the_papers_compass_on_the_level():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
     walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
-    assert gait.state == pytest.approx((-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402), abs=1e-9)
+    assert gait.state == pytest.approx(LEVEL, abs=1e-9)
     assert (gait.period, gait.step_length) == pytest.approx((0.5791508912, 0.3839097737), abs=1e-9)
 
 
@@ -145,6 +148,13 @@ def test_the_energies_of_a_driven_walk_balance(name):
     assert sum(gait.work.values()) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
     off = with_scaled_rates(walker, gait.state, 1.01, 1.02)
     assert take_walk(walker, EXACT, off, 2).energy_balance_residual < 1e-11 * weight
+
+
+def test_a_hips_damper_takes_the_integral_of_its_power():
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0, hip_damping=0.1), 0.0)
+    walk = take_walk(walker, EXACT, LEVEL, 1, sampled=True)
+    y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
+    assert walk.driven.hip == pytest.approx(-np.trapezoid(0.1 * (y[:, 2] - y[:, 3]) ** 2, t), rel=1e-3)
 
 
 def test_of_a_hip_torques_work_that_is_spent_which_is_positive():

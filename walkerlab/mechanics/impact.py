@@ -112,15 +112,6 @@ def push_off_of(model: Standing, new: Any) -> PushOff:
 
 
 @inlined
-def push_off_work(model: Standing, new: Any) -> float:
-    """Work (J) of the push-off of a heel strike, by the state after it.
-
-    The foot rested before; so it is half of the impulse times the velocity after it, along the leg that of the hip.
-    """
-    return 0.5 * push_off_of(model, new).angular * new[len(model.arm_x) + STANCE]
-
-
-@inlined
 def push_off(model: Standing, s_t: float, c_t: float, s_l: float, c_l: float) -> PushOff:
     """The push-off, by sines and cosines of the angles from the slope's normal of trailing and leading leg."""
     R = model.radius
