@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import by_reference, inlined, vector
-from walkerlab.mechanics.impact import push_off_of
+from walkerlab.mechanics.impact import push_off
 from walkerlab.mechanics.standing import STANCE, Mode, energies, ground_reaction, momentum, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
@@ -81,7 +81,7 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
         work[AT_HAND] += energies(model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
-                push = push_off_of(model, after)
+                push = push_off(model, after)
                 along, impulse = along - push.along, impulse - push.upward
                 extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(push.along) / push.upward)
                 given = 0.5 * push.angular * after[len(model.arm_x) + STANCE]  # its foot rested before
