@@ -212,7 +212,16 @@ def light(seed: int) -> Drawn:
     return kneed(seed, LIGHT) if seed % 3 == 2 else compass(seed, LIGHT)
 
 
-WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light}
+def driven(seed: int) -> Drawn:
+    """The same with a spring, a damper and a torque between the legs, for the walker's weight."""
+    one, die = both(seed), random.Random(seed)
+    weight = 1.0 if one.base == "paper" else 0.08
+    keys = {"spring_N_m_per_rad": (0.0, 20.0), "damping_N_m_s_per_rad": (0.0, 0.5), "torque_N_m": (-1.0, 2.0)}
+    hip = tuple(f"walker.hip.{key}={weight * die.uniform(*ends):.4f}" for key, ends in keys.items())
+    return Drawn(one.base, (*one.sets, *hip), one.start)
+
+
+WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven}
 
 
 def plain_scene(config: Config, pitch_m: float) -> plain_walk.Plain:
@@ -225,7 +234,7 @@ def plain_scene(config: Config, pitch_m: float) -> plain_walk.Plain:
         *plain_legs(walker), walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness_N_per_m_e,
         si.exponent, si.damping_N_s_m, si.full_damping_penetration_m, 0.0 if smooth else si.static_friction,
         0.0 if smooth else si.dynamic_friction, si.stiction_velocity_m_s, si.friction_velocity_m_s,
-        TERRAINS[contact.terrain], pitch_m, at_touch(walker),
+        TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
     )  # fmt: skip
 
 

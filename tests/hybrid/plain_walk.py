@@ -51,6 +51,7 @@ class Plain(NamedTuple):
     terrain: int
     pitch: float
     release_at_touch: bool
+    hip: np.ndarray  # (3,) N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
 
 
 class Walked(NamedTuple):
@@ -193,11 +194,16 @@ def matrices(walker, y, hinged, locked):
 
 
 @njit
-def rate(walker, y, hinged, locked, has_ground):
+def rate(walker, y, hinged, locked, has_ground, stance):
     """dy/dt."""
     n = walker.inertias.size
     A, b = matrices(walker, y, hinged, locked)
     dy = np.zeros_like(y)
+    swing = 1 - stance
+    ahead, faster = y[2 + swing] - y[2 + stance], y[4 + n + swing] - y[4 + n + stance]
+    torque = walker.hip[2] - walker.hip[0] * ahead - walker.hip[1] * faster
+    b[2 + swing] += torque
+    b[2 + stance] -= torque
     for foot in range(2):
         _, h, slip, vertical_velocity, _ = foot_at(walker, foot, y)
         if h < 0.0 and has_ground[foot] and foot != hinged:
@@ -247,12 +253,12 @@ def reaction(walker, y, hinged, locked, has_ground):
 
 
 @njit
-def runge_kutta(walker, y, h, hinged, locked, has_ground):
+def runge_kutta(walker, y, h, hinged, locked, has_ground, stance):
     """One step of the classical method."""
-    k1 = rate(walker, y, hinged, locked, has_ground)
-    k2 = rate(walker, y + 0.5 * h * k1, hinged, locked, has_ground)
-    k3 = rate(walker, y + 0.5 * h * k2, hinged, locked, has_ground)
-    k4 = rate(walker, y + h * k3, hinged, locked, has_ground)
+    k1 = rate(walker, y, hinged, locked, has_ground, stance)
+    k2 = rate(walker, y + 0.5 * h * k1, hinged, locked, has_ground, stance)
+    k3 = rate(walker, y + 0.5 * h * k2, hinged, locked, has_ground, stance)
+    k4 = rate(walker, y + h * k3, hinged, locked, has_ground, stance)
     return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
@@ -292,7 +298,7 @@ def energy(walker, y, has_ground):
     for foot in range(2):
         if has_ground[foot]:
             total += stored(walker, foot, y)
-    return total
+    return total + 0.5 * walker.hip[0] * (y[2] - y[3]) ** 2
 
 
 @njit
@@ -364,7 +370,7 @@ def take_steps(walker, y, h, hinged, diary):
         counts[ROUNDS] += 1
         deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
         dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, has_ground)), deadline)
-        new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
+        new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
         g = event_values(walker, new, cells, stance, touched)
         low, high, event = 0.0, dt, -1
         for _ in range(HALVINGS):
@@ -389,11 +395,11 @@ def take_steps(walker, y, h, hinged, diary):
             if high - low < 1e-15:
                 break
             dt = 0.5 * (low + high)
-            new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
+            new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
             g = event_values(walker, new, cells, stance, touched)
         if event >= 0:
             dt = high
-            new = runge_kutta(walker, y, dt, hinged, locked, has_ground)
+            new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
         y = new
         t += dt
         for knee in range(knees):

@@ -28,6 +28,14 @@ def test_a_drawn_walk_differs_from_the_plain_integration_by_no_more_than_their_e
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-5
 
 
+@pytest.mark.parametrize("seed", [1, 7, 38, 44])
+def test_so_does_a_driven_one(campaign, seed):
+    one = campaign.compare(campaign.driven(seed), steps=2)
+    assert one.wrong == []
+    assert one.steps == 2  # the torque has changed legs
+    assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
+
+
 def test_the_walks_of_the_short_campaign_are_on_every_ground(campaign):
     grounds = {campaign.both(seed).ground for seed in SEEDS}
     assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds

@@ -27,9 +27,13 @@ def on_slope(walker, z):
 
 
 def in_lanes(walker, starts, rtol=1e-9, steps=STEPS):
+    return model_in_lanes(assembled(walker), starts, rtol, steps)
+
+
+def model_in_lanes(model, starts, rtol, steps=STEPS):
     strikes = Strikes(np.zeros((len(starts), steps)), np.zeros((len(starts), steps, 4)))
     fates = new_fates(len(starts))
-    walk_lanes(two_legs(assembled(walker)), new_lane_memory(rtol, 1e-2 * rtol), strikes, starts, fates)
+    walk_lanes(two_legs(model), new_lane_memory(rtol, 1e-2 * rtol), strikes, starts, fates)
     return fates, strikes
 
 
@@ -91,3 +95,16 @@ def test_a_walker_that_hangs_on_never_strikes():
 def test_numbers_that_overflow_end_the_walk():
     fates, _ = in_lanes(ONE_DEGREE, on_slope(ONE_DEGREE, (0.1, 1e200, -1e200)))
     assert Outcome(int(fates.outcome[0])) in (Outcome.SOLVER_FAILED, Outcome.BUDGET_EXHAUSTED)
+
+
+def test_driven_walks_in_lanes_walk_as_they_do_one_by_one():
+    driven = assembled(ONE_DEGREE).changed(
+        driven_hip=True, hip_stiffness=5.0, hip_damping=0.1, hip_torque=0.5, push_off=1.0
+    )
+    starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
+    fates, strikes = model_in_lanes(driven, starts, 1e-10)
+    walks = [take_walk(driven, Tolerances("dop853", 1e-11, 1e-13, 10**7), tuple(start), STEPS) for start in starts]
+    assert [walk.steps for walk in walks] == fates.steps.tolist()
+    assert np.count_nonzero(fates.steps) > 8
+    for i, walk in enumerate(walks):
+        assert strikes.after[i, : walk.steps] == pytest.approx(walk.after, abs=1e-6)

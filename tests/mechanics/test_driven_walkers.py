@@ -132,7 +132,9 @@ def test_a_push_off_acts_from_the_trailing_foots_contact_through_the_hip(assembl
         return (ends[0] - ends[1]) / (2.0 * h)
 
     work = 0.5 * float(push @ rate(hip_at, after))
-    assert impact.push_off_work(model, after) == pytest.approx(work, rel=1e-7, abs=1e-7)
+    pushed = impact.push_off(model, np.array(after))
+    assert (pushed.along, pushed.upward) == pytest.approx(tuple(push), abs=1e-9)
+    assert 0.5 * pushed.angular * after[len(y) // 2 + STANCE] == pytest.approx(work, rel=1e-7, abs=1e-7)
     ground = momentum(new_points) - momentum(points) - push
     landing = rate(lambda state, centre: in_motion(assembly, model, state, centre)[2], y)
     landing += (model.radius * y[len(y) // 2 + SWING], 0.0)

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, slope_of, stepped
 
 from walkerlab.config import loader
+from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.shooting import EXACT, Shooting, StepEquations, coordinates_of, section_of
@@ -58,12 +59,15 @@ def test_kuos_gaits(name):
     assert gait.multipliers[:2] == pytest.approx(multipliers, abs=1e-9)
 
 
+LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
+
+
 def test_the_papers_compass_on_the_level():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
     walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
-    assert gait.state == pytest.approx((-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402), abs=1e-9)
+    assert gait.state == pytest.approx(LEVEL, abs=1e-9)
     assert (gait.period, gait.step_length) == pytest.approx((0.5791508912, 0.3839097737), abs=1e-9)
 
 
@@ -120,6 +124,50 @@ def test_torques_that_turn_gravity_walk_a_passive_gait_on_any_slope(slope):
     swing = solve_ivp(rate, (0.0, gait.period), start, "DOP853", rtol=1e-11, atol=1e-12)
     assert heel_strike(turned, swing.y[:, -1]) == pytest.approx(start, abs=1e-6)
     assert math.fsum(swing.y[:2, -1]) == pytest.approx(-2.0 * slope, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["paper", "round-feet", "torso", "kneed", "kneed-round-feet", "simplest"])
+def test_a_passive_gaits_cost_of_transport_is_the_slopes_sine(name):
+    walker = walker_of(name)
+    gait = find_gaits(walker).gait
+    assert gait.cost_of_transport == pytest.approx(math.sin(walker.slope), rel=1e-10)
+    assert gait.work["gravity"] > gait.work["push_off"] == gait.work["hip"] == 0.0
+
+
+DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "driven_hip": True, "hip_stiffness": 10.0, "hip_torque": 0.3}}
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_the_energies_of_a_driven_walk_balance(name):
+    """And what is given in a gait's step is what its strikes take; a spring gives back what it takes."""
+    walker = on_slope(walker_of(name, **DRIVES[name]), 0.0)
+    gait = find_gaits(walker).gait
+    weight = walker.mass * walker.gravity * walker.leg_length
+    walk = take_walk(walker, EXACT, gait.state, 4)
+    assert walk.energy_balance_residual < 1e-11 * weight
+    assert sum(gait.work.values()) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
+    off = with_scaled_rates(walker, gait.state, 1.01, 1.02)
+    assert take_walk(walker, EXACT, off, 2).energy_balance_residual < 1e-11 * weight
+
+
+def test_a_hips_damper_takes_the_integral_of_its_power():
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0, hip_damping=0.1), 0.0)
+    walk = take_walk(walker, EXACT, LEVEL, 1, sampled=True)
+    y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
+    spring = 5.0 * float(np.diff((y[[-1, 0], 0] - y[[-1, 0], 1]) ** 2)[0])
+    damper = -np.trapezoid(0.1 * (y[:, 2] - y[:, 3]) ** 2, t)
+    assert walk.driven.hip - spring == pytest.approx(damper, rel=1e-3)
+
+
+def test_of_a_hip_torques_work_that_is_spent_which_is_positive():
+    """Against an integral of the sampled power; late in the swing the legs turn back."""
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0, hip_torque=0.3), 0.0)
+    walk = take_walk(walker, EXACT, find_gaits(walker).gait.state, 1, sampled=True)
+    y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
+    power = 0.3 * (y[:, 2] - y[:, 3])
+    assert power.min() < 0.0
+    assert walk.driven.forward == pytest.approx(np.trapezoid(np.maximum(power, 0.0), t), rel=1e-3)
+    assert walk.driven.forward > walk.driven.hip
 
 
 HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")

@@ -53,8 +53,9 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
+    driven = f", driven by {listed(summary['driven_by'])}," if summary.get("driven_by") else ""
     head = (
-        f"On a slope of {slope} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
+        f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
         f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
         f"the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
     )
@@ -81,6 +82,8 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
+    *gaits.works("work of", partial(number, digits=4)),
+    told("cost of transport", "cost_of_transport"),
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
     told("energy balance off by", "energy_balance_residual_J", 2),

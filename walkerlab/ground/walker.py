@@ -60,6 +60,8 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     hip_stiffness: float  # N m/rad
     hip_damping: float  # N m s/rad
     hip_torque: float  # N m, on the swing leg
+    push_off: float  # N s, along the trailing leg from a step's touch on
+    push_off_duration: float  # s
     onto: Integers  # (all bodies,) which of these bodies each is
     first: Integers  # (n,) the first of the bodies that each of these is
     mass: float  # kg
@@ -132,6 +134,11 @@ class ContactWalker(NamedTuple):
     def gravity_down(self) -> float:
         """m/s^2, towards the slope."""
         return float(self.whole.gravity_down)
+
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return bool(self.whole.push_off != 0.0 or self.whole.hip_torque != 0.0)
 
     @property
     def gravity(self) -> float:

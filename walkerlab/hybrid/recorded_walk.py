@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
-    HIP,
     INTEGRAL,
     LATEST,
     MAX_FRICTION_RATIO,
@@ -24,7 +23,6 @@ from walkerlab.hybrid.rigid_observer import (
     MIN_NORMAL_FORCE,
     PUSH_OFF,
     STRIKES,
-    TAKEN,
     Observer,
     new_observer,
     observe_start,
@@ -36,6 +34,7 @@ from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
     STANCE,
+    SWING,
     Mode,
     Standing,
     energies,
@@ -130,7 +129,8 @@ class Recorder:
 
     def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
-        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
+        self.walker, self.wanted, self.budget = walker, sampled, tolerances.budget
+        self.sampled = sampled or walker.hip_torque != 0.0
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
@@ -143,7 +143,7 @@ class Recorder:
         first = new_observer(np.zeros(0), self.numbers)
         observe_start(first, Mode(walker, BENT), start)
         self.energy_at_start = float(first.energy[LATEST])
-        self.extremes, self.driven = first.extremes, np.zeros_like(first.work[TAKEN])
+        self.extremes, self.work = first.extremes, np.zeros_like(first.work)
         self.energy_integral, self.duration = 0.0, 0.0
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
@@ -169,7 +169,7 @@ class Recorder:
             worst[index] = min(worst[index], observer.extremes[index])
         for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MAX_IMPULSE_RATIO):
             worst[index] = max(worst[index], observer.extremes[index])
-        self.driven += observer.work[TAKEN]
+        self.work += observer.work
         self.energy_integral += float(observer.energy[INTEGRAL])
         self.duration += float(observer.energy[DURATION])
         strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
@@ -193,17 +193,31 @@ class Recorder:
         durations = np.diff(strikes, prepend=0.0, append=max(self.duration, self.time))
         return float((self.energy_integral - zeros @ durations) / self.duration)
 
-    def _driven_work(self, gravity: float) -> DrivenWork:
-        """What was given over the steps taken, by gravity that much (J)."""
-        weight = float(self.walker.mass * self.walker.gravity)
-        return DrivenWork(weight, gravity, *self.driven[:STRIKES].tolist())
+    def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
+        """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
 
-    def _residual(self, gravity: float) -> float:
-        """How far the energy of the last state is off the start's (J), with all that was given and taken between."""
-        unsprung = self.walker.changed(hip_stiffness=0.0)  # what the spring gives is among the works
+        The balance gives the damper's work, which the states before and after strikes do not tell.
+        """
+        walker, push = self.walker, float(self.work[PUSH_OFF])
+        starts = np.vstack((self.start, after[:-1])) if self.steps else before
+        apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
+        given = [walker.hip_torque * each - 0.5 * walker.hip_stiffness * each * each for each in apart]
+        hip = float((given[1] - given[0]).sum())
+        unsprung = walker.changed(hip_stiffness=0.0)  # what the spring gives is among the works
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        given = gravity + self.driven[PUSH_OFF] + self.driven[HIP] - self.driven[STRIKES]
-        return float(abs(ends[1] - ends[0] - given))
+        left = float(ends[1] - ends[0] - gravity - push - hip + self.work[STRIKES])
+        hip, left = (hip + left, 0.0) if walker.hip_damping else (hip, left)
+        forward = self._forward_work() if walker.hip_torque and self.steps else 0.0
+        return DrivenWork(float(walker.mass * walker.gravity), gravity, push, hip, forward), abs(left)
+
+    def _forward_work(self) -> float:
+        """What of the torque's work is positive (J) in the steps taken."""
+        samples, n, torque = joined(self.pieces), self.numbers // 2, float(self.walker.hip_torque)
+        apart, rate = (samples.state[:, first + SWING] - samples.state[:, first + STANCE] for first in (0, n))
+        within = (samples.step[1:] == samples.step[:-1]) & (samples.step[1:] < self.steps)
+        turned = turning_values(np.diff(samples.time_s), apart, rate)
+        ways = turned - apart[:-1], apart[1:] - turned
+        return float(sum(np.maximum(torque * way[within], 0.0).sum() for way in ways))
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
@@ -233,6 +247,7 @@ class Recorder:
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
         )
+        driven, residual = self._driven_work(before, after, gravity)
         return RigidWalkResult(
             outcome=outcome,
             touch_time_s=strikes,
@@ -241,9 +256,9 @@ class Recorder:
             end_time_s=end_time,
             work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
-            driven=self._driven_work(gravity),
-            energy_balance_residual=self._residual(gravity),
-            lost_in_strikes=float(self.driven[STRIKES]),
+            driven=driven,
+            energy_balance_residual=residual,
+            lost_in_strikes=float(self.work[STRIKES]),
             start=self.start,
             before=before,
             after=after,
@@ -254,7 +269,7 @@ class Recorder:
             max_impulse_ratio=float(self.extremes[MAX_IMPULSE_RATIO]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self._mean_energy(strikes, after),
-            samples=joined(self.pieces) if self.pieces else None,
+            samples=joined(self.pieces) if self.pieces and self.wanted else None,
         )
 
 
@@ -263,6 +278,21 @@ def with_scaled_rates(walker: Standing, state: State, swing: float, stance: floa
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
     return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
+
+
+def turning_values(h: Array, value: Array, rate: Array) -> Array:
+    """Where something turns back between samples (n,) h apart, by Hermite's cubic; its value before where it does not.
+
+    Returns (n - 1,) values.
+    """
+    begin, end, change = h * rate[:-1], h * rate[1:], np.diff(value)
+    square, cube = 3.0 * change - 2.0 * begin - end, begin + end - 2.0 * change
+    turns = begin * end < 0.0
+    root = np.sqrt(np.where(turns, square * square - 3.0 * cube * begin, 0.0))
+    # where the slope, begin + 2 square u + 3 cube u^2, falls or rises through zero between 0 and 1
+    under = square - np.sign(begin) * root
+    u = np.divide(-begin, under, out=np.zeros_like(h), where=turns & (under != 0.0))
+    return np.asarray(value[:-1] + u * (begin + u * (square + u * cube)))
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

@@ -5,19 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.kernels import by_reference, inlined, vector
-from walkerlab.mechanics.hinges import hinge_energy
-from walkerlab.mechanics.impact import push_off_of, push_off_work
-from walkerlab.mechanics.standing import (
-    STANCE,
-    SWING,
-    Mode,
-    Standing,
-    energies,
-    ground_reaction,
-    hip_law,
-    momentum,
-    swing_foot,
-)
+from walkerlab.mechanics.impact import push_off
+from walkerlab.mechanics.standing import STANCE, Mode, energies, ground_reaction, momentum, swing_foot
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
 NO_FORCE = 1e300  # above any normal force
@@ -26,15 +15,10 @@ MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MIN_IMPULSE
 # indices into Observer.energy
 LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
 CLOSER = 3  # parabolas to an extremum
-# indices into Observer.work: rows, and what drives the walker; of the torque's work what is positive; what strikes take
-AT_HAND, TAKEN = 0, 1
-PUSH_OFF, HIP, FORWARD, STRIKES = 0, 1, 2, 3
-TURNING = 4  # secants to where the legs stop moving apart
-# the closed rule of Newton and Cotes on eighths, of order ten
-WEIGHTS = (
-    989.0 / 28350.0, 5888.0 / 28350.0, -928.0 / 28350.0, 10496.0 / 28350.0, -4540.0 / 28350.0, 10496.0 / 28350.0,
-    -928.0 / 28350.0, 5888.0 / 28350.0, 989.0 / 28350.0,
-)  # fmt: skip
+# indices into Observer.work: what strikes take in the step at hand and in the steps taken, and what these push off
+AT_HAND, STRIKES, PUSH_OFF = 0, 1, 2
+# composite Simpson rule on eighths
+SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
 
 @by_reference
@@ -50,7 +34,7 @@ class Observer(NamedTuple):
     # impulses the least normal one N s, and the largest ratio of tangential to normal
     extremes: Any
     energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
-    work: Any  # (2, 4) J, in the step at hand and in the steps taken
+    work: Any  # (3,) J
 
 
 def new_observer(times: Any, numbers: int) -> Observer:
@@ -65,7 +49,7 @@ def new_observer(times: Any, numbers: int) -> Observer:
         np.zeros(1, np.int64),
         extremes,
         np.zeros(5),
-        np.zeros((2, 4)),
+        np.zeros(3),
     )
 
 
@@ -81,7 +65,6 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
         kinetic, potential = energies(mode.model, y)
         observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
         record_extremes(observer, mode, y)
-        observer.work[AT_HAND, HIP] -= hip_potential(mode.model, y)
 
 
 @inlined
@@ -95,61 +78,20 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
         along, normal = momentum(model, before)
         along_after, normal_after = momentum(model, after)
         along, impulse = along_after - along, normal_after - normal
-        work[AT_HAND, HIP] += hip_potential(model, before)
-        work[AT_HAND, STRIKES] += energies(model, before)[0] - energies(model, after)[0]
+        work[AT_HAND] += energies(model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
-                push = push_off_of(model, after)
+                push = push_off(model, after)
                 along, impulse = along - push.along, impulse - push.upward
                 extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(push.along) / push.upward)
-                given = push_off_work(model, after)
-                work[AT_HAND, PUSH_OFF] += given
-                work[AT_HAND, STRIKES] += given
-            for i in range(work.shape[1]):
-                work[TAKEN, i] += work[AT_HAND, i]
-                work[AT_HAND, i] = 0.0
+                given = 0.5 * push.angular * after[len(model.arm_x) + STANCE]  # its foot rested before
+                work[PUSH_OFF] += given
+                work[AT_HAND] += given
+            work[STRIKES] += work[AT_HAND]
+            work[AT_HAND] = 0.0
         extremes[MIN_IMPULSE] = min(extremes[MIN_IMPULSE], impulse)
         if impulse > 0.0:
             extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(along) / impulse)
-
-
-@inlined
-def hip_potential(model: Standing, y: Any) -> float:
-    """What spring and torque have given (J) from legs together on: their work is its change."""
-    apart = y[SWING] - y[STANCE]
-    return model.hip_torque * apart - hinge_energy(hip_law(model), apart)
-
-
-@inlined
-def legs_apart(method: Any, mode: Mode, fraction: float) -> tuple[float, float]:
-    """How far the swing leg is ahead at a fraction of the last step (rad), and how fast it gets further (rad/s)."""
-    y, n = vector(mode.model.zero_state), len(mode.model.arm_x)
-    interpolate(method, mode, fraction, y)
-    return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
-
-
-@inlined
-def observe_hip(observer: Observer, method: Any, mode: Mode, fraction: float, h: float) -> None:
-    """Take note of what the damper takes (J) up to a fraction of the last step, and of the torque's positive work."""
-    model, work, spacing = mode.model, observer.work[AT_HAND], 0.125 * fraction
-    before = legs_apart(method, mode, 0.0)
-    work[HIP] -= WEIGHTS[0] * model.hip_damping * before[1] * before[1] * fraction * h
-    for eighth in range(1, 9):
-        after = legs_apart(method, mode, spacing * eighth)
-        work[HIP] -= WEIGHTS[eighth] * model.hip_damping * after[1] * after[1] * fraction * h
-        begin, end = model.hip_torque * before[1] > 0.0, model.hip_torque * after[1] > 0.0
-        first, last = before[0], after[0]
-        if begin != end:  # the legs turn back on the way
-            share, rates = spacing * (eighth - 1), (before[1], after[1])
-            turn = share + spacing * rates[0] / (rates[0] - rates[1])
-            slope = (rates[1] - rates[0]) / spacing
-            for _ in range(TURNING):
-                turn -= legs_apart(method, mode, turn)[1] / slope
-            turned = legs_apart(method, mode, turn)[0]
-            first, last = (first, turned) if begin else (turned, last)
-        if begin or end:
-            work[FORWARD] += model.hip_torque * (last - first)
-        before = after
 
 
 @inlined
@@ -229,21 +171,19 @@ def observe(observer: Observer, method: Any, mode: Mode, fraction: float, step: 
     """
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
-    mean_energy = WEIGHTS[0] * observer.energy[LATEST]
+    mean_energy = SIMPSON[0] * observer.energy[LATEST]
     y = vector(mode.model.zero_state)
     before = at = assumptions_at(method, mode, 0.0)
     for eighth in range(1, 9):
         interpolate(method, mode, spacing * eighth, y)
         after = record_extremes(observer, mode, y)
-        mean_energy += WEIGHTS[eighth] * observer.energy[LATEST]
+        mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
                 ascend_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before, at = at, after
     observer.energy[INTEGRAL] += mean_energy * fraction * h
     observer.energy[DURATION] += fraction * h
-    if mode.model.driven_hip:
-        observe_hip(observer, method, mode, fraction, h)
     index = observer.recorded[0]
     while index < observer.times.size and observer.times[index] <= t_end:
         interpolate(method, mode, (observer.times[index] - t) / h, y)

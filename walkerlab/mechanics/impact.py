@@ -66,7 +66,7 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
     momenta(model, M, F, U, new[n : 2 * n], along, upward, p)
     pushed = other_foot and model.push_off != 0.0
     if pushed:
-        p[STANCE] += push_off(model, s[SWING], c[SWING], s[STANCE], c[STANCE]).angular
+        p[STANCE] += push_off(model, new).angular
     gathered(model, phase, p)
     solve_linked(model, phase, factors, p)
     jump, turned = vector(like), vector(like)
@@ -88,7 +88,7 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         for k in range(n):
             p[k] -= turned[k]
         if pushed:
-            push = push_off(model, s[SWING], c[SWING], s[STANCE], c[STANCE])
+            push = push_off(model, new)
             p[STANCE] += push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         gathered(model, phase, p)
         solve_linked(model, phase, factors, p)
@@ -107,25 +107,10 @@ class PushOff(NamedTuple):
 
 
 @inlined
-def push_off_of(model: Standing, new: Any) -> PushOff:
+def push_off(model: Standing, new: Any) -> PushOff:
     """The push-off of a heel strike, by the state after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
-    return push_off(model, s_t, c_t, s_l, c_l)
-
-
-@inlined
-def push_off_work(model: Standing, new: Any) -> float:
-    """Work (J) of the push-off of a heel strike, by the state after it.
-
-    The foot rested before; so it is half of the impulse times the velocity after it, along the leg that of the hip.
-    """
-    return 0.5 * push_off_of(model, new).angular * new[len(model.arm_x) + STANCE]
-
-
-@inlined
-def push_off(model: Standing, s_t: float, c_t: float, s_l: float, c_l: float) -> PushOff:
-    """The push-off, by sines and cosines of the angles from the slope's normal of trailing and leading leg."""
     R = model.radius
     # from where each foot touches to the hip, along the slope and normal to it
     x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R

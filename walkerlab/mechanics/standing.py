@@ -27,7 +27,6 @@ from walkerlab.mechanics.hinges import (
     SpringDamper,
     add_hinge_gradients,
     add_hinge_torque,
-    hinge_energy,
     hinge_torque,
 )
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
@@ -67,7 +66,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
     driven_hip: bool  # whether anything acts between the legs
-    hip_stiffness: float  # N m/rad, of what acts between the legs: see `hip_law`
+    hip_stiffness: float  # N m/rad, of what acts between the legs: a SpringDamper
     hip_damping: float  # N m s/rad
     hip_torque: float  # N m, on the swing leg
     push_off: float  # N s, along the trailing leg in the heel strike
@@ -196,16 +195,10 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
 
 
 @always_inline
-def hip_law(model: Standing) -> SpringDamper:
-    """What acts between the legs."""
-    return SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
-
-
-@always_inline
 def hip_torque(model: Standing, y: Any) -> HingeTorque:
     """The torque between the legs, by how far the swing leg is ahead."""
-    n = len(model.arm_x)
-    return hinge_torque(hip_law(model), y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
+    n, law = len(model.arm_x), SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
+    return hinge_torque(law, y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
 
 
 @always_inline
@@ -348,7 +341,8 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
-    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + hinge_energy(hip_law(model), y[SWING] - y[STANCE])
+    apart = y[SWING] - y[STANCE]
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + 0.5 * model.hip_stiffness * apart * apart
 
 
 def energy_at_touch(model: Standing, touched: Any) -> Any:

@@ -114,10 +114,10 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
 
 def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
     """Why no gait can exist on this ground, by the balance of momentum and of energy alone, and what to change."""
-    if walker.slope <= 0.0:
+    if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
-    friction, wanted = walker.friction.largest, math.tan(walker.slope)
-    if friction == 0.0:
+    friction, wanted = walker.friction.largest, abs(math.tan(walker.slope))
+    if friction == 0.0 and not walker.driven:
         return (
             "without friction nothing holds the walker back: it gathers speed along the slope",
             f"Give the feet friction: contact.friction: coulomb, contact.static_friction above {wanted:.3g}.",

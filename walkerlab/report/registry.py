@@ -7,6 +7,7 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 import math
 from collections.abc import Callable
 
+from walkerlab.config.drives import drives_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
@@ -85,7 +86,7 @@ def lead(config: Config, run: str) -> str:
     """What was run: the walker, its slope and what it was to do."""
     equations = config.equations if is_plain_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
-    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations)
+    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations, drives_of(config))
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

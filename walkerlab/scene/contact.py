@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.config.drives import Hip
+from walkerlab.config.drives import Hip, drives_of
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import KneeRules, contact_walker
@@ -87,19 +87,22 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
         pitch,
         knee_rules(config.walker),
     )
-    return replace(scene, walker=with_hip(scene.walker, config.walker.hip))
+    return replace(scene, walker=with_drives(scene.walker, config))
 
 
-def with_hip(walker: ContactWalker, hip: Hip) -> ContactWalker:
-    """The walker with what a config has between its legs."""
-    if hip == Hip():
+def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
+    """The walker with what drives it in a config."""
+    if not drives_of(config):
         return walker
+    hip, push = config.walker.hip, config.push_off
     return changed_forms(
         walker,
-        driven_hip=True,
+        driven_hip=hip != Hip(),
         hip_stiffness=hip.spring_N_m_per_rad,
         hip_damping=hip.damping_N_m_s_per_rad,
         hip_torque=hip.torque_N_m,
+        push_off=push.impulse_N_s,
+        push_off_duration=push.duration_s,
     )
 
 

@@ -66,15 +66,20 @@ def rigid_scene(config: SimulateConfig) -> RigidScene:
 
 def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
+    model = driven(on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad), config)
+    return as_printed(model) if equations == "as-printed" else model
+
+
+def driven(model: Standing, config: RigidConfig) -> Standing:
+    """The walker with what drives it in a config."""
     hip = config.walker.hip
-    model = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad).changed(
+    return model.changed(
         driven_hip=hip != Hip(),
         hip_stiffness=hip.spring_N_m_per_rad,
         hip_damping=hip.damping_N_m_s_per_rad,
         hip_torque=hip.torque_N_m,
         push_off=config.push_off.impulse_N_s,
     )
-    return as_printed(model) if equations == "as-printed" else model
 
 
 @lru_cache(REMEMBERED)

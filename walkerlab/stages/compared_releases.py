@@ -15,6 +15,7 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import driven
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -33,20 +34,20 @@ LEFT_OUT = (
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Up to 20 steps from a gait with each instant of release; None for a walker without knees.
+    """Up to 20 steps from a gait with each instant of release; None without knees, or where these wait for a push-off.
 
     state    of the rigid model
     pitch_m  what lengths are measured by
     """
     scene = contact_scene(config, pitch_m, pitch_m)
-    if not scene.walker.kneed:
+    if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
         return None
     found = {}
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), STEPS, CONTACT)
         model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
-        rigid = take_walk(model, RIGID, state, RIGID_STEPS)
+        rigid = take_walk(driven(model, config), RIGID, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
         found[name] = {**told(scene, walk), "rigid": of_rigid}

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from walkerlab.config.drives import drives_of
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
@@ -88,7 +89,8 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
             "random_hits": list(search.random_hits),
             "lost": list(search.lost),
         }
-    return {**sets[config.equations], "state_names": list(coordinates(config)), "equation_sets": sets}
+    driven = {"driven_by": list(drives_of(config))}
+    return {**sets[config.equations], **driven, "state_names": list(coordinates(config)), "equation_sets": sets}
 
 
 def numbers_of(gait: Gait) -> dict[str, Label]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from walkerlab.config.reads import RigidConfig
+from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import CompassWalker, is_plain_compass
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
@@ -27,7 +27,7 @@ from walkerlab.orbits.rigid_limit import (
     observed_orders,
 )
 from walkerlab.paper.printed import ANGLE_ERROR
-from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_hip
+from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_drives
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
@@ -86,7 +86,7 @@ class LimitFindings:
 
 
 def limit_findings(
-    config: RigidConfig,
+    config: ContactConfig,
     scene: ContactScene,
     gait: ContactGait,
     rigid_gait: Mapping[str, Any],
@@ -124,7 +124,7 @@ def limit_findings(
         if name != ALL:  # points for feet, as the rigid model has them
             parts, rules = assembly_of(config.walker, rigid=True), knee_rules(config.walker)
             walker = contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
-            walker = with_hip(walker, config.walker.hip)
+            walker = with_drives(walker, config)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:

@@ -120,11 +120,21 @@ class RigidMasses:
         whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return whole, moving.about(moving.hip, share[self.owner], share)
 
-    def momentum_change(self, before: Array, after: Array) -> float:
-        """Largest change of these momenta in heel strikes, as a share of their size; states (strikes, 2 n)."""
+    def moment_of(self, push_off: float, state: Array) -> float:
+        """Of a push-off (N s) about the new foothold (kg m^2/s): it acts from the contact behind towards the hip."""
+        moving = self.at(state)
+        along, up = push_off * moving.hip / np.hypot(*moving.hip)
+        return float(moving.contact[1] * along - moving.contact[0] * up)
+
+    def momentum_change(self, before: Array, after: Array, push_off: float = 0.0) -> float:
+        """Largest change of these momenta in heel strikes, as a share of their size; states (strikes, 2 n).
+
+        A push-off's moment (N s) is no change.
+        """
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             kept, left = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
+            kept[0] += self.moment_of(push_off, old)
             change, size = max(change, *np.abs(left - kept)), max(size, *np.abs(kept), *np.abs(left))
         return finite(change / size)
 

@@ -52,6 +52,11 @@ def scaled_block(block: B, by: TwinScale) -> B:
     """A block of measures scaled, each by the unit that its key ends in; knees' stops are turned by torques."""
     torque = by.force * by.length
     units = {
+        "_N_m_per_rad": torque,
+        "_N_m_s_per_rad": torque * by.time,
+        "_N_m": torque,
+        "_N_s": by.force * by.time,
+        "duration_s": by.time,
         "_kg_m2": by.mass * by.length**2,
         "_kg": by.mass,
         "_m": by.length,
@@ -76,7 +81,11 @@ def scaled_block(block: B, by: TwinScale) -> B:
 def scaled(config: Config, by: TwinScale) -> Config:
     """The config of the similar walker: every quantity with a unit scaled, angles and pure numbers as they are."""
     walker = scaled_block(config.walker, by)
-    changes: dict[str, object] = {"walker": walker, "gravity_m_s2": config.gravity_m_s2 * by.gravity}
+    changes: dict[str, object] = {
+        "walker": walker,
+        "gravity_m_s2": config.gravity_m_s2 * by.gravity,
+        "push_off": scaled_block(config.push_off, by),
+    }
     if not isinstance(config.start, str):
         n = len(config.start) // 2
         changes["start"] = (*config.start[:n], *(rate / by.time for rate in config.start[n:]))

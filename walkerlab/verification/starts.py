@@ -74,7 +74,8 @@ class RigidStart:
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
         cost = work.rhs_evaluations, work.accepted
-        return JudgedWalk(walk.outcome, touches, None, walk.energy_drift, *cost, numbers, walk)
+        off = walk.energy_balance_residual if self.walker.driven_hip else walk.energy_drift
+        return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
         """What heel strikes must keep."""
@@ -83,8 +84,9 @@ class RigidStart:
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
         off = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
-        changed = strikes.momentum_change(record.before, record.after)
-        won = strikes.energy_won(record.before, record.after) / self.energy
+        push = float(self.walker.push_off)
+        changed = strikes.momentum_change(record.before, record.after, push)
+        won = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
         return [
             Measure("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
             Measure("momentum changed by a heel strike", changed, ROUNDING),

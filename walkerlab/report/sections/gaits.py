@@ -1,7 +1,7 @@
 """The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -54,6 +54,8 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
         ),
         Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
+        *works("work of", partial(number, digits=4)),
+        measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
         measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
         measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
@@ -68,6 +70,20 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
     return side_by_side(caption, lines, gaits, note=words("gait.equations") if both else "")
+
+
+GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
+"""What gives a step its work, by the names under which it is stored."""
+
+
+def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
+    """The work that each gives a step, of those that give any."""
+    for name, giver in GIVEN_BY.items():
+
+        def given(record: Mapping[str, Any], name: str = name) -> float | None:
+            return (record.get("work_per_step_J") or {}).get(name) or None
+
+        yield Column(f"{words} {giver} a step (J)", given, written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:

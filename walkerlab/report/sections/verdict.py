@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from walkerlab.config.drives import drives_of
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.outcomes import MODELS, tone
@@ -24,7 +25,9 @@ def section(results: Results) -> Section:
     if walked:  # what holds, what fails and what follows
         verdicts = Counter(row["verdict"] for row in rows)
         misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
-        said = words("verdict.opening", walked, results.summary("fixedpoint"), verdicts, misprint)
+        said = words(
+            "verdict.opening", walked, results.summary("fixedpoint"), verdicts, misprint, drives_of(results.config)
+        )
         blocks.append(Paragraph(said))
     fared = sorted(how_all_fared(results), key=lambda found: found.tone != "bad")
     if fared:

@@ -37,6 +37,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "slip a step": length(get("slip_per_step_m")),
         "slip, step by step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
         "rolling a step": length(get("rolling_per_step_m") or None),
+        "cost of transport": number(get("cost_of_transport"), 4),
         "energy balance residual": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
         "work": whole(get("rhs_evaluations")),
@@ -66,9 +67,10 @@ ASSUMPTION_COLUMNS = (
 def assumptions(results: Results) -> Section | None:
     """What the rigid model assumes, and how far its own walk bears that out."""
     summary = results.summary(RIGID)
-    judged = []
+    judged, hip = [], results.config.walker.hip
+    works = hip.torque_N_m != 0.0 or hip.damping_N_m_s_per_rad != 0.0
     for key, said in words.terms("walks.assumed").items():
-        if summary.get(key) is not None:
+        if summary.get(key) is not None and not (key == "energy_drift_J" and works):
             (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
             judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
     if not judged:

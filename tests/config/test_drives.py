@@ -1,0 +1,37 @@
+"""What drives a walker: where it is refused, and in which words."""
+
+from pathlib import Path
+
+import pytest
+
+from walkerlab.config.drives import drives_of
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+
+PUSH = "push_off.impulse_N_s=0.1"
+REFUSED = {
+    ("paper-as-printed", PUSH): "equations: .*passive compass, and this walker has a push-off of 0.1 N s",
+    ("paper-as-printed", "walker.hip.torque_N_m=1"): "equations: .*this walker has a hip torque of 1 N m",
+    ("kneed", PUSH, "walker.knee.at_heel_strike=free"): "push_off: .*needs a trailing knee that is locked",
+    ("simplest", PUSH, "walker.hip_mass_kg=0"): "push_off: .*has nothing to push: the hip has no mass",
+    ("simplest", "walker.hip.torque_N_m=0.1"): "walker.hip: .*faster than 10000 rad/s",
+    ("kneed", "walker.hip.spring_N_m_per_rad=-1"): "walker.hip.spring_N_m_per_rad: -1 is out of bounds",
+    ("paper", "push_off.duration_s=0"): "push_off.duration_s: 0 is out of bounds",
+    ("paper", "walker.hip.spring=1"): "did you mean walker.hip.spring_N_m_per_rad",
+}
+
+
+@pytest.mark.parametrize("asked", REFUSED)
+def test_what_cannot_drive_a_walker_is_refused_in_words(asked):
+    name, *sets = asked
+    with pytest.raises(ConfigError, match=REFUSED[asked]):
+        load(Path(name), sets)
+
+
+@pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "parts"])
+def test_walkers_of_every_type_are_driven(name):
+    sets = (PUSH, "walker.hip.spring_N_m_per_rad=0.01", "walker.hip.damping_N_m_s_per_rad=0.02")
+    assert drives_of(load(Path(name)).config) == ()
+    assert drives_of(load(Path(name), sets).config) == (
+        "a push-off of 0.1 N s", "a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad"
+    )  # fmt: skip
