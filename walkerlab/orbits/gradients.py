@@ -31,6 +31,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
 """What is differentiated, with units; the norm is that of the step period for a drop of the floor."""
 OWN = 3  # of them that a step itself has
 APART = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers meet
+STEP = 1.5  # of a difference quotient, in fifth roots of the relative tolerance
 LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
 
 
@@ -60,7 +61,7 @@ def gradients(at: Standpoint, scale: float) -> dict[str, Gradient]:
     scale  magnitude of changes of the parameter that matter
     """
     d, unity = at.z.size, np.eye(at.z.size)
-    h = at.step_map.tolerances.rtol**0.2 * scale
+    h = STEP * at.step_map.tolerances.rtol**0.2 * scale
 
     def led(off: float) -> Floats | None:
         step = at.step_map.step(at.z, at.p + off, derived=False)

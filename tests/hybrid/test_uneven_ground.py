@@ -1,0 +1,235 @@
+"""Walks over footholds of different heights: against a library's integrator, differences, energy, and each other."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from walkerlab.config.ground import Ground
+from walkerlab.config.loader import load
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.mechanics import impact
+from walkerlab.mechanics.standing import BENT, NO_SHANK, STANCE, STRAIGHT, SWING, Mode
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.shooting import EXACT, SMALL, Shooting, coordinates_of, section_of
+from walkerlab.outcome import Outcome
+from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.scene.footholds import foothold_heights
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import derivative
+
+TIGHT = Tolerances("dop853", 1e-12, 1e-13, 10**7)
+ON_GROUND = Tolerances("radau5", 1e-8, 1e-10, 10**7)
+WALKERS = ("slope-3deg", "kneed", "torso", "round-feet", "kneed-round-feet")
+
+
+def gait_of(name, *changes):
+    config = load(Path(name), changes).config
+    walker = rigid_walker(config, config.equations)
+    return config, walker, find_gaits(walker).gait
+
+
+def heights_of(walker, seed, steps, share=2e-4):
+    return np.append(0.0, np.random.default_rng(seed).normal(0.0, share * walker.leg_length, steps))
+
+
+# ---- rigid model ---------------------------------------------------------------------------------------------------
+
+
+def foot_of(walker, y):
+    """Ahead of and over the present contact point (m), by the levers' definition."""
+    psi = np.array(y[: len(walker.arm_x)]) + walker.slope
+    return (
+        float(np.cos(psi) @ walker.foot_x - np.sin(psi) @ walker.foot_y),
+        float(np.sin(psi) @ walker.foot_x + np.cos(psi) @ walker.foot_y),
+    )
+
+
+def plain_walk(walker, y, heights):
+    """Times and states after heel strikes, each swing by a library's method with one event for each of its ends."""
+    n, t, seen = len(walker.arm_x), 0.0, []
+    for rise in np.diff(heights):
+        phases = (BENT, STRAIGHT) if walker.shank != NO_SHANK else (STRAIGHT,)
+        for phase in phases:
+            system = Mode(walker, phase)
+
+            def rate(_t, y, system=system):
+                f = np.zeros(2 * n)
+                derivative(system, 0.0, y, f)
+                return f
+
+            def strike(_t, y, rise=rise):
+                ahead, height = foot_of(walker, y)
+                return height - rise if ahead > 0.0 else 1.0
+
+            def knee(_t, y):
+                return y[walker.shank] - y[walker.thigh]
+
+            event = knee if phase == BENT else strike
+            event.terminal, event.direction = True, 1 if phase == BENT else -1
+            # a knee has just been released, a foot stands beside the other's contact: none is the next event
+            begun = (
+                solve_ivp(rate, (0.0, 1e-3), y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1] if phase == phases[0] else y
+            )
+            late = 1e-3 if phase == phases[0] else 0.0
+            swing = solve_ivp(rate, (late, 10.0), begun, "DOP853", events=event, rtol=1e-12, atol=1e-13)
+            assert swing.t_events[0].size, "neither knee nor heel strikes"
+            y, t = swing.y[:, -1], t + swing.t[-1]
+            new = np.zeros(2 * n)
+            (impact.knee_strike if phase == BENT else impact.heel_strike)(walker, y, new)
+            y = new
+        seen.append((t, *y))
+    return np.array(seen)
+
+
+@pytest.mark.parametrize("name", WALKERS)
+def test_rigid_walk_over_random_heights_is_that_of_a_library(name):
+    _, walker, gait = gait_of(name)
+    heights = heights_of(walker, 5, 5)
+    walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights)
+    assert walk.outcome is Outcome.WALKED
+    plain = plain_walk(walker, np.array(gait.state), heights)
+    np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(walk.after, plain[:, 1:], rtol=0.0, atol=1e-7)
+    assert walk.energy_balance_residual < 1e-8 * walker.mass * walker.gravity * walker.leg_length
+
+
+@pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet"])
+def test_columns_change_over_steps_up_and_down_as_differences_say(name):
+    _, walker, gait = gait_of(name)
+    shooting, section = Shooting(walker, EXACT), section_of(walker)
+    z, d = coordinates_of(walker, gait.state), int(walker.coordinates)
+    rises = np.array([0.0, 6e-4, -9e-4, 3e-4]) * walker.leg_length  # the last foothold is level with the first
+
+    def end(z, derived=False):
+        return shooting.walk(section, z, 3, derived, rises)
+
+    n = len(walker.arm_x)
+    columns = end(z, derived=True).strikes.after[-1].reshape(1 + d, 2 * n)[1:].T / SMALL
+    for j in range(d):
+        h = 1e-4 * np.eye(d)[j]
+        ends = {k: end(z + k * h).strikes.after[-1][: 2 * n] for k in (-2, -1, 1, 2)}
+        slope = (8.0 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / 12e-4
+        np.testing.assert_allclose(columns[:, j], slope, rtol=1e-6, atol=1e-6)
+
+
+def test_feet_land_at_the_heights_of_their_footholds():
+    _, walker, gait = gait_of("slope-3deg")
+    heights = np.array([0.0, -4e-3, 1e-3, -2e-3, -2e-3])
+    walk = take_walk(walker, TIGHT, gait.state, 4, heights=heights)
+    rises = [foot_of(walker, before)[1] for before in walk.before]
+    np.testing.assert_allclose(rises, np.diff(heights), atol=1e-12)
+    np.testing.assert_array_equal(walk.foothold_height_m, heights[1:])
+
+
+def test_even_ground_changes_no_bit():
+    _, walker, gait = gait_of("kneed")
+    even, level = (take_walk(walker, TIGHT, gait.state, 3, heights=heights) for heights in (None, np.zeros(4)))
+    np.testing.assert_array_equal(even.after, level.after)
+    np.testing.assert_array_equal(even.touch_time_s, level.touch_time_s)
+
+
+# ---- contact model -------------------------------------------------------------------------------------------------
+
+
+def on_terrain(name, terrain, heights, *changes, steps=5):
+    config, _, gait = gait_of(name, f"contact.terrain={terrain}", *changes)
+    scene = contact_scene(config, gait.step_length, gait.step_length)
+    return scene, scene.walk(start_state(scene, gait.state), steps, ON_GROUND, 0.01, heights)
+
+
+CASES = {
+    "pads": ("slope-3deg", "checkerboard"),
+    "past mid-swing": ("slope-3deg", "after-mid-swing"),
+    "round feet past mid-swing": ("round-feet", "after-mid-swing"),
+    "knees on a plane": ("kneed", "plane"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_contact_walk_over_heights_keeps_its_energy_and_stays_near_the_rigid_one(case):
+    name, terrain = CASES[case]
+    _, walker, gait = gait_of(name)
+    heights = heights_of(walker, 2, 6)
+    scene, walk = on_terrain(name, terrain, heights)
+    rigid = take_walk(walker, TIGHT, gait.state, 5, heights=heights[:-1])
+    assert walk.outcome is Outcome.WALKED
+    np.testing.assert_array_equal(walk.foothold_height_m, heights[1:6])
+    assert walk.energy_balance_residual_J < walk.explained_residual_J
+    assert walk.driven.gravity == pytest.approx(
+        scene.walker.mass
+        * (scene.walker.gravity_along * walk.touch_along_m[-1] - scene.walker.gravity_down * heights[5]),
+        rel=1e-12,
+    )
+    np.testing.assert_allclose(walk.periods_s, rigid.periods_s, rtol=0.1)
+    depths = np.where(walk.samples.has_ground > 0, walk.samples.level, 0.0)
+    assert set(np.unique(depths)) <= {*heights.tolist(), 0.0}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_level_ground_by_heights_is_even_ground_bit_for_bit(case):
+    name, terrain = CASES[case]
+    _, even = on_terrain(name, terrain, None, steps=3)
+    _, level = on_terrain(name, terrain, np.zeros(1), steps=3)
+    np.testing.assert_array_equal(even.samples.states, level.samples.states)
+
+
+def test_stiffer_ground_brings_the_contact_walk_over_heights_to_the_rigid_one():
+    """Led towards the limit as tune does: stiffness, its root the damping, and slower creep."""
+    config, walker, gait = gait_of("slope-3deg")
+    heights, law = np.array([0.0, -2e-3, 1e-3, -1e-3, -1e-3]), config.contact
+    rigid = take_walk(walker, TIGHT, gait.state, 3, heights=heights[:-1])
+    off = []
+    for factor in (1.0, 10.0, 100.0):
+        changed = {
+            "stiffness": law.stiffness * factor, "damping": law.damping * factor**0.5,
+            "full_damping_penetration": law.full_damping_penetration / factor ** (1.0 / law.exponent),
+            "stiction_velocity": law.stiction_velocity / factor, "friction_velocity": law.friction_velocity / factor,
+        }  # fmt: skip
+        changes = (f"contact.{key}={value!r}" for key, value in changed.items())
+        _, walk = on_terrain("slope-3deg", "after-mid-swing", heights, *changes, steps=3)
+        off.append(np.abs(walk.periods_s - rigid.periods_s).max())
+    assert off[1] < 0.5 * off[0]
+    assert off[2] < 0.5 * off[1]
+
+
+def test_a_foot_below_its_next_foothold_as_the_feet_pass_is_stubbed_on_plain_ground():
+    _, walk = on_terrain("kneed", "plane", np.array([0.0, 0.0, 0.05]))
+    assert (walk.outcome, walk.steps) == (Outcome.STUBBED, 1)
+
+
+def test_the_flank_of_a_raised_pad_is_off_pad():
+    _, walk = on_terrain("slope-3deg", "checkerboard", np.array([0.0, 0.0, 0.2]))
+    assert walk.outcome in (Outcome.OFF_PAD, Outcome.FELL)
+    assert walk.steps == 1
+
+
+def test_past_mid_swing_a_foot_is_carried_once_it_has_been_above_its_foothold():
+    """A foothold so deep that the foot never comes down onto it in time, and one that it is never above: both fall."""
+    for height in (0.3, -0.4):
+        _, walk = on_terrain("slope-3deg", "after-mid-swing", np.array([0.0, 0.0, height]))
+        assert (walk.outcome, walk.steps) == (Outcome.FELL, 1)
+
+
+# ---- heights -------------------------------------------------------------------------------------------------------
+
+
+def test_listed_heights_go_on_at_the_last_and_drawn_ones_do_not_depend_on_how_many():
+    np.testing.assert_array_equal(
+        foothold_heights(Ground(heights_m=(1e-3, -2e-3)), 4), [0.0, 1e-3, -2e-3, -2e-3, -2e-3]
+    )
+    few, many = (foothold_heights(Ground(roughness_m=1e-3, seed=7), steps) for steps in (3, 300))
+    np.testing.assert_array_equal(few, many[:4])
+    assert np.std(many[1:]) == pytest.approx(1e-3, rel=0.15)
+    assert foothold_heights(Ground(heights_m=(0.0, 0.0)), 4) is None
+
+
+@pytest.mark.parametrize("leg", [SWING, STANCE])
+def test_a_walk_ends_where_its_hip_is_low_over_its_own_foothold_not_over_the_slope(leg):
+    """Stairs that lead down by a leg's length are walked: nothing falls but the ground."""
+    _, walker, gait = gait_of("slope-3deg")
+    heights = np.append(0.0, -1e-3 * np.arange(1, 701)) if leg == SWING else np.append(0.0, 1e-4 * np.arange(1, 701))
+    walk = take_walk(walker, Tolerances("dop853", 1e-9, 1e-11, 10**8), gait.state, 700, heights=heights)
+    assert walk.steps == 700

@@ -1,0 +1,199 @@
+"""Sensitivity norms, largest steps and rough ground against published values, brute sums and theory; gradients."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.mechanics.impact import pushed_at_hip
+from walkerlab.mechanics.standing import energies, momentum
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.gradients import QUANTITIES, gait_numbers, gradients
+from walkerlab.orbits.robustness import (
+    Scales,
+    Standpoint,
+    disturbed,
+    indicators,
+    largest,
+    largest_disturbance,
+    quotient,
+    rough_walks,
+    sensitivity,
+    sensitivity_norm,
+    steps_on_rough_ground,
+)
+from walkerlab.orbits.shooting import EXACT, QUICK, on_section
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near
+from walkerlab.outcome import Outcome
+from walkerlab.scene.families import rigid_map
+from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.rigid import rigid_walker
+
+
+def standpoint(name, key="slope_rad", tolerances=EXACT, changes=()):
+    config = load(Path(name), changes).config
+    walker = rigid_walker(config, config.equations)
+    _, units = unit_walker(walker)
+    z = np.array(find_gaits(walker).gait.state)[walker.section[: walker.coordinates]]
+    z[1:] *= units.time
+    parameter = parameter_of(key, config)
+    step_map, p = rigid_map(config, parameter, 1.0).at(tolerances), parameter.value_in(config)
+    return Standpoint(step_map, p, z, step_map.step(z, p).DP, Scales(units.length, units.time, units.impulse))
+
+
+# ---- the norm ------------------------------------------------------------------------------------------------------
+
+
+def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
+    """Floor drop to step period, gamma .009, l = g = 1: direct part and norm."""
+    answer = sensitivity(standpoint("simplest"), "floor-drop")
+    scales = standpoint("simplest").scales
+    to_pure = scales.length / scales.time
+    assert answer.direct[0] * to_pure == pytest.approx(11.56992214, rel=1e-8)
+    assert answer.norm[0] * to_pure == pytest.approx(680.1273, rel=1e-7)
+
+
+@pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
+@pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet", "torso"])
+def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
+    """Every step of a long walk from a gait that was disturbed a little either way, summed."""
+    at = standpoint(name)
+    unit, steps = at.scales.of_disturbance(disturbance), 60
+    walks = {k: disturbed(at, disturbance, k * 1e-5 * unit, steps) for k in (-2, -1, 1, 2)}
+    seen = {k: indicators(walk.durations_s, walk.lengths_m) for k, walk in walks.items()}
+    changes = (8.0 * (seen[1] - seen[-1]) - (seen[2] - seen[-2])) / (12e-5 * unit)
+    answer = sensitivity(at, disturbance)
+    np.testing.assert_allclose(answer.norm, np.sqrt((changes**2).sum(axis=0)), rtol=1e-6)
+    np.testing.assert_allclose(answer.direct, changes[0], rtol=1e-7)
+    assert (answer.error < 1e-6 * answer.norm).all()
+
+
+def test_the_norm_by_the_lyapunov_equation_is_the_sum_and_an_unstable_gait_has_none():
+    generator = np.random.default_rng(3)
+    for d in (1, 3, 5):
+        A = generator.normal(size=(d, d))
+        A *= 0.9 / np.abs(np.linalg.eigvals(A)).max()
+        B, C, D = generator.normal(size=d), generator.normal(size=(2, d)), generator.normal(size=(3, 2))
+        total, z = (D**2).sum(axis=0), B
+        for _ in range(2000):
+            total, z = total + (C @ z) ** 2, A @ z
+        np.testing.assert_allclose(sensitivity_norm(A, B, C, D), np.sqrt(total), rtol=1e-10)
+        assert sensitivity_norm(A / 0.9 * 1.001, B, C, D) is None
+
+
+def test_a_push_at_the_hip_keeps_the_foot_and_gives_its_impulse_along_the_hips_lever():
+    """The moment of momentum about the foot grows by the impulse times the hip's height, and by nothing else."""
+    at = standpoint("slope-3deg")
+    walker = at.step_map._unit_at(at.p).walker
+    y = np.array(on_section(walker, at.z))
+    pushed = pushed_at_hip(walker, y, 1e-3)
+    np.testing.assert_array_equal(pushed[: y.size // 2], y[: y.size // 2])
+    # work of an impulse: the mean velocity of the hip along the slope, before and after
+    height = walker.radius + np.cos(y[1] + walker.slope) * walker.hip_y
+    hip_velocity = -0.5 * height * (y[3] + pushed[3])
+    assert sum(energies(walker, pushed)) - sum(energies(walker, y)) == pytest.approx(1e-3 * hip_velocity, rel=1e-10)
+    assert momentum(walker, pushed)[0] > momentum(walker, y)[0]
+
+
+# ---- large disturbances --------------------------------------------------------------------------------------------
+
+
+def test_the_compass_at_three_degrees_stands_the_steps_that_are_known():
+    at = standpoint("slope-3deg", tolerances=QUICK)
+    down, up = (largest_disturbance(at, "floor-drop", sign, 50)[0] for sign in (1.0, -1.0))
+    assert down == pytest.approx(14.37e-3, rel=5e-3)
+    assert up == pytest.approx(5.98e-3, rel=5e-3)
+
+
+def test_the_largest_is_below_the_first_that_falls_even_where_larger_ones_are_stood():
+    assert largest(lambda size: size < 0.0123456 or size > 0.02, 1.0)[0] == pytest.approx(0.0123456, abs=1e-6)
+    assert largest(lambda size: True, 2.0) == (1.0, True)
+
+
+def test_rough_ground_takes_the_compass_as_many_steps_as_is_known():
+    """2 mm at 3 degrees: 18.4 steps."""
+    at = standpoint("slope-3deg", tolerances=QUICK)
+    seen = rough_walks(np.array([steps_on_rough_ground(at, 2e-3, (0, walk), 5000) for walk in range(200)]), 5000)
+    assert seen.method == "all-failed"
+    assert abs(seen.mean - 18.4) < 4.0 * math.hypot(seen.standard_error, 0.7)
+
+
+def rimless_wheel(deviation_deg, walks, most, seed=0):
+    """Steps of Byl and Tedrake's rimless wheel on slopes drawn step by step (2009): alpha pi/8, mean slope 8 deg."""
+    generator, alpha, ratio = np.random.default_rng(seed), np.pi / 8, 9.8
+    slope = np.deg2rad(8.0)
+    steps, alive = np.zeros(walks), np.ones(walks, bool)
+    squared = np.full(walks, 2.0)
+    for _ in range(most):
+        gamma = slope + np.deg2rad(deviation_deg) * generator.normal(size=walks)
+        squared = np.cos(2 * alpha) ** 2 * (squared + 2 * ratio * (1 - np.cos(alpha + gamma))) - 2 * ratio * (
+            1 - np.cos(alpha - gamma)
+        )
+        alive &= squared >= 0.0
+        squared = np.maximum(squared, 0.0)
+        steps += alive
+    return steps
+
+
+@pytest.mark.parametrize(("deviation", "mean"), [(2.5, 412.0), (3.0, 114.0)])
+def test_mean_steps_of_the_rimless_wheel_are_those_published_whether_walks_are_cut_off_or_not(deviation, mean):
+    """Byl and Tedrake, Metastable walking machines, IJRR 28 (2009), by the recomputed map."""
+    for most, method in ((20_000, "all-failed"), (round(mean), "censored")):
+        seen = rough_walks(rimless_wheel(deviation, 4000, most), most)
+        assert seen.method == method
+        assert abs(seen.mean - mean) < 4.0 * seen.standard_error + 0.01 * mean
+
+
+def test_walks_that_all_go_on_bound_the_mean_from_below():
+    seen = rough_walks(np.full(20, 100.0), 100)
+    assert (seen.method, seen.mean, seen.standard_error, seen.capped) == ("lower-bound", 2000.0, None, 20)
+
+
+# ---- gradients -----------------------------------------------------------------------------------------------------
+
+KEYS = {"slope-3deg": ("slope_rad", "walker.hip_mass_kg", "gravity_m_s2"), "kneed": ("walker.shank.mass_below_knee_m",)}
+
+
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, keys in KEYS.items() for key in keys])
+def test_gradients_are_differences_of_converged_gaits(name, key):
+    at = standpoint(name, key)
+    found = gradients(at, abs(at.p))
+
+    def numbers_at(off):
+        p = at.p + off
+        gait = gait_near(at.step_map, at.z, p, 1, 1e-12)
+        numbers = gait_numbers(at._replace(p=p, z=gait.z, A=gait.DP))
+        return np.array([numbers[one] for one in QUANTITIES])
+
+    by_difference = quotient(numbers_at, 3e-3 * abs(at.p)).value
+    for one, expected in zip(QUANTITIES, by_difference, strict=True):
+        assert found[one].value == pytest.approx(expected, rel=1e-6, abs=1e-9), one
+        assert found[one].error < 1e-5 * abs(expected) + 1e-8
+
+
+def test_gravity_scales_times_and_nothing_else():
+    at = standpoint("slope-3deg", "gravity_m_s2")
+    numbers, found = gait_numbers(at), gradients(at, at.p)
+    of_itself = {one: found[one].value * at.p / numbers[one] for one in QUANTITIES}
+    expected = {"period_s": -0.5, "step_length_m": 0.0, "speed_m_s": 0.5, "spectral_radius": 0.0}
+    for one, power in expected.items():
+        assert of_itself[one] == pytest.approx(power, abs=1e-7), one
+    assert of_itself["gait_sensitivity_norm"] == pytest.approx(-0.5, abs=1e-6)
+
+
+def test_a_quotient_is_of_fourth_order_tells_its_error_and_is_one_sided_at_a_wall():
+    for wall in (-np.inf, -1e-12):
+        seen = quotient(lambda x, wall=wall: np.array([math.exp(x)]) if x > wall else None, 1e-2)
+        assert seen.value[0] == pytest.approx(1.0, abs=3e-8)
+        assert abs(seen.value[0] - 1.0) < seen.error[0] < 1e-6
+    assert quotient(lambda x: None, 1e-2) is None
+
+
+def test_a_walk_that_ends_has_fewer_steps_and_says_how():
+    at = standpoint("slope-3deg")
+    walk = disturbed(at, "floor-drop", 0.2, 3)
+    assert walk.outcome is Outcome.FELL
+    assert walk.durations_s.size < 3
