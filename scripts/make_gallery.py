@@ -88,6 +88,7 @@ def sweep_page(runs: Path) -> str:
         ordinary_force=weight(tracks),
         closeup_m=STILL_VIEW_OF_RIGID,
         pads=(),
+        ground=(),
         view=view(tuple(tracks.values()), slope, margin=0.1),
     )
     for gait in (gait for row in gaits for gait in row):

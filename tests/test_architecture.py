@@ -38,6 +38,7 @@ LAYERS = (
     "labels",
     "prose",
     "stopping",
+    "outcome",
     "errors",
 )
 SOURCES = sorted(PACKAGE.rglob("*.py"))

@@ -15,6 +15,7 @@ __all__ = [
     "Result",
     "Run",
     "basin",
+    "robustness",
     "compass",
     "contact",
     "continue_gait",

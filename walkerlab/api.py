@@ -376,6 +376,22 @@ def basin(
     return in_memory("basin", config_of_scene(walker, {"slope_deg": slope_deg, "basin": asked}, keys))
 
 
+def robustness(
+    walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
+) -> Result:
+    """What a gait stands and which number moves it, in memory: norms, largest steps, rough ground in `summary`.
+
+    walker     from `compass`, `kneed` or `walker`
+    slope_deg  positive downhill, deg
+    to         numbers of the config that the gait is differentiated by; every one that the model reads without
+    walks      on each rough ground
+    keys       other keys of a config, such as contact, seed
+    """
+    asked: dict[str, Any] = {} if walks is None else {"walks": plain(walks)}
+    asked |= {"to": list(to)} if to else {}
+    return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
+
+
 def dataset(group: Group) -> Any:
     """A group of labelled arrays as an xarray Dataset: variables named as a dimension are its coordinates."""
     try:

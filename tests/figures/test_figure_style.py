@@ -161,7 +161,7 @@ def brightness(colour):
 )
 def test_lines_on_one_another_differ_in_brightness_and_in_style(looks):
     one, other = looks
-    assert abs(brightness(TOLD[one].colour) - brightness(other.colour)) > VISIBLE
+    assert abs(brightness(one.colour) - brightness(other.colour)) > VISIBLE
     assert one.style != other.style
 
 

@@ -14,7 +14,11 @@ class Robustness(Block):
     """What `walkerlab robustness` asks of a gait."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
-        None, "", "which model walks", default_in_words="both, rigid where there is no contact block"
+        None,
+        "",
+        "which model walks",
+        bounds="rigid, contact, both",
+        default_in_words="both, rigid where there is no contact block",
     )
     to: tuple[str, ...] = key(
         (),

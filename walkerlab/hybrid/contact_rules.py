@@ -125,9 +125,9 @@ def set_level(
     y: Any,
 ) -> None:
     """The ground for a foot, in whose ground it moves so, gets another height (m); what its spring held is lost."""
-    height = motion.height + walk_state.level[foot] - level
     if level == walk_state.level[foot]:
         return
+    height = motion.height + walk_state.level[foot] - level
     if not is_above(walk_state, foot):
         observe_edge(observer, system, foot, y)
     walk_state.level[foot] = level

@@ -15,5 +15,5 @@ def foothold_heights(ground: Ground, steps: int) -> NDArray[np.float64] | None:
         return None
     if ground.heights_m:
         listed = np.array(ground.heights_m)[:steps]
-        return np.concatenate(([0.0], listed, np.full(steps - listed.size, listed[-1])))
+        return np.concatenate(([0.0], listed, np.full(steps - listed.size, ground.heights_m[-1])))
     return np.append(0.0, np.random.default_rng(ground.seed).normal(0.0, ground.roughness_m, steps))

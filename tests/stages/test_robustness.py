@@ -1,0 +1,121 @@
+"""The robustness stage: what it answers, keeps and refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from walkerlab.cli.answers import answer
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.stages import fixedpoint, robustness
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+from walkerlab.store.parts import Parts
+
+# design contract, section 4
+FIXED_KEYS = {
+    "gait_sensitivity_norm": {"model", "disturbance", "indicator", "value", "direct", "unit", "scaled"},
+    "sensitivity": {"model", "of", "to", "value", "unit"},
+    "largest_step": {"model", "down_m", "up_m", "steps"},
+    "largest_push": {"model", "forward_N_s", "backward_N_s", "steps"},
+    "rough_ground": {"model", "roughness_m", "mean_steps", "standard_error", "walks", "capped"},
+}
+FEW = ("robustness.walks=20", "robustness.roughness_m=[0.002]", "robustness.to=[slope_deg, walker.hip_mass_kg]")
+
+
+def run(name, *changes, jobs=1, parts=None):
+    config = load(Path(name), changes).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    asked = only(config, PIPELINE["robustness"].takes)
+    return robustness.run(asked, {"fixedpoint": gait}, Silent(), parts=parts or Parts(None, ""), jobs=jobs)
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return run("slope-3deg", "robustness.model=rigid", *FEW)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return run(
+        "kneed",
+        "robustness.steps=3",
+        "robustness.walks=2",
+        "robustness.max_steps=3",
+        FEW[1],
+        "robustness.to=[slope_deg]",
+    )
+
+
+def test_the_answer_has_the_fixed_keys(rigid, both):
+    for summary in (rigid.summary, both.summary):
+        json.dumps(summary, allow_nan=False)
+        for name, keys in FIXED_KEYS.items():
+            assert summary[name], name
+            for row in summary[name]:
+                assert set(row) >= keys - {"standard_error"}, name
+    assert [row["model"] for row in both.summary["largest_step"]] == ["rigid", "contact"]
+    assert len(rigid.summary["gait_sensitivity_norm"]) == 6
+
+
+def test_both_models_stand_about_the_same(both):
+    rigid, contact = both.summary["largest_step"]
+    first, second = (row["value"] for row in both.summary["gait_sensitivity_norm"][::6])
+    assert contact["down_m"] == pytest.approx(rigid["down_m"], rel=0.2)
+    assert second == pytest.approx(first, rel=0.1)
+    pushes = both.summary["largest_push"]
+    assert pushes[1]["forward_N_s"] == pytest.approx(pushes[0]["forward_N_s"], rel=0.2)
+
+
+def test_a_slope_in_degrees_is_differentiated_by_degrees(rigid):
+    found = {(row["of"], row["to"]): row for row in rigid.summary["sensitivity"]}
+    one = found["step_length_m", "slope_deg"]
+    assert one["unit"] == "m per deg"
+    # a step of a compass on gentle slopes grows with about the slope's cube root
+    assert 0.2 < one["relative"] < 0.5
+
+
+def test_a_builder_understands_the_answer(rigid):
+    said = "\n".join(answer("robustness", rigid.summary)).replace("\N{NO-BREAK SPACE}", " ")
+    assert "stands one step down of 14.37 mm and one step up of 5.977 mm" in said
+    assert "On a floor rough by 2 mm" in said
+    assert "1 % more of it makes that" in " ".join(said.split())
+
+
+def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruption(rigid, tmp_path):
+    assert run("slope-3deg", "robustness.model=rigid", *FEW, jobs=3).summary == rigid.summary
+    kept = Parts(tmp_path / "parts", "key")
+    run("slope-3deg", "robustness.model=rigid", *FEW, parts=kept)
+    again = Parts(tmp_path / "parts", "key")
+    assert len(again.kept) == 5
+    assert run("slope-3deg", "robustness.model=rigid", *FEW, parts=again).summary == rigid.summary
+
+
+def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
+    with pytest.raises(NoAnswer, match="the gait of the rigid model is unstable") as raised:
+        run("rigid-only", "slope_deg=4.6", *FEW)
+    summary = raised.value.partial.summary
+    assert summary["gaits"][0]["spectral_radius"] > 1.0
+    assert not summary["gait_sensitivity_norm"]
+    assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (("robustness.roughness_m=[0.7]",), "more than half a leg"),
+        (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
+        (("robustness.to=[strides]",), "touches no model"),
+    ],
+)
+def test_bad_questions_end_in_words(changes, said):
+    with pytest.raises(ConfigError, match=said):
+        run("slope-3deg", *changes)
+
+
+def test_contact_is_not_asked_for_without_its_block():
+    with pytest.raises(ConfigError, match="contact"):
+        run("rigid-only", "robustness.model=both")
+    assert {row["model"] for row in run("rigid-only", "slope_deg=3", *FEW).summary["gaits"]} == {"rigid"}
