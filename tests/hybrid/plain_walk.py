@@ -51,7 +51,9 @@ class Plain(NamedTuple):
     terrain: int
     pitch: float
     release_at_touch: bool
-    hip: np.ndarray  # (3,) N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
+    hip: np.ndarray = np.zeros(
+        3
+    )  # N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
 
 
 class Walked(NamedTuple):

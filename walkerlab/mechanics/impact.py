@@ -96,7 +96,7 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
             new[at + n + k] = p[k]
 
 
-class PushOff(NamedTuple):
+class PushOffImpulse(NamedTuple):
     """An impulse at the trailing foot, along the line from there to the hip."""
 
     along: float  # N s, along the slope
@@ -107,7 +107,7 @@ class PushOff(NamedTuple):
 
 
 @inlined
-def push_off(model: Standing, new: Any) -> PushOff:
+def push_off(model: Standing, new: Any) -> PushOffImpulse:
     """The push-off of a heel strike, by the state after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
@@ -120,7 +120,7 @@ def push_off(model: Standing, new: Any) -> PushOff:
     angular = share * (x_l * y_t - y_l * x_t)
     by_trailing = share * (x_l * x_t + y_l * (y_t - R)) - angular * x_t * R / (length * length)
     by_leading = -share * ((y_l - R) * y_t + x_l * x_t)
-    return PushOff(share * x_t, share * y_t, angular, by_trailing, by_leading)
+    return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
 
 
 def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:
