@@ -118,7 +118,7 @@ def completed(walker, typed):
     [
         ("walkerlab simulate --set slope_d", ["slope_deg="]),
         ("walkerlab simulate --set walker.thigh.le", ["walker.thigh.length_m="]),
-        ("walkerlab continuation --over walker.hip", ["walker.hip_mass_kg"]),
+        ("walkerlab continuation --over walker.hip_", ["walker.hip_mass_kg"]),
         ("walkerlab simulate -c simp", ["simplest", "simple.yaml"]),
         ("walkerlab simulate --stri", ["--strides"]),
     ],

@@ -97,7 +97,7 @@ def test_an_exported_figure_has_all_that_the_page_has(run, tmp_path, monkeypatch
         assert drawn == (run[1].path / "figures" / f"figure-{number}.svg").read_bytes()
 
 
-ON_DEMAND = ("families", "basin", "engines")  # sections of stages that only their own commands run
+ON_DEMAND = ("families", "basin", "engines", "robustness")  # sections of stages that only their own commands run
 
 
 def test_what_only_its_own_command_makes_is_no_part_of_a_report(results):
