@@ -19,6 +19,7 @@ __all__ = [
     "contact",
     "continue_gait",
     "dataset",
+    "design",
     "find_gait",
     "kneed",
     "open_run",

@@ -392,6 +392,24 @@ def robustness(
     return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
 
 
+BOUNDED = ("over", "keep")
+
+
+def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
+    """The walker whose gait has the least or largest of a number, in memory: `best`, `value` and more in `summary`.
+
+    walker  from `compass`, `kneed` or `walker`
+    over    bounds (low, high) of numbers of the config, in the key's unit
+    keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
+    """
+    own = {name: keys.pop(name) for name in ("minimise", "maximise", "keep", "model", "starts") if name in keys}
+    asked: dict[str, Any] = {"over": over or {}, **own}
+    for name in BOUNDED:
+        if name in asked:
+            asked[name] = {key: list(pair) for key, pair in asked[name].items()}
+    return in_memory("design", config_of_scene(walker, {"design": asked}, keys))
+
+
 def dataset(group: Group) -> Any:
     """A group of labelled arrays as an xarray Dataset: variables named as a dimension are its coordinates."""
     try:

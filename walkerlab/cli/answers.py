@@ -1,6 +1,7 @@
 """What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count."""
 
 import math
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -220,6 +221,13 @@ def stood(summary: Summary) -> list[str | Table]:
     return [*robustness.findings(summary), *robustness.tables(summary)]
 
 
+def best_walker(summary: Summary) -> list[str | Table]:
+    """Where the optimum lies, and the config that has it."""
+    file = summary.get("config")
+    told = [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
+    return [*robustness.designed(summary), *told]
+
+
 def engines(summary: Summary) -> list[str | Table]:
     """What was concluded of each scene; every run is in `show`."""
     told = [
@@ -253,6 +261,7 @@ ANSWERS: dict[str, Answer] = {
     "continuation": continuation,
     "basin": starts,
     "robustness": stood,
+    "design": best_walker,
     "engines": engines,
     "plot": plot,
     "report": report,

@@ -13,7 +13,7 @@ from walkerlab.config.writer import commented
 from walkerlab.errors import ConfigError, StorageError
 
 SCHEMA = ".walkerlab-schema.json"
-QUESTIONS = ("stability", "tune", "continuation", "basin", "robustness", "sweep")
+QUESTIONS = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
 """Blocks that are written only where they are not at their defaults."""
 
 

@@ -1,5 +1,6 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
+import re
 import warnings
 from dataclasses import replace
 from typing import Annotated, Any
@@ -93,13 +94,26 @@ Full = Annotated[
 ]
 
 
+Least = Annotated[str | None, typer.Option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")]
+Most = Annotated[str | None, typer.Option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")]
+Within = Annotated[
+    list[str] | None,
+    typer.Option("--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."),
+]
+Keep = Annotated[
+    list[str] | None, typer.Option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
+]
+
+
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of one stage to a program, with the options that mean something to it."""
     last = stage is graph.stages[-1]
     shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *(["open_page"] if last else []), *OF_TALK]
     if not (stage.walks or last):
         shared.remove("strides")
-    unasked: list[str] = [] if stage.follows else ["over", "begin", "end", "model", "periods"]
+    unasked: list[str] = [] if stage.follows else ["over", "begin", "end", "periods"]
+    unasked += [] if stage.follows or stage.designs else ["model"]
+    unasked += [] if stage.designs else ["least", "most", "within", "keep"]
     meaningless = [*unasked, *([] if graph.campaigns_of(stage.name) else ["full"])]
 
     @command(app, *shared, name=stage.name, purpose=stage.purpose, without=meaningless)
@@ -111,13 +125,41 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
         model: Model = None,
         periods: Periods = None,
         full: Full = False,
+        least: Least = None,
+        most: Most = None,
+        within: Within = None,
+        keep: Keep = None,
     ) -> None:
-        settings = [*(request.sets or ()), *following(over, begin, end, model, periods)]
+        own = designing if stage.designs else following
+        given = (model, least, most, within, keep) if stage.designs else (over, begin, end, model, periods)
+        settings = [*(request.sets or ()), *own(*given)]
         with exit_on_failure(stage.name, replace(request, sets=settings)) as asked:
             # Imported here: help loads neither a config nor an array.
             from walkerlab.cli.stage import run_stage
 
             run_stage(asked, stage, graph, full)
+
+
+def designing(
+    model: str | None, least: str | None, most: str | None, within: list[str] | None, keep: list[str] | None
+) -> tuple[str, ...]:
+    """The options of a design as settings of the config; typer.BadParameter for bounds that are none."""
+    if least is None and most is None and not within and not keep:
+        return ()
+    given = {"model": model, "minimise": least, "maximise": most}
+    said = tuple(f"design.{name}={value}" for name, value in given.items() if value is not None)
+    return (
+        *said,
+        *(f"design.{name}={bounds(name, each)}" for name, each in (("over", within), ("keep", keep)) if each),
+    )
+
+
+def bounds(option: str, given: list[str]) -> str:
+    """Bounds KEY=A:B as a block in YAML."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
+    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}"
 
 
 def following(

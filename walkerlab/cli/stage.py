@@ -1,7 +1,10 @@
 """A stage's command: run it, or say what would happen; then print the result."""
 
+import itertools
+import os
 import shlex
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -9,10 +12,15 @@ import typer
 from walkerlab.cli.answers import answer, verdict
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
+from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.config.layers import setting_of
+from walkerlab.config.loader import load
+from walkerlab.config.writer import extending
 from walkerlab.errors import NoAnswer
 from walkerlab.report.tables import aligned
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 from walkerlab.stages.runner import Options, StageReport, execute, told_once
+from walkerlab.store.files import storing
 
 SEARCHING = ("fixedpoint", "report")
 """Stages that look for gaits nearby where there is none."""
@@ -28,6 +36,8 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
         show(request, as_json(report) | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
+    if stage.designs and "best" in report.summary:
+        report.summary["config"] = str(write_optimum(request, report))
     show(request, as_json(report), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
@@ -46,6 +56,29 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
 
     met = nearby(request.resolved, request.typed)
     return replace(report, no_answer=NoAnswer(said.message, f"{met} {said.advice}".strip()))
+
+
+def write_optimum(request: Request, report: StageReport) -> Path:
+    """Write the optimum as a config that extends the one that was asked about, into its run folder, over no file.
+
+    Raises StorageError if the system refuses.
+    """
+    typed = request.config or DEFAULT
+    file = Path(typed)
+    if typed not in builtin_names():
+        typed = os.path.relpath(file, report.run_dir) if file.is_file() and file.suffix != ".h5" else DEFAULT
+    base = load(file if typed != DEFAULT or request.config == DEFAULT else None).config
+    settings = [setting_of(f"{key}={value!r}") for key, value in report.summary["best"].items()]
+    best = request.loaded.variant(settings).model_copy(update={"design": base.design})
+    text = extending(typed, base, best, f"{base.name}-optimum")
+    for number in itertools.count(1):
+        path = report.run_dir / ("optimum.yaml" if number == 1 else f"optimum-{number}.yaml")
+        with storing(path):
+            if not path.exists():
+                path.write_text(text, encoding="utf-8")
+            if path.read_text(encoding="utf-8") == text:
+                return path
+    raise AssertionError("there is always another name")
 
 
 def show(request: Request, value: dict[str, Any], text: str) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from walkerlab.config.basin import Basin
     from walkerlab.config.contact import Contact
     from walkerlab.config.continuation import Continuation
+    from walkerlab.config.design import Design
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Ground
     from walkerlab.config.robustness import Robustness
@@ -220,6 +221,13 @@ class RobustnessConfig(FixedPointConfig, ContactConfig, Protocol):
     def robustness(self) -> Robustness: ...
 
 
+class DesignConfig(FixedPointConfig, ContactConfig, Protocol):
+    """What `design` takes."""
+
+    @property
+    def design(self) -> Design | None: ...
+
+
 class NamedConfig(Protocol):
     """What `plot` takes."""
 
@@ -230,9 +238,9 @@ class NamedConfig(Protocol):
 if TYPE_CHECKING:
     OfEachType = tuple[
         SimulateConfig, ContactSimConfig, TuneConfig, CompassCasesConfig, SceneCasesConfig, MapsConfig,
-        ContinuationConfig, BasinConfig, RobustnessConfig, NamedConfig,
+        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, NamedConfig,
     ]  # fmt: skip
 
     def of_each_type(config: schema.Config) -> OfEachType:
         """Let mypy see that a config is."""
-        return config, config, config, config, config, config, config, config, config, config
+        return config, config, config, config, config, config, config, config, config, config, config

@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
+from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, drives_of
 from walkerlab.config.fields import Block, key, wrong
 from walkerlab.config.ground import Ground
@@ -229,6 +230,7 @@ class Config(Block):
     continuation: Continuation = Continuation()
     basin: Basin = Basin()
     robustness: Robustness = Robustness()
+    design: Design | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(
         OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces", sequence=True

@@ -23,6 +23,25 @@ def to_yaml(config: Config) -> str:
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
 
 
+def extending(start: str, base: Config, changed: Config, name: str) -> str:
+    """YAML text of a config that extends another one, `base` by the name `start`, and says only what differs."""
+    different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
+    blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
+    return "".join(f"{line}\n" for line in _lines(blocks, ""))
+
+
+def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in changed.items():
+        below = base.get(name)
+        if isinstance(value, dict) and isinstance(below, dict):
+            if inner := _different(below, value):
+                found[name] = inner
+        elif name not in base or value != below:
+            found[name] = value
+    return found
+
+
 def commented(config: Config, left_alone: Collection[str] = ()) -> str:
     """YAML text of `config` with meaning, bounds and unit of each key above it.
 

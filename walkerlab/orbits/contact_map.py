@@ -404,6 +404,10 @@ class ContactMap(StepMap):
             before = step
         return DisturbedWalk(before.outcome, np.array(durations), np.array(lengths), np.array(points))
 
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:  # noqa: ARG002 (the rigid model's is known)
+        """Not known."""
+        return None
+
     def at(self, tolerances: Tolerances) -> ContactMap:
         """The same map, its steps integrated otherwise."""
         other = copy(self)

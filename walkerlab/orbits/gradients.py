@@ -8,8 +8,9 @@ error; that of a multiplier comes from A's by its left and right eigenvectors.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -27,6 +28,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "speed_m_s": "m/s",
     "spectral_radius": "1",
     "gait_sensitivity_norm": "s/m",
+    "cost_of_transport": "1",
 }
 """What is differentiated, with units; the norm is that of the step period for a drop of the floor."""
 OWN = 3  # of them that a step itself has
@@ -44,21 +46,44 @@ class Gradient:
     why: str = ""
 
 
-def gait_numbers(at: Standpoint) -> dict[str, float] | None:
-    """The numbers of a gait, by name; no norm of an unstable one; None where its step ends."""
+def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[str, float] | None:
+    """The numbers of a gait, by name; no norm of an unstable one; None where its step ends.
+
+    wanted  those that are: what a step itself does not tell takes more steps
+    """
     step = at.step_map.step(at.z, at.p)
     if step.outcome is not Outcome.WALKED:
         return None
     radius = float(np.abs(multipliers_of(step.DP)).max())
     found = dict(zip(QUANTITIES, (step.period_s, step.length_m, step.length_m / step.period_s, radius), strict=False))
-    answer = sensitivity(at._replace(A=step.DP), "floor-drop")
-    return found if answer is None else {**found, "gait_sensitivity_norm": float(answer.norm[0])}
+    for name, of in OTHERS.items():
+        value = of(at._replace(A=step.DP)) if name in wanted else None
+        found |= {} if value is None else {name: value}
+    return found
 
 
-def gradients(at: Standpoint, scale: float) -> dict[str, Gradient]:
+def norm_of(at: Standpoint) -> float | None:
+    """The norm of the step period for a drop of the floor; None of an unstable gait."""
+    answer = sensitivity(at, "floor-drop")
+    return None if answer is None else float(answer.norm[0])
+
+
+def cost_of(at: Standpoint) -> float | None:
+    """The cost of transport, where it is known."""
+    return at.step_map.cost_of_transport(at.z, at.p)
+
+
+OTHERS: Final[Mapping[str, Callable[[Standpoint], float | None]]] = {
+    "gait_sensitivity_norm": norm_of,
+    "cost_of_transport": cost_of,
+}
+
+
+def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES) -> dict[str, Gradient]:
     """Derivatives of a gait's numbers by the parameter of its step map; empty where steps beside it end.
 
-    scale  magnitude of changes of the parameter that matter
+    scale   magnitude of changes of the parameter that matter
+    wanted  the numbers, see `gait_numbers`
     """
     d, unity = at.z.size, np.eye(at.z.size)
     h = STEP * at.step_map.tolerances.rtol**0.2 * scale
@@ -78,20 +103,22 @@ def gradients(at: Standpoint, scale: float) -> dict[str, Gradient]:
             return None
         return np.concatenate(((step.period_s, step.length_m, step.length_m / step.period_s), step.DP.ravel()))
 
-    def norm(off: float) -> Floats | None:
-        here = at._replace(z=at.z + off * along, p=at.p + off)
-        step = here.step_map.step(here.z, here.p)
-        answer = None if step.outcome is not Outcome.WALKED else sensitivity(here._replace(A=step.DP), "floor-drop")
-        return None if answer is None else answer.norm[:1]
+    def other(off: float, of: Callable[[Standpoint], float | None]) -> Floats | None:
+        z, p = at.z + off * along, at.p + off
+        step = at.step_map.step(z, p)
+        value = None if step.outcome is not Outcome.WALKED else of(at._replace(z=z, p=p, A=step.DP))
+        return None if value is None else np.array([value])
 
-    changed, of_norm = quotient(of_family, h), quotient(norm, h)
+    changed = quotient(of_family, h)
     if changed is None:
         return {}
-    own = [told(changed.value[k], changed.error[k]) for k in range(OWN)]
     matrix, off = (part[OWN:].reshape(d, d) for part in changed)
-    radius = of_radius(at.A, matrix, off)
-    last = Gradient(None, None, "unstable") if of_norm is None else told(of_norm.value[0], of_norm.error[0])
-    return dict(zip(QUANTITIES, (*own, radius, last), strict=True))
+    own = (told(changed.value[k], changed.error[k]) for k in range(OWN))
+    found = dict(zip(QUANTITIES, (*own, of_radius(at.A, matrix, off)), strict=False))
+    for name, of in OTHERS.items():
+        one = quotient(partial(other, of=of), h) if name in wanted else None
+        found |= {} if one is None else {name: told(one.value[0], one.error[0])}
+    return found
 
 
 def told(value: float, error: float) -> Gradient:

@@ -324,6 +324,14 @@ class RigidMap(StepMap):
         durations = np.diff(walked.time, prepend=0.0) * units.time
         return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z)
 
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        """Of a step of the unit walker, which is that of the walker; None where it ends."""
+        unit = self._unit_at(p)
+        if unit is None:
+            return None
+        taken = take_walk(unit.walker, EXACT, on_section(unit.walker, z), 1)
+        return float(taken.driven.cost_of_transport(taken.lengths_m[0])) if taken.steps else None
+
     def at(self, tolerances: Tolerances) -> RigidMap:
         """The same map, its steps integrated otherwise."""
         other = copy(self)

@@ -116,6 +116,9 @@ class StepMap(Protocol):
         heights_m  (steps + 1,) of the footholds, the present one's first
         """
 
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        """Work given over weight and distance of a step from z (d,); None where it is not known."""
+
     def at(self, tolerances: Tolerances) -> StepMap:
         """The same map, its steps integrated otherwise."""
 

@@ -34,6 +34,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
         "largest_push.0.forward_N_s", "largest_push.0.backward_N_s", "rough_ground.0.mean_steps",
         "rough_ground.1.mean_steps", "rough_ground.2.mean_steps",
     ),
+    "design": ("quantity", "value", "start_value", "best.", "evaluations", "optima"),
     "plot": (),
     "report": (),
 }  # fmt: skip

@@ -76,6 +76,7 @@ class Stage:
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
     follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
+    designs        whether it has a question of its own: `--minimise`, `--maximise`, `--over`, `--keep`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
 
@@ -96,6 +97,7 @@ class Stage:
     alone: bool = False
     early_with: tuple[str, ...] = ()
     follows: bool = False
+    designs: bool = False
     does_without: Lacks = nothing
     takes_of_scene: type | None = None
     takes_of_paper: type | None = None
@@ -219,6 +221,11 @@ PIPELINE = Graph(
         "robustness", "walkerlab.stages.robustness",
         "Ask what a gait stands: drops, pushes, rough ground, and which number of the walker moves it most.",
         reads.RobustnessConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
+    ),
+    Stage(
+        "design", "walkerlab.stages.design",
+        "Find the walker whose gait has the least or largest of a number, within bounds.",
+        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True,
     ),
     Stage(
         "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,

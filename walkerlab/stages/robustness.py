@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -10,8 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.drives import drives_of
 from walkerlab.config.fields import leaves
-from walkerlab.config.reads import RobustnessConfig
+from walkerlab.config.reads import ContactConfig, DesignConfig, RobustnessConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
@@ -30,7 +31,7 @@ from walkerlab.orbits.robustness import (
     sensitivity,
     steps_on_rough_ground,
 )
-from walkerlab.orbits.shooting import EXACT, QUICK
+from walkerlab.orbits.shooting import EXACT, QUICK, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.scene.families import contact_map, rigid_map
@@ -110,7 +111,7 @@ def run(
         numbers = gait_numbers(here)
         assert numbers is not None, "a gait that was found walks"
         found["gaits"].append({"model": subject.model, **numbers})
-        found["sensitivity"] += sensitivities(subject, numbers, progress, jobs)
+        found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs)
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
@@ -156,7 +157,7 @@ class Subject:
     """
 
     model: str
-    config: RobustnessConfig
+    config: ContactConfig
     z: Floats
     scales: Scales
     length_m: float
@@ -179,8 +180,7 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
     gait = inputs["fixedpoint"].summary
     walker: Standing = rigid_walker(config, config.equations)
     _, units = unit_walker(walker)
-    z = np.array(gait["state"])[walker.section[: walker.coordinates]]
-    z[1:] *= units.time
+    z = section_coordinates(walker, gait["state"])
     scales, length = Scales(units.length, units.time, units.impulse), float(gait["step_length_m"])
     asked = config.robustness.model or ("rigid" if config.contact is None else "both")
     if asked != "contact":
@@ -189,8 +189,16 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
         yield contact_subject(config, gait, scales, length, progress)
 
 
+def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
+    """Where a state (SI) lies on the section of the unit walker."""
+    _, units = unit_walker(walker)
+    z = coordinates_of(walker, state)
+    z[1:] *= units.time
+    return z
+
+
 def contact_subject(
-    config: RobustnessConfig, gait: Mapping[str, Any], scales: Scales, length: float, progress: Progress
+    config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], scales: Scales, length: float, progress: Progress
 ) -> Subject:
     """The contact model, off its pads; raises NoAnswer if it has no gait."""
     # Imported here: the rigid model alone does without.
@@ -291,9 +299,11 @@ def walked(model: str, config: RobustnessConfig, parts: Parts) -> dict[str, Rows
     }
 
 
-def sensitivities(subject: Subject, numbers: Mapping[str, float], progress: Progress, jobs: int) -> Rows:
+def sensitivities(
+    subject: Subject, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
+) -> Rows:
     """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
-    keys = subject.config.robustness.to or numbers_read(subject)
+    keys = wanted or numbers_read(subject)
     progress.start(f"robustness: gradients of the {subject.model} model", len(keys))
     rows: Rows = []
     found = in_order([partial(gradients_of, subject, key) for key in keys], jobs, (0,))
@@ -301,7 +311,7 @@ def sensitivities(subject: Subject, numbers: Mapping[str, float], progress: Prog
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
         for name, gradient in of_key.items():
-            if name in numbers:
+            if name in numbers and (name != "cost_of_transport" or drives_of(subject.config)):
                 told = {} if gradient.value is None else relative_effect(gradient, value, numbers[name])
                 unit = QUANTITIES[name] if parameter.unit == "1" else f"{QUANTITIES[name]} per {parameter.unit}"
                 rows.append(

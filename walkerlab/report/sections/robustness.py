@@ -43,6 +43,25 @@ MOVES = (
 )
 
 
+BEST = (
+    Column("number of the config", "to"),
+    Column("best", "best", lambda value: number(value, 7), numeric=True),
+)
+KEPT = (
+    Column("kept", "quantity"),
+    Column("from", "from", number, numeric=True),
+    Column("to", "to", number, numeric=True),
+    Column("there", "value", lambda value: number(value, 6), numeric=True),
+)
+
+
+def designed(summary: Mapping[str, Any]) -> list[str | Table]:
+    """Where the optimum of a design lies, and what of it."""
+    rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
+    found: list[str | Table] = [*words.parts("design.findings", summary), table("Optimum", BEST, rows)]
+    return [*found, table("Kept within bounds", KEPT, summary["constraints"])] if summary["constraints"] else found
+
+
 def section(results: Results) -> Section | None:
     """The answer; None if it was not asked for."""
     summary = results.summary("robustness")

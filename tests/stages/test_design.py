@@ -1,0 +1,111 @@
+"""The design stage: optima against brute grids, bounds kept, questions refused, and the config that it ends in."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.orbits.design import Point, Question, optima, searched
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages import design, fixedpoint
+from walkerlab.stages.graph import PIPELINE
+from walkerlab.stages.progress import Silent
+
+# design contract, section 4
+FIXED_KEYS = {
+    "best", "value", "start_value", "quantity", "constraints", "gradient_norm", "evaluations",
+}  # fmt: skip
+
+
+def run(name, *changes):
+    config = load(Path(name), changes).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return design.run(only(config, PIPELINE["design"].takes), {"fixedpoint": gait}, Silent()).summary
+
+
+def gait_at(name, *changes):
+    config = load(Path(name), changes).config
+    return find_gaits(rigid_walker(config, config.equations)).gait
+
+
+def test_the_optimum_is_that_of_a_brute_grid():
+    """The least spectral radius over the hip's mass, on a grid of 46 walkers."""
+    found = run(
+        "slope-3deg", "design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=3"
+    )
+    assert set(found) >= FIXED_KEYS
+    json.dumps(found, allow_nan=False)
+    masses = np.linspace(5.0, 50.0, 46)
+    radii = [gait_at("slope-3deg", f"walker.hip_mass_kg={mass!r}").spectral_radius for mass in masses.tolist()]
+    assert found["value"] <= min(radii) + 1e-9
+    assert abs(found["best"]["walker.hip_mass_kg"] - masses[int(np.argmin(radii))]) <= 1.0
+    assert found["value"] == pytest.approx(
+        gait_at("slope-3deg", f"walker.hip_mass_kg={found['best']['walker.hip_mass_kg']!r}").spectral_radius, rel=1e-8
+    )
+
+
+def test_other_numbers_are_kept_within_their_bounds_and_a_bound_that_is_reached_is_said():
+    found = run(
+        "slope-3deg", "design.maximise=speed_m_s", "design.over={slope_deg: [1, 4]}",
+        "design.keep={step_length_m: [0.3, 0.5]}", "design.starts=2",
+    )  # fmt: skip
+    assert found["numbers"]["step_length_m"] == pytest.approx(0.5, abs=1e-6)
+    assert found["constraints"][0]["value"] <= 0.5 + 1e-6
+    assert found["on_bound"] == []
+    free = run("slope-3deg", "design.maximise=speed_m_s", "design.over={slope_deg: [1, 4]}", "design.starts=2")
+    assert free["on_bound"] == ["slope_deg"]
+    assert free["best"]["slope_deg"] == pytest.approx(4.0)
+    assert free["value"] > free["start_value"]
+
+
+def test_drawn_starts_end_in_one_place_or_are_said_not_to():
+    asked = ("design.minimise=gait_sensitivity_norm", "design.over={walker.foot_to_mass_m: [0.4, 0.6]}")
+    found = run("slope-3deg", *asked, "design.starts=4", "seed=5")
+    assert found["optima"] == 1
+    assert found["value"] < found["start_value"]
+
+
+def bowls(x):
+    """Two bowls, the deeper one at 0.8; between 0.4 and 0.6 there is nothing."""
+    u = float(x[0])
+    if 0.4 < u < 0.6:
+        return None
+    low, depth = (0.2, 1.0) if u <= 0.4 else (0.8, 0.5)
+    return Point({"f": depth + (u - low) ** 2, "g": u}, {"f": np.array([2.0 * (u - low)]), "g": np.array([1.0])})
+
+
+def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_are():
+    question = Question("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
+    found = searched(question, np.array([0.1]), 12, seed=1)
+    assert found[0].x[0] == pytest.approx(0.8, abs=1e-6)
+    assert optima(question, found) == 2
+    within = Question("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
+    assert searched(within, np.array([0.1]), 4, seed=1)[0].x[0] == pytest.approx(0.2, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ((), "no question"),
+        (("design.minimise=period_s",), "no question"),
+        (("design.minimise=period_s", "design.over={walker.thigh.mass_kg: [1, 2]}"), "walker.thigh.mass_kg"),
+        (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "first below the second"),
+        (("design.minimise=period_s", "design.maximise=speed_m_s"), "leave one out"),
+        (("design.minimise=height",), "design.minimise"),
+        (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "no number of a"),
+    ],
+)  # fmt: skip
+def test_bad_questions_end_in_words(changes, said):
+    with pytest.raises(ConfigError, match=said):
+        run("rigid-only", *changes)
+
+
+def test_bounds_that_no_walker_keeps_are_no_answer():
+    with pytest.raises(NoAnswer, match="keeps the other numbers"):
+        run("slope-3deg", "design.minimise=period_s", "design.over={slope_deg: [2, 3]}",
+            "design.keep={step_length_m: [2, 3]}", "design.starts=1")  # fmt: skip

@@ -1,0 +1,63 @@
+"""The design block: which number of the gait is made least or largest, over which numbers of the config."""
+
+from typing import Final, Literal
+
+from pydantic import ValidationInfo, field_validator
+
+from walkerlab.config.fields import Block, key, wrong
+
+Quantity = Literal[
+    "period_s", "step_length_m", "speed_m_s", "spectral_radius", "gait_sensitivity_norm", "cost_of_transport"
+]
+_NAMES: Final = "period_s, step_length_m, speed_m_s, spectral_radius, gait_sensitivity_norm, cost_of_transport"
+Bounds = dict[str, list[float]]
+
+
+class Design(Block):
+    """What `walkerlab design` looks for."""
+
+    minimise: Quantity | None = key(
+        None, "", "number of the gait that is made least", bounds=_NAMES, default_in_words="none"
+    )
+    maximise: Quantity | None = key(
+        None, "", "number of the gait that is made largest", bounds=_NAMES, default_in_words="none"
+    )
+    over: Bounds = key(
+        dict,
+        "",
+        "numbers of the config that may change, with their bounds, in the key's unit",
+        bounds="[A, B] for each key, A below B",
+        default_in_words="none",
+    )
+    keep: Bounds = key(
+        dict,
+        "",
+        "numbers of the gait that stay within bounds",
+        bounds=f"[A, B] for each of {_NAMES}",
+        default_in_words="none",
+    )
+    model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
+    starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
+
+    @field_validator("maximise")
+    @classmethod
+    def _one_of_both(cls, value: str | None, info: ValidationInfo) -> str | None:
+        if value is not None and info.data.get("minimise") is not None:
+            raise wrong("a number is minimised or maximised: leave one out")
+        return value
+
+    @field_validator("over", "keep")
+    @classmethod
+    def _upwards(cls, value: Bounds) -> Bounds:
+        for name, bounds in value.items():
+            if len(bounds) != 2 or bounds[0] >= bounds[1]:
+                raise wrong(f"{name}: must be two numbers, the first below the second")
+        return value
+
+    @field_validator("keep")
+    @classmethod
+    def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
+        for name in value:
+            if name not in _NAMES.split(", "):
+                raise wrong(f"{name} is no number of a gait; there are {_NAMES}")
+        return value

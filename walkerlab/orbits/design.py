@@ -1,0 +1,156 @@
+"""The least or largest of a gait's numbers over some of a walker's, others kept within bounds.
+
+SciPy's SLSQP on numbers scaled to their bounds, with exact gradients, from several starts. Where there is no gait the
+function is continued by a slope back to the last point that had one, so that a search goes round such places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+PRECISION = 1e-9  # of the quantity over its start's
+MAX_ITERATIONS = 60
+ON_BOUND = 1e-6  # of the range
+SAME = 1e-4  # of the range: ends of searches that are one optimum
+STEEP = 10.0  # slope of the continuation, in the quantity's own size per range
+
+
+@dataclass(frozen=True)
+class Point:
+    """Numbers of a gait at some numbers of the walker, with their gradients by these (variables,)."""
+
+    numbers: Mapping[str, float]
+    gradients: Mapping[str, Floats]
+    apart: float = 1.0  # between the magnitudes of its two largest multipliers
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is looked for.
+
+    quantity  the number that is made least, or largest with `sign` -1
+    lower, upper  (variables,) bounds
+    keep      bounds of other numbers
+    at        the gait at some numbers (variables,); None where there is none
+    """
+
+    quantity: str
+    sign: float
+    lower: Floats
+    upper: Floats
+    keep: Mapping[str, tuple[float, float]]
+    at: Callable[[Floats], Point | None]
+
+
+@dataclass
+class Search:
+    """One search: where it ended, and what it met."""
+
+    x: Floats
+    point: Point | None
+    gradient_norm: float = 0.0
+    evaluations: int = 0
+    without_gait: int = 0
+    said: str = ""
+    seen: dict[bytes, Point | None] = field(default_factory=dict)
+
+
+def sought(question: Question, start: Floats) -> Search:
+    """The optimum that a search from `start` (variables,) comes to."""
+    from scipy.optimize import minimize  # a tenth of a second that nothing else needs
+
+    span = question.upper - question.lower
+    search = Search(start, None)
+
+    def at(u: Floats) -> Point | None:
+        x = question.lower + np.clip(u, 0.0, 1.0) * span
+        if x.tobytes() not in search.seen:
+            search.evaluations += 1
+            search.seen[x.tobytes()] = question.at(x)
+        point = search.seen[x.tobytes()]
+        if point is None:
+            search.without_gait += 1
+        else:
+            search.x, search.point = x, point
+        return point
+
+    first = at((start - question.lower) / span)
+    if first is None:
+        return search
+    size = max(abs(first.numbers[question.quantity]), 1e-300)
+    good = [((search.x - question.lower) / span, first)]
+
+    def value_of(name: str, scale: float) -> Callable[[Floats], tuple[float, Floats]]:
+        def found(u: Floats) -> tuple[float, Floats]:
+            point = at(u)
+            if point is not None and name in point.numbers:
+                good[0] = (u.copy(), point)
+                return scale * point.numbers[name], scale * point.gradients[name] * span
+            last, known = good[0]
+            back = u - last
+            way = float(np.linalg.norm(back)) or 1.0
+            return scale * known.numbers[name] + STEEP * way * way, 2.0 * STEEP * back
+
+        return found
+
+    objective = value_of(question.quantity, question.sign / size)
+    bounds = [
+        (name, limit, sign, value_of(name, 1.0))
+        for name, limits in question.keep.items()
+        for limit, sign in zip(limits, (1.0, -1.0), strict=True)
+    ]
+    constraints = [
+        {
+            "type": "ineq",
+            "fun": lambda u, limit=limit, sign=sign, of=of: sign * (of(u)[0] - limit),
+            "jac": lambda u, sign=sign, of=of: sign * of(u)[1],
+        }
+        for _, limit, sign, of in bounds
+    ]
+    ended = minimize(
+        objective, good[0][0], jac=True, method="SLSQP", bounds=[(0.0, 1.0)] * span.size, constraints=constraints,
+        options={"ftol": PRECISION, "maxiter": MAX_ITERATIONS},
+    )  # fmt: skip
+    at(np.clip(ended.x, 0.0, 1.0))
+    search.said = str(ended.message)
+    free = (ended.x > ON_BOUND) & (ended.x < 1.0 - ON_BOUND)
+    search.gradient_norm = float(np.linalg.norm(objective(ended.x)[1][free]))
+    return search
+
+
+def kept(question: Question, point: Point) -> bool:
+    """Whether other numbers are within their bounds, up to what rounding leaves."""
+    slack = {name: 1e-6 * max(abs(low), abs(high)) for name, (low, high) in question.keep.items()}
+    return all(
+        name in point.numbers and low - slack[name] <= point.numbers[name] <= high + slack[name]
+        for name, (low, high) in question.keep.items()
+    )
+
+
+def searched(question: Question, own: Floats, starts: int, seed: int) -> list[Search]:
+    """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front."""
+    drawn = np.random.default_rng(seed).uniform(question.lower, question.upper, (starts - 1, own.size))
+    found = [sought(question, start) for start in (np.clip(own, question.lower, question.upper), *drawn)]
+    ended = [one for one in found if one.point is not None]
+
+    def rank(one: Search) -> tuple[bool, float]:
+        assert one.point is not None
+        return not kept(question, one.point), question.sign * one.point.numbers[question.quantity]
+
+    return sorted(ended, key=rank)
+
+
+def optima(question: Question, searches: list[Search]) -> int:
+    """How many different optima searches came to, of those that keep the bounds."""
+    span, ends = question.upper - question.lower, list[Floats]()
+    for one in searches:
+        if one.point is not None and kept(question, one.point):
+            u = (one.x - question.lower) / span
+            if all(np.abs(u - other).max() > SAME for other in ends):
+                ends.append(u)
+    return len(ends)

@@ -1,0 +1,174 @@
+"""The walker whose gait has the least or largest of a number, within bounds: a config that extends the start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.config.design import Design
+from walkerlab.config.reads import DesignConfig
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import without_contact
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.labels import Label
+from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.design import ON_BOUND, Floats, Point, Question, optima, searched
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.gradients import gait_numbers, gradients
+from walkerlab.orbits.robustness import Scales, Standpoint
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near, multipliers_of
+from walkerlab.scene.parameter import Parameter, parameter_of
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.stages.progress import Progress
+from walkerlab.stages.robustness import Subject, contact_subject, section_coordinates
+from walkerlab.store.columns import rows_group
+from walkerlab.store.content import Content
+
+RESIDUAL: Final = 1e-10
+MEETING: Final = 1e-3  # between magnitudes of multipliers
+LABELS: Final = {
+    "to": Label("", "number of the config"),
+    "start": Label("SI", "where the search began"),
+    "best": Label("SI", "where the optimum is, in the unit of the key"),
+}
+ADVICE: Final = "Widen the bounds (--over), or let other numbers go further (--keep)."
+
+
+def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Search; raises ConfigError for a question that cannot be meant, NoAnswer where no walker keeps the bounds."""
+    asked = config.design or Design()
+    quantity = asked.minimise or asked.maximise
+    if quantity is None or not asked.over:
+        raise ConfigError(
+            "design has no question: it needs a number of the gait and the numbers of the config that may change.",
+            "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
+        )
+    if asked.model == "contact" and config.contact is None:
+        raise without_contact("design.model: contact", config.walker, "Add one.")
+    parameters = [parameter_of(key, config) for key in asked.over]
+    gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
+    lower, upper = np.array(list(asked.over.values()), float).T
+    keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
+    question = Question(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
+    own = np.array([parameter.value_in(config) for parameter in parameters])
+    progress.start("design")
+    begun = gaits.at(own)
+    searches = searched(question, own, asked.starts, config.seed)
+    if not searches or searches[0].point is None:
+        raise NoAnswer(f"no gait of the {asked.model} model within the bounds", ADVICE)
+    best = searches[0]
+    assert best.point is not None
+    ends = optima(question, searches)
+    start = {} if begun is None else {"start_value": begun.numbers[quantity], "start": dict(begun.numbers)}
+    found = dict(zip(asked.over, best.x.tolist(), strict=True))
+    said = {
+        "quantity": quantity,
+        "sense": "least" if asked.minimise else "largest",
+        "model": asked.model,
+        "best": found,
+        "value": best.point.numbers[quantity],
+        **start,
+        "numbers": dict(best.point.numbers),
+        "constraints": [
+            {"quantity": name, "from": low, "to": high, "value": best.point.numbers[name]}
+            for name, (low, high) in keep.items()
+        ],
+        "on_bound": on_bound(asked, best.x),
+        "gradient_norm": best.gradient_norm,
+        "evaluations": gaits.evaluations,
+        "without_gait": gaits.without,
+        "optima": ends,
+        "starts": asked.starts,
+        "multipliers_meet": best.point.apart < MEETING,
+    }
+    rows = [
+        {"to": key, "start": float(begins), "best": value}
+        for (key, value), begins in zip(found.items(), own, strict=True)
+    ]
+    content = Content({"optimum": rows_group(rows, LABELS, "row", "row")}, said)
+    if not ends:
+        raise NoAnswer("no walker within the bounds keeps the other numbers of its gait within theirs", ADVICE, content)
+    return content
+
+
+def on_bound(asked: Design, x: Floats) -> list[str]:
+    """The keys of which the optimum lies on a bound."""
+    pairs = zip(asked.over.items(), x.tolist(), strict=True)
+    return [key for (key, (low, high)), value in pairs if min(value - low, high - value) < ON_BOUND * (high - low)]
+
+
+class Gaits:
+    """The gait at numbers of the config, with its gradients, each sought from the last one."""
+
+    def __init__(
+        self,
+        config: DesignConfig,
+        asked: Design,
+        parameters: list[Parameter],
+        gait: Mapping[str, Any],
+        progress: Progress,
+    ) -> None:
+        """Begin at the gait of the config."""
+        self.config, self.model, self.parameters, self.progress = config, asked.model, parameters, progress
+        walker = rigid_walker(config, config.equations)
+        self.wanted = {*filter(None, (asked.minimise, asked.maximise)), *asked.keep}
+        self.evaluations, self.without = 0, 0
+        self.length = float(gait["step_length_m"])
+        if asked.model == "contact":
+            self.z = contact_subject(config, gait, scales_of(walker), self.length, progress).z
+        else:
+            self.z = section_coordinates(walker, gait["state"])
+
+    def at(self, x: Floats) -> Point | None:
+        """The gait; None where there is none, or the config refuses the numbers."""
+        self.evaluations += 1
+        self.progress.advance()
+        changed: Config | None = None
+        for parameter, value in zip(self.parameters, x.tolist(), strict=True):
+            changed = parameter.config_at(self.config if changed is None else changed, value)
+            if changed is None:
+                return None
+        assert changed is not None, "some number changes"
+        found = self.gait_of(changed)
+        if found is None:
+            self.without += 1
+        return found
+
+    def gait_of(self, config: Config) -> Point | None:
+        """The gait of a config: near the last one, or where a search finds it."""
+        walker = rigid_walker(config, config.equations)
+        subject = Subject(self.model, config, self.z, scales_of(walker), self.length)
+        here = subject.at()
+        found = self.near(here, self.z)
+        if found is None and self.model == "rigid":
+            gait = find_gaits(walker, config.seed).gait
+            found = None if gait is None else self.near(here, section_coordinates(walker, gait.state))
+        if found is None:
+            return None
+        here, numbers = found
+        self.z, subject, by_key = here.z, replace(subject, z=here.z), []
+        for parameter in self.parameters:
+            of_key = gradients(subject.at(parameter), abs(parameter.value_in(config)) or 1e-2, self.wanted)
+            if any(name not in of_key for name in self.wanted):
+                return None
+            by_key.append({name: of_key[name].value or 0.0 for name in self.wanted})
+        others = np.sort(np.abs([value for value in multipliers_of(here.A) if value.imag >= 0.0]))
+        apart = float(others[-1] - others[-2]) if others.size > 1 else 1.0
+        return Point(numbers, {name: np.array([one[name] for one in by_key]) for name in self.wanted}, apart)
+
+    def near(self, at: Standpoint, z: Floats) -> tuple[Standpoint, dict[str, float]] | None:
+        """The gait near z (d,) with its numbers; None where it has not all that are wanted."""
+        cycle = gait_near(at.step_map, z, at.p, 1, RESIDUAL)
+        here = at if cycle is None else at._replace(z=cycle.z, A=cycle.DP)
+        numbers = None if cycle is None else gait_numbers(here, self.wanted)
+        return None if numbers is None or any(name not in numbers for name in self.wanted) else (here, numbers)
+
+
+def scales_of(walker: Standing) -> Scales:
+    """Units of a walker."""
+    _, units = unit_walker(walker)
+    return Scales(units.length, units.time, units.impulse)
