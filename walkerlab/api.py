@@ -402,7 +402,9 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     over    bounds (low, high) of numbers of the config, in the key's unit
     keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
     """
-    own = {name: keys.pop(name) for name in ("minimise", "maximise", "keep", "model", "starts") if name in keys}
+    own: dict[str, Any] = {
+        name: keys.pop(name) for name in ("minimise", "maximise", "keep", "model", "starts") if name in keys
+    }
     asked: dict[str, Any] = {"over": over or {}, **own}
     for name in BOUNDED:
         if name in asked:

@@ -5,6 +5,7 @@ from typing import Any
 from walkerlab.ground.hip import hip_energy
 from walkerlab.ground.knees import knee_energy
 from walkerlab.ground.normal_force import elastic_energy
+from walkerlab.ground.pulse import pulse_power
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
@@ -59,6 +60,16 @@ def total_energy(system: OnGround, y: Any) -> float:
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
     return total + knee_energy(system, y) + hip_energy(system, y)
+
+
+@inlined
+def push_power(system: OnGround, t: float, y: Any) -> float:
+    """Power (W) that the push-off gives."""
+    if system.form.push_off == 0.0:
+        return 0.0
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(system.form, y, s, c)
+    return pulse_power(system, t, s, c, one_foot_motion(system.form, 1 - system.feet[0], y))
 
 
 @inlined

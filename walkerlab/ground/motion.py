@@ -4,6 +4,7 @@ from typing import Any
 
 from walkerlab.ground.hip import add_hip_gradients, add_hip_torque
 from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
+from walkerlab.ground.pulse import add_pulse, add_pulse_gradients
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
@@ -47,8 +48,8 @@ def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -
 
 
 @always_inline
-def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Force of the ground along and normal to the slope (N); M (n, n) and all torques on the bodies (N m) into r (n,).
+def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
+    """Force of ground and push-off along and normal to the slope (N); M (n, n) and all torques (N m) into r (n,).
 
     They are those of the ground, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
     gravity.
@@ -67,6 +68,9 @@ def all_forces(system: OnGround, s: Any, c: Any, y: Any, M: Any, r: Any) -> tupl
             push = ground_wrench(system, foot, s, c, y, r)
             along += push[0]
             normal += push[1]
+    pulse = add_pulse(system, t, s, c, r)
+    along += pulse[0]
+    normal += pulse[1]
     add_stop_torques(system, y, r)
     add_hip_torque(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
@@ -80,7 +84,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
-    along, normal = all_forces(system, s, c, y, M, r)
+    along, normal = all_forces(system, t, s, c, y, M, r)
     links = Counted(form.E, form.arm_x[:n])
     factor_linked(links, 0, M, r)
     solve_linked(links, 0, M, r)
@@ -162,7 +166,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     sines_cosines(form, y, s, c)
-    all_forces(system, s, c, y, M, alpha)
+    all_forces(system, t, s, c, y, M, alpha)
     links = Counted(form.E, form.arm_x[:n])
     factor_linked(links, 0, M, alpha)
     solve_linked(links, 0, M, alpha)
@@ -174,6 +178,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     for foot in range(2):
         if system.has_ground[foot] != 0:
             add_ground_gradients(system, foot, s, c, y, J)
+    add_pulse_gradients(system, t, s, c, J)
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])
     for j in range(2 * half):
         for k in range(n):

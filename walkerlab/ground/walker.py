@@ -171,6 +171,7 @@ class OnGround(NamedTuple):
     knee: Any  # (2,) what each knee is doing
     feet: Any  # that of a walk state: the stance foot first
     level: Any  # (2,) m, height over the slope of the ground for each foot
+    times: Any  # that of a walk state: the last touch (s) first
 
 
 def on_ground(
@@ -178,8 +179,9 @@ def on_ground(
     has_ground: Any,
     knee: Any = (RELEASED, RELEASED),
     hinged: bool = False,
-    feet: Any = (1,),
+    feet: Any = (1, 0),
     level: Any = (0.0, 0.0),
+    times: Any = (0.0,),
 ) -> OnGround:
     """The walker in the form that its knees give it.
 
@@ -187,9 +189,11 @@ def on_ground(
     knee        (2,) what each knee is doing
     feet        the stance foot, and what a walk state has behind it
     level       (2,) m, height of the ground for each foot
+    times       the last touch (s), and what a walk state has behind it
     """
     memory = (
-        np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64), np.asarray(level, float)
+        np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64),
+        np.asarray(level, float), np.asarray(times, float),
     )  # fmt: skip
     form = walker.forms[int(hinged), locked_knees(knee)]
     return OnGround(form, walker.normal, walker.friction, walker.stop, *memory)

@@ -36,6 +36,7 @@ PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
 # event functions of both knees: how far beyond straight, and how fast it gets there
 EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
+PULSE_END = EVENT_FUNCTIONS  # no event function's, but the clock's
 NO_SIDE = 0  # of an event function that may cross zero either way
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
@@ -172,7 +173,7 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
             at = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
         if at < best:
             best, event = at, index
-    if walk_state.releasing[0] != 0:
+    if walk_state.releasing[0] == 1:
         index = walk_state.feet[STANCE] * PER_FOOT + VERTICAL_VELOCITY
         at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
         if at < best:

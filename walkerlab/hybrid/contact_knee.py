@@ -17,33 +17,36 @@ from walkerlab.ground.walker import (
     sines_cosines,
     unfolded,
 )
-from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT
+from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
 from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
 from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.scipy_methods import right_hand_side
+from walkerlab.solvers.stepping import T
 
 Floats = NDArray[np.float64]
 
 
 def change_form(
-    walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, y: Any
+    walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
     """The state in the form after an event that locked or released a knee; what it cost is noted, the tangent jumps.
 
-    So it does where a step's touch has the torque between the legs change them.
+    So it does where a step's touch has the torque between the legs change them. Of a walker that pushes off, whose
+    pulse is as old as the touch, the tangent is that of walks that touch together from then on.
 
     A lock is a plastic impact; what a latch holds in its spring is lost; a release changes no velocity.
 
-    y  the state in the form before
+    method  stands where the walk came back, with the state in the form before
     """
+    y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     x = unfolded(before.form, y, size)
     new, reset = x, np.eye(size)
     if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
         before = before._replace(feet=1 - after.feet)
-    if event >= EXTENSION:
+    if EXTENSION <= event < PULSE_END:
         new, lost, reset = lock(whole, after.form, x)
         observer.dissipated[KNEE_STRIKES] += lost
         if event >= EXTENSION_RATE:
@@ -54,17 +57,22 @@ def change_form(
     z = folded(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
-        rate, rate_after = rate_of(before, y, size), rate_of(after, z, size)
-        gradient, column = event_gradient(whole, event, x), unfolded(before.form, Phi[: y.size], size)
-        later = (gradient @ column) / (gradient @ rate)
+        rate, rate_after = rate_of(before, y, size, t), rate_of(after, z, size, t)
+        column = unfolded(before.form, Phi[: y.size], size)
+        later = np.zeros(Phi.shape[1])
+        if event != PULSE_END:
+            gradient = event_gradient(whole, event, x)
+            later = (gradient @ column) / (gradient @ rate)
+        if event < EXTENSION and before.form.push_off != 0.0 and event % PER_FOOT == HEIGHT:
+            rate_after = np.zeros(size)
         Phi[: z.size] = folded(after.form, reset @ column + np.outer(rate_after - reset @ rate, later))
     return z
 
 
-def rate_of(system: OnGround, y: Floats, size: int) -> Floats:
-    """dy/dt of all bodies (size,)."""
+def rate_of(system: OnGround, y: Floats, size: int, t: float) -> Floats:
+    """dy/dt of all bodies (size,) at a time (s)."""
     rate = np.zeros(y.size)
-    right_hand_side(system, 0.0, y, rate)
+    right_hand_side(system, t, y, rate)
     return unfolded(system.form, rate, size)
 
 

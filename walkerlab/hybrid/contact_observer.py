@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, total_energy
+from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hip import hip_power
 from walkerlab.ground.knees import knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
@@ -25,6 +25,9 @@ MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
 # the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
 NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
 WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
+
+
+Works = tuple[float, float, float, float, float, float]
 
 
 @by_reference
@@ -74,13 +77,13 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         fraction = (observer.times[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, observer.states[index])
-        damping, friction, stops, hip, _ = work_until(method, system, fraction)
+        damping, friction, stops, hip, _, push = work_until(method, system, fraction)
         for channel in range(CHANNEL_COUNT):
             observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
         observer.sampled_dissipation[index, DAMPING] += damping
         observer.sampled_dissipation[index, FRICTION] += friction
         observer.sampled_dissipation[index, KNEE_STOP] += stops
-        observer.sampled_work[index, PUSH_OFF] = observer.work[SO_FAR, PUSH_OFF]
+        observer.sampled_work[index, PUSH_OFF] = observer.work[SO_FAR, PUSH_OFF] + push
         observer.sampled_work[index, HIP] = observer.work[SO_FAR, HIP] + hip
         for k in range(2):
             observer.knees[index, k] = walk_state.knee[k]
@@ -94,9 +97,10 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 @inlined
 def add_dissipation(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """What the last step dissipated, and how well the energy balances at its end."""
-    damping, friction, stops, hip, forward = work_until(method, system, 1.0)
+    damping, friction, stops, hip, forward, push = work_until(method, system, 1.0)
     work = observer.work[SO_FAR]
     work[HIP] += hip
+    work[PUSH_OFF] += push
     work[FORWARD] += forward
     observer.dissipated[DAMPING] += damping
     observer.dissipated[FRICTION] += friction
@@ -142,20 +146,20 @@ def end_energy(method: Any, system: OnGround) -> float:
 
 
 @by_type_or_default
-def work_until(method: Any, system: OnGround, fraction: float) -> tuple[float, float, float, float, float]:
+def work_until(method: Any, system: OnGround, fraction: float) -> Works:
     """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step.
 
-    Then what the hip gave, and what of its torque's was positive.
+    Then what the hip gave, what of its torque's was positive, and what the push-off gave.
     """
     states = matrix(OF_STATES)
     for i in range(len(NODES)):
         interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
-    return lost_work(system, states, fraction * (method.clock[T] - method.clock[T_OLD]))
+    return lost_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]))
 
 
 @inlined
-def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float, float, float, float]:
-    """`work_until` of a time `span` (s), with the states at its NODES."""
+def lost_work(system: OnGround, states: Any, begin: float, span: float) -> Works:
+    """`work_until` of a time `span` (s) from `begin` on, with the states at its NODES."""
     damping, friction, stops = 0.0, 0.0, 0.0
     for foot in range(2):
         if system.has_ground[foot] != 0:
@@ -165,12 +169,13 @@ def lost_work(system: OnGround, states: Any, span: float) -> tuple[float, float,
     if system.knee[0] == STOPPING or system.knee[1] == STOPPING:
         for i in range(1, len(NODES)):
             stops += span * WEIGHTS[i] * knee_power(system, states[i])
-    hip, forward = 0.0, 0.0
+    hip, forward, push = 0.0, 0.0, 0.0
     for i in range(1, len(NODES)):
         power = hip_power(system, states[i])
         hip += span * WEIGHTS[i] * power[0]
         forward += span * WEIGHTS[i] * power[1]
-    return damping, friction, stops, hip, forward
+        push += span * WEIGHTS[i] * push_power(system, begin + NODES[i] * span, states[i])
+    return damping, friction, stops, hip, forward, push
 
 
 @inlined
@@ -198,9 +203,9 @@ def energy_of(system: OnGround, y: Any) -> float:
 
 
 @kernel
-def lost_work_of(system: OnGround, states: Any, span: float) -> tuple[float, float, float, float, float]:
+def lost_work_of(system: OnGround, states: Any, begin: float, span: float) -> Works:
     """As `lost_work`."""
-    return lost_work(system, states, span)
+    return lost_work(system, states, begin, span)
 
 
 @end_energy.case(ScipyMethod)
@@ -210,9 +215,10 @@ def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
 
 
 @work_until.case(ScipyMethod)
-def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> tuple[float, float, float, float, float]:
+def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> Works:
     """Likewise."""
-    damping, friction, stops, hip, forward = lost_work_of(
-        system, method.states_at(fraction * np.array(NODES)), fraction * (method.clock[T] - method.clock[T_OLD])
+    states, begin = method.states_at(fraction * np.array(NODES)), method.clock[T_OLD]
+    damping, friction, stops, hip, forward, push = lost_work_of(
+        system, states, begin, fraction * (method.clock[T] - begin)
     )
-    return damping, friction, stops, hip, forward
+    return damping, friction, stops, hip, forward, push

@@ -3,6 +3,7 @@
 from typing import Any
 
 from walkerlab.ground.knees import FLEXED, IdealLock, extension
+from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import (
     Terrain,
     foothold_height,
@@ -50,6 +51,7 @@ TRIP = 0.25  # of the stride measure: how far from where it stood a foot must co
 FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
 BENT_KNEE, STUBBED = int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
 GOES_ON = -1
+OWED = 2  # of a knee's release: it comes when the push-off ends
 
 
 @inlined
@@ -110,7 +112,10 @@ def apply_event(
             return OFF_PAD
     elif kind == VERTICAL_VELOCITY:
         walk_state.at_zero[event] = 0
-        release(walk_state, 1 - foot)
+        if pulse_left(system, t) > 0.0:
+            walk_state.releasing[0] = OWED
+        else:
+            release(walk_state, 1 - foot)
     return GOES_ON
 
 
@@ -284,7 +289,9 @@ def is_straight(form: Form, walk_state: WalkState, foot: int) -> bool:
 def follow_strike(form: Form, walk_state: WalkState, trailing: int) -> None:
     """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
     if form.kneed:
-        if form.release_at_touch:
+        if form.release_at_touch and form.push_off != 0.0:
+            walk_state.releasing[0] = OWED
+        elif form.release_at_touch:
             release(walk_state, trailing)
         else:
             walk_state.releasing[0] = 1

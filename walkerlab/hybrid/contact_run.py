@@ -251,7 +251,9 @@ def new_observer(
     samples = times.size
     extremes = np.zeros(4)
     if track_energy:
-        here = on_ground(walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level)
+        here = on_ground(
+            walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level, times=walk_state.times
+        )
         extremes[START_ENERGY] = total_energy(here, y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
@@ -291,7 +293,9 @@ def walk_on(
     Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    memory = walk_state.has_ground, walk_state.knee, hinged, walk_state.feet, walk_state.level
+    memory = (
+        walk_state.has_ground, walk_state.knee, hinged, walk_state.feet, walk_state.level, walk_state.times
+    )  # fmt: skip
     system = on_ground(walker, *memory)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
@@ -310,7 +314,7 @@ def walk_on(
         if ended != GOES_ON:
             break
         before, system = system, on_ground(walker, *memory)
-        y = change_form(walker, before, system, event, observer, method.y)
+        y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
     end = floating_state(system.form, method.y, walker.size)

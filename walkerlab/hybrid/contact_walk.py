@@ -5,6 +5,7 @@ Compiled as a whole for the project's own methods; the same source runs in Pytho
 
 from typing import Any
 
+from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import is_uneven
 from walkerlab.ground.walker import OF_STATES, OnGround, locked_knees
 from walkerlab.hybrid.contact_events import (
@@ -12,6 +13,8 @@ from walkerlab.hybrid.contact_events import (
     LAST_TOUCH,
     PASSES_SWITCHING,
     PASSING,
+    PULSE_END,
+    STANCE,
     STEPS,
     Frame,
     JudgedGround,
@@ -21,7 +24,7 @@ from walkerlab.hybrid.contact_events import (
     sample_event_functions,
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, note_work, observe
-from walkerlab.hybrid.contact_rules import GOES_ON, apply_event, is_above, is_to_lift, note_flexion
+from walkerlab.hybrid.contact_rules import GOES_ON, OWED, apply_event, is_above, is_to_lift, note_flexion, release
 from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import CrossingFinder
@@ -121,7 +124,7 @@ def walk_in_form(
     """
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     arriving, refinements, rewinds, event = False, 0, 0, -1
-    target = deadline(ground.frame, walk_state)
+    target = deadline(system, ground.frame, walk_state, method.clock[T])
     latest = target  # the end of the step in which an event was found: it is not sought beyond
     watch_order = ground.terrain.order_matters or until >= 0 or is_uneven(ground.terrain)
     locked = locked_knees(walk_state.knee)
@@ -185,11 +188,14 @@ def walk_in_form(
             if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
                 return WALKED, event
             # where the motion jumps the tangent does, too: in another form, and where a hip's torque changes legs
-            if locked_knees(walk_state.knee) != locked or (stepped and system.form.hip_torque != 0.0):
+            if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
                 return GOES_ON, event
             if not is_switching(event):
                 begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
-        target = deadline(ground.frame, walk_state)
+        if walk_state.releasing[0] == OWED and pulse_left(system, method.clock[T]) <= EVENT_TIME:
+            release(walk_state, 1 - walk_state.feet[STANCE])
+            return GOES_ON, PULSE_END
+        target = deadline(system, ground.frame, walk_state, method.clock[T])
     return WALKED, event
 
 
@@ -200,8 +206,17 @@ def is_hinged(system: OnGround) -> bool:
 
 
 @inlined
-def deadline(frame: Frame, walk_state: WalkState) -> float:
-    """When the walk ends if nothing happens before: too long a step, or too long a flight (s)."""
+def jumps_at_touch(system: OnGround) -> bool:
+    """Whether a step's touch changes what acts on the walker at once: torque changes legs, a push-off begins."""
+    return system.form.hip_torque != 0.0 or system.form.push_off != 0.0
+
+
+@inlined
+def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
+    """When the walk ends if nothing happens before: too long a step, or too long a flight (s); or when a pulse does."""
+    left = pulse_left(system, t)
+    if left > EVENT_TIME:
+        return t + left
     by_step = walk_state.times[LAST_TOUCH] + LONGEST_STEP * frame.pendulum_time
     by_flight = walk_state.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * frame.pendulum_time
     return min(by_step, by_flight)

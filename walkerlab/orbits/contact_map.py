@@ -191,8 +191,15 @@ def step_from_section(
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     if derived:  # the flow's, less how it shifts the moment at which the feet pass
-        system = on_ground(walker, walk_state.has_ground, walk_state.knee, feet=walk_state.feet, level=walk_state.level)
-        rate = rate_of(system, folded(system.form, end), end.size)
+        system = on_ground(
+            walker,
+            walk_state.has_ground,
+            walk_state.knee,
+            feet=walk_state.feet,
+            level=walk_state.level,
+            times=walk_state.times,
+        )
+        rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
         Phi = observer.tangent.Phi

@@ -1,0 +1,146 @@
+"""The push-off's pulse on compliant ground: values known, derivatives, energy, and its limit, the rigid impulse."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.ground.pulse import add_pulse, pulse_force
+from walkerlab.ground.walker import OF_BODIES, on_ground
+from walkerlab.orbits.contact_map import step_from_section
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.outcome import Outcome
+from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.scipy_methods import right_hand_side
+from walkerlab.solvers.system import jacobian
+
+WALK = Tolerances("radau5", 1e-8, 1e-10, 10**7)
+TIGHT = Tolerances("radau5", 1e-12, 1e-13, 10**7)
+
+
+def scene_of(name, *changes):
+    config = load(Path(name), changes).config
+    gait = find_gaits(rigid_walker(config, config.equations)).gait
+    return config, contact_scene(config, gait.step_length, gait.step_length), gait
+
+
+def walked(name, *changes, steps=10):
+    _, scene, gait = scene_of(name, *changes)
+    return scene.walk(start_state(scene, gait.state), steps, WALK, 0.01), gait
+
+
+def test_the_paper_compass_walks_the_level_with_short_pulses_and_leaves_its_pads_with_a_long_one():
+    """The paper's contact, 4 N s: values of another derivation and code."""
+    short, _ = walked("level", "push_off.duration_s=0.005")
+    assert short.outcome is Outcome.WALKED
+    assert short.periods_s[0] == pytest.approx(0.70, abs=0.005)
+    assert short.periods_s.min() == pytest.approx(0.689, abs=0.001)
+    assert short.lengths_m[0] == pytest.approx(0.402, abs=0.0005)
+    assert short.lengths_m[-1] == pytest.approx(0.397, abs=0.0005)
+    assert walked("level", "push_off.duration_s=0.02")[0].outcome is Outcome.WALKED
+    long, _ = walked("level", "push_off.duration_s=0.05")
+    assert (long.outcome, long.steps) == (Outcome.OFF_PAD, 7)
+
+
+def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
+    _, scene, _ = scene_of("level")
+    system = on_ground(scene.walker, (True, True), feet=(1, 1), times=(2.0,))
+    times = 2.0 + np.linspace(-0.001, 0.006, 70_001)
+    force = np.array([pulse_force(system, t) for t in times])
+    assert np.trapezoid(force, times) == pytest.approx(4.0, rel=1e-6)
+    assert not force[(times < 1.99999) | (times > 2.00501)].any()
+    assert np.abs(np.diff(force)).max() < 1e-3 * force.max()
+    before_any_touch = on_ground(scene.walker, (True, True), feet=(1, 0), times=(2.0,))
+    assert pulse_force(before_any_touch, 2.002) == 0.0
+
+
+@pytest.mark.parametrize("name", ["level", "kneed-level"])
+def test_the_equations_derivatives_in_a_pulse_are_differences(name):
+    _, scene, gait = scene_of(name, "push_off.impulse_N_s=1")
+    system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
+    y = np.array(start_state(scene, gait.state))
+    J, t = np.zeros((y.size, y.size)), 0.3 * scene.walker.whole.push_off_duration
+    jacobian(system, t, y, J)
+
+    def rate(y):
+        f = np.zeros(y.size)
+        right_hand_side(system, t, y, f)
+        return f
+
+    for j in range(y.size):
+        h = 1e-5 * np.eye(y.size)[j]
+        slope = (8.0 * (rate(y + h) - rate(y - h)) - (rate(y + 2 * h) - rate(y - 2 * h))) / 12e-5
+        np.testing.assert_allclose(J[:, j], slope, rtol=1e-6, atol=1e-5)
+
+
+def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothing_about_the_hip():
+    """About the hip, the root's acceleration taken along, the trailing leg feels no torque of it."""
+    _, scene, gait = scene_of("level")
+    system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
+    form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
+    n = int(form.bodies)
+    s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(OF_BODIES))
+    along, upward = add_pulse(system, 0.0025, s, c, r)
+    hip_F = c * form.hip_x[:n] - s * form.hip_y[:n]
+    hip_U = s * form.hip_x[:n] + c * form.hip_y[:n]
+    trailing = 0
+    # moving the force to the hip changes the trailing leg's torque by nothing
+    assert r[trailing] == pytest.approx(float(-along * hip_U[trailing] + upward * hip_F[trailing]), abs=1e-9)
+    assert upward > 0.0
+
+
+@pytest.mark.parametrize("name", ["level", "kneed-level"])
+def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
+    config, _, gait = scene_of(name)
+    found = gait_off_pads(config, gait.step_length, gait.state)
+    assert found.gait is not None, found.reason
+    scene = contact_scene(
+        config.model_copy(update={"contact": config.contact.model_copy(update={"terrain": "after-mid-swing"})}),
+        gait.step_length,
+    )
+    z = np.array(found.gait.z)
+
+    def step(z, derived=False):
+        taken = step_from_section(scene.walker, scene.ground, TIGHT, z, gait.step_length, derived)
+        assert taken.outcome is Outcome.WALKED
+        return taken
+
+    DP = step(z, derived=True).DP
+    for j in range(z.size):
+        h = 3e-6 * np.eye(z.size)[j]
+        ends = {k: step(z + k * h).z for k in (-2, -1, 1, 2)}
+        slope = (8.0 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / (12.0 * h[j])
+        np.testing.assert_allclose(DP[:, j], slope, rtol=1e-4, atol=2e-4)
+
+
+def test_the_energy_of_a_pushed_walk_balances():
+    for name in ("level", "kneed-level"):
+        walk, _ = walked(name, steps=4)
+        assert walk.energy_balance_residual_J < walk.explained_residual_J
+        assert walk.driven.push_off > 0.0
+
+
+def test_pulses_shorter_than_the_grounds_own_time_come_to_the_rigid_impulse_as_the_ground_stiffens():
+    """Only then do landing and push-off happen together; a longer pulse finds the leading foot at rest already."""
+    law, off = load(Path("level")).config.contact, {}
+    for factor, durations in ((1.0, (1e-6,)), (100.0, (1e-3, 1e-4, 3e-5))):
+        changed = {
+            "stiffness": law.stiffness * factor, "damping": law.damping * factor**0.5,
+            "full_damping_penetration": law.full_damping_penetration / factor ** (1.0 / law.exponent),
+            "stiction_velocity": law.stiction_velocity / factor, "friction_velocity": law.friction_velocity / factor,
+        }  # fmt: skip
+        changes = [f"contact.{key}={value!r}" for key, value in changed.items()]
+        for duration in durations:
+            pulse = f"push_off.duration_s={duration!r}"
+            walk, gait = walked("level", *changes, "contact.terrain=after-mid-swing", pulse, steps=2)
+            off[factor, duration] = abs(walk.periods_s[1] - gait.period)
+    assert off[100.0, 3e-5] < 0.1 * off[100.0, 1e-4] < 0.1 * off[100.0, 1e-3]
+    assert off[100.0, 3e-5] < 1e-2 * off[1.0, 1e-6]
+
+
+def test_a_passive_walk_does_not_know_the_pulses_duration():
+    (one, _), (other, _) = (walked("slope-3deg", f"push_off.duration_s={d}", steps=2) for d in (0.005, 0.02))
+    np.testing.assert_array_equal(one.samples.states, other.samples.states)
