@@ -80,10 +80,14 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)
+    if scene.walker.whole.push_off != 0.0:
+        pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
+        pushed = (walk.touch_time_s[:, None] + pulse).ravel()
+        grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
     for _ in range(PASSES):
         samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
         assert samples is not None, "the walk was looked at"
-        given = impulse_rate(samples, scene, config) / scale
+        given = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
         change = unsettled(samples.time_s, given)
         wanting = change > SETTLED / grid.size
         if not wanting.any() or grid.size > MAX_INTERVALS:
@@ -125,15 +129,30 @@ def unsettled(times: Array, rate: Array) -> Array:
     return np.asarray(np.abs(change).max(axis=1))
 
 
-def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig) -> Array:
-    """Force along and up from the slope (N), and torque about a point of the slope (N m), of ground and gravity."""
+def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Array) -> Array:
+    """Force along and up from the slope (N), and torque about a point of the slope (N m).
+
+    They are those of ground and gravity and, from the times of touches (steps,) on, of push-offs.
+    """
     feet = np.zeros((samples.time_s.size, 2, 5))
     sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
     along, height, normal, friction = np.moveaxis(feet[:, :, :4], 2, 0)
     slope = config.slope_rad
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)
-    return np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
+    given = np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
+    form, every = scene.walker.whole, np.arange(samples.time_s.size)
+    if form.push_off != 0.0:
+        pushing, y = 1 - samples.stance, samples.states
+        foot = np.column_stack([along[every, pushing], height[every, pushing]])
+        turned = y[:, 2 : y.shape[1] // 2] + slope
+        s, c, x, up = np.sin(turned), np.cos(turned), form.hip_x[: turned.shape[1]], form.hip_y[: turned.shape[1]]
+        line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
+        u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
+        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
+        push = (bell / np.hypot(*line.T))[:, None] * line
+        given += np.column_stack([push, cross(foot, push)])
+    return given
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Array:
