@@ -39,10 +39,11 @@ from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, tw
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.fixed_point import Gait, Search, SearchSettings, SlopeBranch, find_gaits
-from walkerlab.orbits.newton import Solution, newton
+from walkerlab.orbits.fixed_point import RigidGait, Search, SearchSettings, SlopeBranch, find_gaits, over_slope
+from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
+from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
@@ -214,7 +215,7 @@ def contact_trial_of(config: Config) -> ContactTrial:
     return contact_trial(config, tuple(gait.state), gait.step_length, STEPS)
 
 
-def chosen_gait(config: Config) -> Gait:
+def chosen_gait(config: Config) -> RigidGait:
     """The rigid gait of a config that has one."""
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     assert gait is not None, "there is a gait"
@@ -224,12 +225,13 @@ def chosen_gait(config: Config) -> Gait:
 def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     """From the small-slope seed to the fixed point at 1 degree."""
     search = Search(rigid_walker(ONE_DEGREE, "corrected"), SearchSettings())
-    seed = seeds(search.walker)[0]
+    seed, slope = seeds(search.walker)[0], float(search.walker.slope)
+    looking = over_slope(search.walker, search.settings.looking)
 
     def solve() -> None:
-        _, z = SlopeBranch(search.looking, search.walker, seed).follow(search.walker.slope)
+        _, z = SlopeBranch(looking, seed).follow(slope)
         assert z is not None, "the gait can be followed"
-        assert isinstance(newton(search.equations, z, 1e-14, rounding=1e3), Solution), "and solved"
+        assert isinstance(gait_near(search.step_map, z, slope, Effort(1e-14, rounding=1e3)), Cycle), "and solved"
 
     yield at_most("fixed point at 1 deg from the small-slope seed", 1e3 * watch(solve), "ms", 1.0, 0.3)
 

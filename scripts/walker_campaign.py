@@ -38,8 +38,8 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.fixed_point import MAX_START, MIN_START, Gait, GaitSearch, Search, SearchSettings, find_gaits
-from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section
+from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, RigidGait, Search, SearchSettings, find_gaits
+from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section, section_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
@@ -231,18 +231,19 @@ def overlooks(walker: Standing) -> bool:
     """Whether another method finds a gait of a walker of which a search finds none."""
     search = Search(walker, SETTINGS)
     looking, still = search.looking, search.walker.slope + search.walker.lean
+    section = section_of(search.walker)
     d = len(search.walker.section_indices)
     starts = np.random.default_rng(7).uniform(MIN_START[:d], MAX_START[:d], (OTHER_STARTS, d))
     starts[:, 0] = 0.5 * starts[:, 0] - still
 
     def residual(z: NDArray[np.float64]) -> NDArray[np.float64]:
-        step = looking.walk(search.equations.section, z, derived=False)
+        step = looking.walk(section, z, derived=False)
         return step.z[0] - z if step.time.size else np.ones(d)
 
-    walking = [z for z in starts if looking.walk(search.equations.section, z, derived=False).time.size]
+    walking = [z for z in starts if looking.walk(section, z, derived=False).time.size]
     for z in walking[:TRIED]:
         solved = root(residual, z, options={"maxfev": EVALUATIONS})
-        step = looking.walk(search.equations.section, solved.x, derived=False)
+        step = looking.walk(section, solved.x, derived=False)
         left = np.abs(residual(solved.x)).max()
         if left < SOLVED and abs(solved.x[0] + still) > APART and step.time[0] > SHORTEST_STEP:
             return True
@@ -294,7 +295,7 @@ def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
     return faults
 
 
-def traces(walker: Standing, gait: Gait) -> Iterator[tuple[float, float, float]]:
+def traces(walker: Standing, gait: RigidGait) -> Iterator[tuple[float, float, float]]:
     """For one step, two, ... ten: trace of the derivative seen, the multipliers' sum of powers, the derivative's size.
 
     Ends where the starts' distance from the gait outgrows what is linear, or a walk ends.

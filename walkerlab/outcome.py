@@ -45,7 +45,7 @@ def outcome_of(label: str) -> Outcome | None:
     return next((one for one in Outcome if one.label == label), None)
 
 
-class Told(NamedTuple):
+class OutcomeWords(NamedTuple):
     """What is said of an outcome."""
 
     does: str  # what a walker does in the end
@@ -56,21 +56,21 @@ class Told(NamedTuple):
 
 
 TOLD = {
-    Outcome.WALKED: Told(
+    Outcome.WALKED: OutcomeWords(
         "walks to the end",
         "walked on",
         "",
         "#56B4E9",
         "The walker took every step it was asked for.",
     ),
-    Outcome.FELL: Told(
+    Outcome.FELL: OutcomeWords(
         "falls",
         "fell",
         "the walker falls before the foot comes down",
         "#EDEDED",
         "The hip came below half a leg above the slope; start nearer to a gait (start: fixed-point).",
     ),
-    Outcome.OFF_PAD: Told(
+    Outcome.OFF_PAD: OutcomeWords(
         "trips on a pad",
         "met the flank of a pad or tripped over the pad they had left",
         "the swinging foot meets a pad's flank, or its own pad again",
@@ -78,7 +78,7 @@ TOLD = {
         "A foot met the flank of a pad below its top, or tripped over the pad it had left: the steps do not fit the "
         "pads; try contact.terrain: after-mid-swing, or another contact.pad_pitch.",
     ),
-    Outcome.LIFTED_OFF: Told(
+    Outcome.LIFTED_OFF: OutcomeWords(
         "leaves the ground",
         "left the ground",
         "the ground would have to pull",
@@ -86,28 +86,28 @@ TOLD = {
         "The walker left the ground: no foot was in contact for a quarter of a pendulum time or, in the rigid model, "
         "the ground would have had to pull; slow the start down, or stiffen or damp the contact.",
     ),
-    Outcome.SLID: Told(
+    Outcome.SLID: OutcomeWords(
         "slides away",
         "slid away",
         "the stance foot slides away",
         "#A6D3B4",
         "The stance foot slid by more than a quarter of a step; raise friction or lower the stiction velocity.",
     ),
-    Outcome.NO_HEEL_STRIKE: Told(
+    Outcome.NO_HEEL_STRIKE: OutcomeWords(
         "never reaches a heel strike",
         "never came to a heel strike",
         "the swinging foot does not come down",
         "#7F7F7F",
         "The swing foot did not come down within ten pendulum times; the start is far from walking.",
     ),
-    Outcome.BUDGET_EXHAUSTED: Told(
+    Outcome.BUDGET_EXHAUSTED: OutcomeWords(
         "exhausts its evaluation budget",
         "exhausted their budget of right-hand sides",
         "a step takes more right-hand sides than it may",
         "#000000",
         "The run exhausted its evaluation budget; loosen solver.*.rtol, soften the contact, or ask for fewer strides.",
     ),
-    Outcome.SOLVER_FAILED: Told(
+    Outcome.SOLVER_FAILED: OutcomeWords(
         "makes the solver fail",
         "made the solver fail",
         "the solver's step fell to rounding, or the energy balance does not close",
@@ -115,14 +115,14 @@ TOLD = {
         "The step size fell to rounding, or the energy balance does not close; choose another solver.*.rtol or "
         "solver.*.method.",
     ),
-    Outcome.REJECTED: Told(
+    Outcome.REJECTED: OutcomeWords(
         "starts in a state that is not allowed",
         "began in a state that is not allowed",
         "no walker has the parameter's next value",
         "#FFFFFF",
         "The start is not a state this walker can be in.",
     ),
-    Outcome.BENT_KNEE: Told(
+    Outcome.BENT_KNEE: OutcomeWords(
         "lands on a bent knee",
         "came down on a bent knee",
         "the foot comes down on a knee that has not locked",
@@ -130,7 +130,7 @@ TOLD = {
         "A foot came down on a knee that had not locked; start nearer to a gait (start: fixed-point), or, on compliant "
         "ground, release the trailing knee by compression (walker.knee.release).",
     ),
-    Outcome.STUBBED: Told(
+    Outcome.STUBBED: OutcomeWords(
         "stubs its foot",
         "stubbed a foot",
         "the swinging foot is below its next foothold as the feet pass",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from walkerlab.config.ground import Ground
+from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics import impact
@@ -218,12 +218,12 @@ def test_past_mid_swing_a_foot_is_carried_once_it_has_been_above_its_foothold():
 
 def test_listed_heights_go_on_at_the_last_and_drawn_ones_do_not_depend_on_how_many():
     np.testing.assert_array_equal(
-        foothold_heights(Ground(heights_m=(1e-3, -2e-3)), 4), [0.0, 1e-3, -2e-3, -2e-3, -2e-3]
+        foothold_heights(Footholds(heights_m=(1e-3, -2e-3)), 4), [0.0, 1e-3, -2e-3, -2e-3, -2e-3]
     )
-    few, many = (foothold_heights(Ground(roughness_m=1e-3, seed=7), steps) for steps in (3, 300))
+    few, many = (foothold_heights(Footholds(roughness_m=1e-3, seed=7), steps) for steps in (3, 300))
     np.testing.assert_array_equal(few, many[:4])
     assert np.std(many[1:]) == pytest.approx(1e-3, rel=0.15)
-    assert foothold_heights(Ground(heights_m=(0.0, 0.0)), 4) is None
+    assert foothold_heights(Footholds(heights_m=(0.0, 0.0)), 4) is None
 
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])

@@ -13,7 +13,7 @@ from walkerlab.config import loader
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.shooting import EXACT, Shooting, StepEquations, coordinates_of, section_of
+from walkerlab.orbits.shooting import EXACT, Shooting, coordinates_of, section_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
@@ -83,10 +83,10 @@ DRIVEN = {
 def test_a_driven_step_maps_derivative_is_its_slope(name):
     walker, _ = unit_walker(on_slope(walker_of(name, **DRIVEN[name]), 0.0))
     gait = find_gaits(walker).gait
-    equations = StepEquations(Shooting(walker, EXACT), section_of(walker))
+    shooting, section = Shooting(walker, EXACT), section_of(walker)
     z = coordinates_of(walker, gait.state)
-    DP = equations(z).data.DP[0]
-    differences = slope_of(lambda z: equations(z).data.z[0], z, [5e-4] * z.size)
+    DP = shooting.walk(section, z).DP[0]
+    differences = slope_of(lambda z: shooting.walk(section, z).z[0], z, [5e-4] * z.size)
     np.testing.assert_allclose(DP, differences, rtol=0.0, atol=AGREEMENT)
 
 

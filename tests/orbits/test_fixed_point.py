@@ -1,5 +1,7 @@
 """Gaits against numbers known from elsewhere, and what every search must hold to."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +17,17 @@ from walkerlab.mechanics.rigid import standing
 from walkerlab.orbits.fixed_point import (
     RANDOM_START,
     SHORTEST_MOVE,
-    Gait,
+    RigidGait,
     Search,
     SearchSettings,
     SlopeBranch,
     branches,
     choice,
+    over_slope,
 )
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.newton import NotConverged, newton
-from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, StepEquations, section_of
+from walkerlab.orbits.newton import Evaluated, NotConverged, newton
+from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
@@ -67,7 +70,16 @@ def shooting(walker):
 
 
 def solve(shooting, walker, z, tolerance):
-    return newton(StepEquations(shooting, section_of(assembled(walker))), np.array(z), tolerance, 60, SHORTEST_MOVE)
+    """By Newton's method for a walker in its own units, so that a step counts what it costs."""
+    section = section_of(assembled(walker))
+
+    def returning(z):
+        step = shooting.walk(section, z)
+        if step.outcome is not Outcome.WALKED:
+            return Evaluated(step.outcome, z, np.eye(z.size), step)
+        return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - np.eye(z.size), step)
+
+    return newton(returning, np.array(z), tolerance, 60, SHORTEST_MOVE)
 
 
 # from two other integrations of the same equations
@@ -150,8 +162,9 @@ def test_the_same_seed_draws_the_same_starts():
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
     settings = SearchSettings()
     walker = Search(assembled(PAPER), settings).walker
-    counted = Counted(walker, settings.looking)
-    assert SlopeBranch(counted, walker, seeds(walker)[0]).follow(walker.slope)[1] is not None
+    step_map = over_slope(walker, settings.looking)
+    counted = step_map._exact = Counted(walker, settings.looking)
+    assert SlopeBranch(step_map, seeds(walker)[0]).follow(walker.slope)[1] is not None
     # one step of walking takes about 200 right-hand sides
     assert counted.steps <= 30
     assert counted.evaluations < 30 * 200
@@ -275,7 +288,7 @@ def test_a_slope_with_unstable_gaits_only_says_so():
 
 
 def gait_with(radius, pull=0.0):
-    return Gait(
+    return RigidGait(
         (0.0, 0.0, -1.0, -1.0),
         1.0,
         0.4,
@@ -356,12 +369,25 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     def starts_from_seeds(degrees):
         search = Search(assembled(on_slope(degrees)), SearchSettings())
         search.follow_seeds()
-        return [found.z.tolist() for found in search.found], search.lost
+        return [found.cycle.z.tolist() for found in search.found], search.lost
 
     branches.cache_clear()
     after_others = [starts_from_seeds(degrees) for degrees in (4.0, 0.3, 7.0, 2.0)][-1]
     branches.cache_clear()
     assert starts_from_seeds(2.0) == after_others
+
+
+def test_gaits_sought_in_threads_at_once_are_those_sought_one_after_the_other():
+    walkers = [on_slope(degrees) for degrees in np.linspace(0.5, 4.0, 24)]
+    alone = [find_gaits(walker) for walker in walkers]
+    branches.cache_clear()
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            assert list(pool.map(find_gaits, walkers)) == alone
+    finally:
+        sys.setswitchinterval(interval)
 
 
 def led(map_, walker, starts, gaits=()):

@@ -9,8 +9,10 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.newton import Solution, newton
-from walkerlab.orbits.shooting import Shooting, StepEquations, on_section, section_of
+from walkerlab.orbits.newton import Effort
+from walkerlab.orbits.shooting import RigidMap, Shooting, on_section, section_of
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
@@ -40,25 +42,26 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-16, 10**6)
 
 
 def solved(model, z):
-    found = newton(StepEquations(Shooting(model, TIGHT), section_of(model)), z, 1e-13)
-    assert isinstance(found, Solution)
-    return found.x, found.evaluated
+    """The gait near z, in SI, and its cycle."""
+    scale = np.array([1.0, *[unit_walker(model)[1].time] * (z.size - 1)])
+    found = gait_near(RigidMap(lambda _: model, 1.0, model, TIGHT), z * scale, 0.0, Effort(1e-13))
+    return found.z / scale, found
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_gait_of_a_published_walker(name):
     parts, slope, gravity, (angle, stance, swing), period, multipliers = PUBLISHED[name]
     massless = stance * (1.0 - math.cos(2.0 * angle))  # the trailing foot's momentum about the hip is lost
-    z, here = solved(
+    z, gait = solved(
         standing(parts, gravity, slope), np.array([angle - slope, massless if swing is None else swing, stance])
     )
-    assert here.residual < 1e-12
+    assert gait.residual < 1e-12
     assert z[0] + slope == pytest.approx(angle, abs=2e-7)
     assert z[2] == pytest.approx(stance, abs=2e-7)
     if swing is not None:
         assert z[1] == pytest.approx(swing, abs=2e-7)
-    assert here.data.time[0] == pytest.approx(period, abs=1e-6)
-    eigenvalues = np.linalg.eigvals(here.data.DP[0])
+    assert gait.period_s == pytest.approx(period, abs=1e-6)
+    eigenvalues = np.linalg.eigvals(gait.DP)
     for wanted in multipliers:
         assert np.abs(eigenvalues - wanted).min() < 1e-5
 

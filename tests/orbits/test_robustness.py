@@ -11,6 +11,7 @@ from walkerlab.mechanics.impact import pushed_at_hip
 from walkerlab.mechanics.standing import energies, momentum
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import QUANTITIES, gait_numbers, gradients
+from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.robustness import (
     Scales,
     Standpoint,
@@ -164,7 +165,7 @@ def test_gradients_are_differences_of_converged_gaits(name, key):
 
     def numbers_at(off):
         p = at.p + off
-        gait = gait_near(at.step_map, at.z, p, 1, 1e-12)
+        gait = gait_near(at.step_map, at.z, p, Effort(1e-12))
         numbers = gait_numbers(at._replace(p=p, z=gait.z, A=gait.DP))
         return np.array([numbers[one] for one in QUANTITIES])
 

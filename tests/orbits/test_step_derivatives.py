@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from walkerlab.config import loader
-from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait
-from walkerlab.orbits.contact_map import step_from_section
+from walkerlab.orbits.contact_map import OwnPads, step_from_section
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.newton import newton
-from walkerlab.orbits.shooting import Shooting, StepEquations, section_of
+from walkerlab.orbits.newton import Effort, newton
+from walkerlab.orbits.shooting import RigidMap
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near, walk_steps
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.contact import contact_scene
@@ -54,9 +55,16 @@ WALKERS = {"corrected": PAPER, "as printed": PRINTED, "four degrees": STEEP}
 OFF_THE_GAIT = {"at the gait": (0.0, 0.0, 0.0), "wider": (5e-3, -2e-2, 1e-2), "slower": (-2e-3, 3e-2, 2e-2)}
 
 
-def equations(walker):
-    model = assembled(walker)
-    return StepEquations(Shooting(model, Tolerances("dop853", 1e-13, 1e-15, 10**5)), section_of(model))
+def unit_map(walker):
+    """The step map of a walker that is its own unit walker."""
+    unit = unit_walker(assembled(walker))[0]
+    return RigidMap(lambda _: unit, 1.0, unit, Tolerances("dop853", 1e-13, 1e-15, 10**5))
+
+
+def beside_the_gait(walker, offset):
+    """The coordinates of a walker's gait, those of its unit walker, with an offset."""
+    in_units = [1.0] + [unit_walker(assembled(walker))[1].time] * 2
+    return in_units * np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT[offset])
 
 
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
@@ -64,27 +72,26 @@ def equations(walker):
 def test_rigid_step_maps_derivative_is_its_slope(name, offset):
     """Through the swing by the variational equations, through the heel strike by the saltation."""
     walker = WALKERS[name]
-    of_walker = equations(walker)
-    z = np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT[offset])
+    step_map, z = unit_map(walker), beside_the_gait(walker, offset)
 
     def ends(z):
-        here = of_walker(z)
-        assert here.outcome is Outcome.WALKED
-        return here.data.z[0]
+        step = step_map.step(z, 0.0)
+        assert step.outcome is Outcome.WALKED
+        return step.z
 
-    DP = of_walker(z).data.DP[0]
+    DP = step_map.step(z, 0.0).DP
     np.testing.assert_allclose(DP, slope_of(ends, z, [1e-3] * 3), rtol=0.0, atol=AGREEMENT)
 
 
 @pytest.mark.parametrize("name", WALKERS)
 def test_newton_converges_quadratically_on_the_rigid_step_map(name):
     walker = WALKERS[name]
-    of_walker, z, residuals = equations(walker), np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT["wider"]), []
+    step_map, z, residuals = unit_map(walker), beside_the_gait(walker, "wider"), []
     while not residuals or residuals[-1] > ROUNDING:
         # one move: it ends with the first residual that is any smaller
-        found = newton(of_walker, z, 0.999 * residuals[-1] if residuals else 1.0)
-        z = found.x
-        residuals.append(found.evaluated.residual)
+        found = gait_near(step_map, z, 0.0, Effort(0.999 * residuals[-1] if residuals else 1.0))
+        z = found.z
+        residuals.append(found.residual)
     assert is_quadratic(residuals)
 
 
@@ -130,9 +137,9 @@ def test_newton_converges_quadratically_on_the_contact_step_map(scene):
     tolerances = Tolerances("radau5", 1e-11, 1e-13, 10**6)
 
     def moves(tolerance):
-        found = find_contact_gait(scene.walker, scene.ground, tolerances, NEAR_THE_GAIT + ASIDE, PITCH, tolerance)
-        assert isinstance(found, ContactGait)
-        return found.iterations, found.residual
+        pads = OwnPads(lambda _: scene.walker, scene.ground, tolerances, PITCH)
+        found = newton(lambda z: walk_steps(pads, z, 0.0, 1).returning(), NEAR_THE_GAIT + ASIDE, tolerance)
+        return found.corrections, found.evaluated.residual
 
     # a tolerance between two residuals shows each of them
     residuals = dict(moves(10.0**-digits) for digits in range(2, 11))

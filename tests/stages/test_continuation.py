@@ -13,6 +13,7 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import plane as plane_of_gaits
 from walkerlab.orbits.families import ValueSpan
+from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
@@ -78,7 +79,7 @@ def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
 def test_what_newtons_method_leaves_over_is_part_of_the_numerical_error():
     """A gait whose start is off: its own step has another period than the gait, whatever the tolerances."""
     step_map = rigid_map(config(), parameter_of("slope_deg", config()), 1.0)
-    gait = gait_near(step_map, np.array([0.22, -0.12, -0.35]), 3.0, 1, 1e-13)
+    gait = gait_near(step_map, np.array([0.22, -0.12, -0.35]), 3.0, Effort(1e-13))
     z = gait.z + np.array([1e-8, 0.0, 0.0])
     off = step_map.step(z, 3.0)
     lengths = np.array([off.length_m])

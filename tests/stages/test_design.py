@@ -9,7 +9,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.orbits.design import Point, Question, optima, searched
+from walkerlab.orbits.design import Aim, Point, optima, searched
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages import design, fixedpoint
@@ -80,11 +80,11 @@ def bowls(x):
 
 
 def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_are():
-    question = Question("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
+    question = Aim("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
     found = searched(question, np.array([0.1]), 12, seed=1)
     assert found[0].x[0] == pytest.approx(0.8, abs=1e-6)
     assert optima(question, found) == 2
-    within = Question("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
+    within = Aim("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
     assert searched(within, np.array([0.1]), 4, seed=1)[0].x[0] == pytest.approx(0.2, abs=1e-5)
 
 

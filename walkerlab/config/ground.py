@@ -5,7 +5,7 @@ from pydantic import ValidationInfo, field_validator
 from walkerlab.config.fields import Block, key, wrong
 
 
-class Ground(Block):
+class Footholds(Block):
     """Uneven ground: each foothold of a walk at its own height; without these keys it is even."""
 
     roughness_m: float = key(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from walkerlab.config.continuation import Continuation
     from walkerlab.config.design import Design
     from walkerlab.config.drives import PushOff
-    from walkerlab.config.ground import Ground
+    from walkerlab.config.ground import Footholds
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
@@ -95,7 +95,7 @@ class WalkConfig(StartConfig, Protocol):
     @property
     def strides(self) -> int: ...
     @property
-    def ground(self) -> Ground: ...
+    def ground(self) -> Footholds: ...
     @property
     def outputs(self) -> tuple[schema.Output, ...]: ...
 

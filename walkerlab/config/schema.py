@@ -13,7 +13,7 @@ from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, drives_of
 from walkerlab.config.fields import Block, key, wrong
-from walkerlab.config.ground import Ground
+from walkerlab.config.ground import Footholds
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
@@ -222,7 +222,7 @@ class Config(Block):
         bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
     )
     strides: int = key(5, "1", "strides to walk, one stride is two steps", ge=1, le=10_000)
-    ground: Ground = Ground()
+    ground: Footholds = Footholds()
     contact: Contact | None = None
     solver: Solvers = Solvers()
     stability: Stability = Stability()

@@ -16,9 +16,9 @@ from itertools import pairwise
 import numpy as np
 
 from walkerlab.orbits.bifurcations import eigenvector
-from walkerlab.orbits.families import GaitPoint, Seed
+from walkerlab.orbits.families import Seed
 from walkerlab.orbits.newton import Floats
-from walkerlab.orbits.step_map import StepMap
+from walkerlab.orbits.step_map import Cycle, StepMap
 from walkerlab.outcome import Outcome
 
 LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
@@ -135,10 +135,10 @@ def swept(
     return AttractorBranch(tuple(found), None, "")
 
 
-def left_by_flip(step_map: StepMap, gait: GaitPoint, transient: int, kept: int) -> Attractor | Outcome:
+def left_by_flip(step_map: StepMap, gait: Cycle, transient: int, kept: int) -> Attractor | Outcome:
     """Where walks settle that leave an unstable gait along the direction in which every step changes sides."""
     flipping = min(gait.multipliers.real)
-    aside = ASIDE * np.max(np.abs(gait.z)) * eigenvector(gait.solved.evaluated.data.DP, flipping)
+    aside = ASIDE * np.max(np.abs(gait.z)) * eigenvector(gait.DP, flipping)
     return settled(step_map, gait.z + aside, gait.value, transient, kept)
 
 

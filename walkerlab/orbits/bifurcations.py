@@ -15,7 +15,7 @@ import numpy as np
 
 from walkerlab.orbits.continuation import Segment, Solved, root_along
 from walkerlab.orbits.newton import Evaluated, Floats
-from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
+from walkerlab.orbits.step_map import Cycle, StepMap, walk_steps, with_parameter
 from walkerlab.outcome import Outcome
 
 Kind = Literal["fold", "flip", "torus"]
@@ -33,12 +33,11 @@ class GaitEquations:
         """Gaits of `period` steps; `scale` makes the parameter of magnitude one."""
         self.step_map, self.period, self.scale = step_map, period, scale
 
-    def __call__(self, x: Floats) -> Evaluated[IteratedMap]:
+    def __call__(self, x: Floats) -> Evaluated[Cycle]:
         """Residual and its derivative at x (d + 1,)."""
-        z = x[:-1]
-        cycle = walk_steps(self.step_map, z, self.value(x), self.period)
-        jacobian = np.column_stack((cycle.DP - np.eye(z.size), self.scale * cycle.Dp))
-        return Evaluated(cycle.outcome, cycle.z - z, jacobian, cycle)
+        cycle = walk_steps(self.step_map, x[:-1], self.value(x), self.period)
+        here = with_parameter(self.step_map, cycle).returning()
+        return here._replace(jacobian=np.column_stack((here.jacobian, self.scale * here.data.Dp)))
 
     def value(self, x: Floats) -> float:
         """The parameter at x."""
@@ -66,15 +65,21 @@ class Bifurcation:
     kind: Kind
     value: float  # of the parameter
     multiplier: complex
-    point: Solved[IteratedMap]
-    segment: Segment[IteratedMap] = field(repr=False)  # of the branch, that it lies on
+    point: Solved[Cycle]
+    segment: Segment[Cycle] = field(repr=False)  # of the branch, that it lies on
 
-    def lies_between(self, one: Solved[IteratedMap], other: Solved[IteratedMap]) -> bool:
+    @property
+    def gait(self) -> Cycle:
+        """The gait there."""
+        return self.point.evaluated.data
+
+    def lies_between(self, one: Cycle, other: Cycle) -> bool:
         """Whether these two neighbours on the branch are its segment's ends."""
-        return {id(self.segment.first.x), id(self.segment.second.x)} == {id(one.x), id(other.x)}
+        ends = (self.segment.first, self.segment.second)
+        return {id(end.evaluated.data.z) for end in ends} == {id(one.z), id(other.z)}
 
 
-def bifurcation_in(segment: Segment[IteratedMap], kind: Kind, scale: float) -> Bifurcation | None:
+def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
     """The bifurcation of a kind between two neighbours of a branch; None if there is none."""
     tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
     if tests[0] * tests[1] >= 0.0:
@@ -82,7 +87,7 @@ def bifurcation_in(segment: Segment[IteratedMap], kind: Kind, scale: float) -> B
     point = root_along(segment, lambda solved: critical_value(kind, solved.evaluated.data.DP))
     if point is None:
         return None
-    multipliers = multipliers_of(point.evaluated.data.DP)
+    multipliers = point.evaluated.data.multipliers
     if kind == "torus":
         on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < TOUCHING]
         if not on_circle:  # two real multipliers whose product is one: a saddle, and no bifurcation

@@ -7,6 +7,7 @@ walks on: the force laws are led to the wanted ones in steps as large as Newton'
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,10 @@ from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
-from walkerlab.orbits.contact_map import SectionStep, coordinates_of, step_from_section
+from walkerlab.orbits.contact_map import OwnPads, coordinates_of
 from walkerlab.orbits.continuation import Follower, Strides, Way
-from walkerlab.orbits.newton import Evaluated, NotConverged, newton
-from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.orbits.newton import Effort, NotConverged
+from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
@@ -26,67 +27,18 @@ from walkerlab.solvers.system import State
 Floats = NDArray[np.float64]
 
 WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
-NEWTON_STEPS = 10  # steps walked in one search by Newton's method
 BUDGET_OF_A_STEP = 40_000  # right-hand sides
-GAIT_RESIDUAL = 1e-10
-DAMPING = 1e-3, 2.0  # see `newton`
+EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
 # nearly rigid ground, by which factor its laws differ from the wanted ones
 STIFFER, STICKIER = 100.0, 30.0
 FIRST_STRIDE, STRIDES = 0.25, Strides(1.0, 0.02, 2)  # of the way from nearly rigid to the wanted ground
 
 
 @dataclass(frozen=True)
-class ContactGait:
-    """A periodic walk of the contact model."""
-
-    z: Floats  # section coordinates
-    step: SectionStep  # the step from there
-    multipliers: NDArray[np.complex128]  # of the step map, largest first
-    residual: float  # largest component of P(z) - z, in the section's units
-    iterations: int
-
-    @property
-    def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle."""
-        return bool(abs(self.multipliers[0]) < 1.0)
-
-
-def find_contact_gait(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    pitch_m: float,
-    residual: float = GAIT_RESIDUAL,
-    most: int = 60,
-) -> ContactGait | NotConverged:
-    """The gait near section coordinates z, by Newton's method.
-
-    pitch_m   the pads' pitch to begin with
-    residual  of the gait
-    most      how many steps may be walked in search of it
-    """
-
-    def on_own_pads(z: Floats) -> Evaluated[SectionStep]:
-        """P(z) - z, whose pads are laid for the step that was taken last."""
-        nonlocal pitch_m
-        step = step_from_section(walker, ground, tolerances, z, pitch_m)
-        if step.outcome is Outcome.WALKED:
-            pitch_m = step.length_m
-        return Evaluated(step.outcome, step.z - z, step.DP - np.eye(z.size), step)
-
-    found = newton(on_own_pads, z, residual, most, *DAMPING, 1.0)
-    if isinstance(found, NotConverged):
-        return found
-    here = found.evaluated
-    return ContactGait(found.x, here.data, multipliers_of(here.data.DP), here.residual, found.corrections)
-
-
-@dataclass(frozen=True)
 class GaitAnswer:
     """The contact model's gait, or why there is none."""
 
-    gait: ContactGait | None
+    gait: Cycle | None
     reason: str  # how it was found, or why not
     advice: str = ""
 
@@ -102,8 +54,8 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
     tolerances = replace(tolerances, budget=BUDGET_OF_A_STEP)
     said = "the start does not even let the feet pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
-        gait = gait_near(walker, ground, tolerances, z, ground.terrain.stride_measure)
-        if isinstance(gait, ContactGait):
+        gait = gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.stride_measure), z)
+        if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         said = f"Newton's method found none after {steps} steps from the start: {gait}"
     followed = follow_from_rigid(walker, ground, tolerances, start)
@@ -146,11 +98,9 @@ def section_points(
             return
 
 
-def gait_near(
-    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float
-) -> ContactGait | str:
+def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
     """Newton's method from section coordinates z: the gait, or what came in its way."""
-    found = find_contact_gait(walker, ground, tolerances, z, pitch_m, most=NEWTON_STEPS)
+    found = gait_near(pads, z, rigidity, EFFORT)
     if isinstance(found, NotConverged):
         if found.singular:
             return "its matrix is singular, since a multiplier is 1"
@@ -183,12 +133,13 @@ def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
     """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
-    pitch, last = ground.terrain.stride_measure, None
-    for _steps, z in section_points(with_rigidity(walker, 1.0), ground, tolerances, start):
-        found = gait_near(with_rigidity(walker, 1.0), ground, tolerances, z, pitch)
-        if isinstance(found, ContactGait):
-            last = found
-            break
+
+    def gait_at(rigidity: float, z: Floats, pitch_m: float) -> Cycle | str:
+        return gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
+
+    points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
+    tried = (gait_at(1.0, z, ground.terrain.stride_measure) for _, z in points)
+    last = next((found for found in tried if isinstance(found, Cycle)), None)
     if last is None:
         return GaitAnswer(
             None,
@@ -199,8 +150,8 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
 
     def softer(way: float, expected: Floats) -> Floats | None:
         """Section coordinates and step length after a part of the way from nearly rigid to the wanted ground."""
-        near = gait_near(with_rigidity(walker, 1.0 - way), ground, tolerances, expected[:-1], expected[-1])
-        if not isinstance(near, ContactGait):
+        near = gait_at(1.0 - way, expected[:-1], expected[-1])
+        if not isinstance(near, Cycle):
             return None
         gaits[way] = near
         return with_length(near)
@@ -217,6 +168,6 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
     )
 
 
-def with_length(gait: ContactGait) -> Floats:
+def with_length(gait: Cycle) -> Floats:
     """Section coordinates of a gait, and its step length behind them."""
-    return np.append(gait.z, gait.step.length_m)
+    return np.append(gait.z, gait.lengths_m)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -38,7 +38,7 @@ from walkerlab.hybrid.contact_observer import ContactObserver
 from walkerlab.hybrid.contact_run import Stopped, new_observer, new_walk_state, walk_on
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
-from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, MappedStep, Monitor, StepMap, no_step
+from walkerlab.orbits.step_map import REMEMBERED, Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper, no_step
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
@@ -51,21 +51,14 @@ NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
-class SectionStep:
-    """One step from the section to the section."""
+class SectionStep(MappedStep):
+    """One step from the section to the section, in SI."""
 
-    outcome: Outcome
-    z: Floats  # (coordinates,) where it led
-    DP: Floats  # (coordinates, coordinates) its derivative, if it was wanted
-    period_s: float
-    length_m: float  # how far the walker went
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
     rolling_m: float  # likewise
     dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
     height_lost_J: float  # potential energy given up
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
-    touch_s: float  # from the section to the touch
-    spacing_m: float  # between the feet at the touch
     reach_m: float  # from where the stance foot is on the section to the touch
     advance_m: float  # of the foot that touched, from its touch to the section
 
@@ -207,6 +200,8 @@ def step_from_section(
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
     lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
     lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
+    spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
+    half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     foothold = feet_motion(walker.whole, start)[stance].along
     end[HEIGHT] -= rise
     return SectionStep(
@@ -215,13 +210,13 @@ def step_from_section(
         DP,
         stopped.time_s,
         float(end[ALONG] - start[ALONG]),
+        math.asin(half) - walker.slope,
+        float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
         observer.dissipated.copy(),
         float(lost),
         stopped.work,
-        float(walk_state.touch_time[0]),
-        float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0]),
         float(walk_state.touch_along[0] - foothold),
         float(along - walk_state.foothold[landed]),
     )
@@ -366,16 +361,8 @@ class ContactMap(StepMap):
         step = self._walk(here, z, derived)
         if step.outcome is not Outcome.WALKED:
             return no_step(step.outcome, z.size)
-        half = min(1.0, max(-1.0, 0.5 * step.spacing_m / here.ground.frame.leg_length))
-        return MappedStep(
-            Outcome.WALKED,
-            step.z / self._units,
-            step.DP * self._units / self._units[:, None] if derived else step.DP,
-            step.period_s,
-            step.length_m,
-            math.asin(half) - here.walker.slope,
-            step.touch_s,
-        )
+        DP = step.DP * self._units / self._units[:, None] if derived else step.DP
+        return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Largest slip, and whether pads would trip a gait of one step."""
@@ -404,7 +391,7 @@ class ContactMap(StepMap):
                 break
             step = self._walk(here, z, False, rise=rise)
             if step.outcome is Outcome.WALKED:
-                durations.append(before.period_s - before.touch_s + step.touch_s)
+                durations.append(before.period_s - before.strike_s + step.strike_s)
                 lengths.append(before.advance_m + step.reach_m)
                 z = step.z / self._units
                 points.append(z)
@@ -420,3 +407,26 @@ class ContactMap(StepMap):
         other = copy(self)
         other.tolerances = tolerances
         return other
+
+
+class OwnPads(Stepper):
+    """A walker on compliant ground in SI, whose pads are laid for the step that was taken last."""
+
+    def __init__(
+        self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float
+    ) -> None:
+        """A family of walkers on one ground; `pitch_m` is the pads' to begin with."""
+        self.walker_at, self.ground, self.tolerances, self.pitch_m = walker_at, ground, tolerances, pitch_m
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        """One step, with its exact derivative along the section."""
+        step = step_from_section(self.walker_at(p), self.ground, self.tolerances, z, self.pitch_m, derived)
+        if step.outcome is Outcome.WALKED:
+            self.pitch_m = step.length_m
+        return step
+
+
+def step_of(gait: Cycle) -> SectionStep:
+    """The step of a gait of one step of the contact model, with what only that model has."""
+    assert isinstance(gait.step, SectionStep), "a gait of the contact model"
+    return gait.step

@@ -30,7 +30,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Question:
+class Aim:
     """What is looked for.
 
     quantity  the number that is made least, or largest with `sign` -1
@@ -48,7 +48,7 @@ class Question:
 
 
 @dataclass
-class Search:
+class Descent:
     """One search: where it ended, and what it met."""
 
     x: Floats
@@ -60,12 +60,12 @@ class Search:
     seen: dict[bytes, Point | None] = field(default_factory=dict)
 
 
-def sought(question: Question, start: Floats) -> Search:
+def sought(question: Aim, start: Floats) -> Descent:
     """The optimum that a search from `start` (variables,) comes to."""
     from scipy.optimize import minimize  # a tenth of a second that nothing else needs
 
     span = question.upper - question.lower
-    search = Search(start, None)
+    search = Descent(start, None)
 
     def at(u: Floats) -> Point | None:
         x = question.lower + np.clip(u, 0.0, 1.0) * span
@@ -123,7 +123,7 @@ def sought(question: Question, start: Floats) -> Search:
     return search
 
 
-def kept(question: Question, point: Point) -> bool:
+def kept(question: Aim, point: Point) -> bool:
     """Whether other numbers are within their bounds, up to what rounding leaves."""
     slack = {name: 1e-6 * max(abs(low), abs(high)) for name, (low, high) in question.keep.items()}
     return all(
@@ -132,20 +132,20 @@ def kept(question: Question, point: Point) -> bool:
     )
 
 
-def searched(question: Question, own: Floats, starts: int, seed: int) -> list[Search]:
+def searched(question: Aim, own: Floats, starts: int, seed: int) -> list[Descent]:
     """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front."""
     drawn = np.random.default_rng(seed).uniform(question.lower, question.upper, (starts - 1, own.size))
     found = [sought(question, start) for start in (np.clip(own, question.lower, question.upper), *drawn)]
     ended = [one for one in found if one.point is not None]
 
-    def rank(one: Search) -> tuple[bool, float]:
+    def rank(one: Descent) -> tuple[bool, float]:
         assert one.point is not None
         return not kept(question, one.point), question.sign * one.point.numbers[question.quantity]
 
     return sorted(ended, key=rank)
 
 
-def optima(question: Question, searches: list[Search]) -> int:
+def optima(question: Aim, searches: list[Descent]) -> int:
     """How many different optima searches came to, of those that keep the bounds."""
     span, ends = question.upper - question.lower, list[Floats]()
     for one in searches:

@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.orbits.bifurcations import (
     KINDS,
@@ -24,15 +23,15 @@ from walkerlab.orbits.bifurcations import (
     onto_doubled,
 )
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
-from walkerlab.orbits.newton import Floats, NotConverged
-from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, multipliers_of, strike_to_strike
+from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.step_map import Cycle, Monitor, StepMap, gait_near
 from walkerlab.outcome import TOLD, Outcome
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
 TURN_OF_MULTIPLIERS = 0.6  # by how much a multiplier may change between neighbours, near the unit circle
 NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
-SHORTEST_STEP_S = 1e-3
+EVALUATIONS = 20  # of Newton's method from a seed
 POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyond which no gait is resolved
 
 
@@ -56,31 +55,6 @@ class ValueSpan:
 CONTROL = StepControl()
 
 
-@dataclass(frozen=True, eq=False)
-class GaitPoint:
-    """A gait on a branch.
-
-    z            (d,) where it begins
-    multipliers  (d,) of its whole cycle, largest first
-    periods_s, lengths_m, angles  (n,) of its steps, angles of the stance leg after them in rad
-    monitors     (monitors,) the worst over the cycle
-    """
-
-    value: float
-    z: Floats
-    multipliers: NDArray[np.complex128]
-    periods_s: Floats
-    lengths_m: Floats
-    angles: Floats
-    monitors: Floats
-    solved: Solved[IteratedMap]
-
-    @property
-    def stable(self) -> bool:
-        """Whether small disturbances die out."""
-        return bool(abs(self.multipliers[0]) < 1.0)
-
-
 @dataclass(frozen=True)
 class BranchEnd:
     """Where a branch ends, and why."""
@@ -102,7 +76,7 @@ class GaitBranch:
     """Gaits of one number of steps along a curve."""
 
     period: int
-    points: tuple[GaitPoint, ...]
+    points: tuple[Cycle, ...]
     ends: tuple[BranchEnd, BranchEnd]
     bifurcations: tuple[Bifurcation, ...]
     crossings: tuple[Crossing, ...]
@@ -122,7 +96,7 @@ class GaitBranch:
             if one.stable:
                 values.append(one.value)
             if one.stable != other.stable:
-                on_it = (b.value for b in self.bifurcations if b.lies_between(one.solved, other.solved))
+                on_it = (b.value for b in self.bifurcations if b.lies_between(one, other))
                 edge = next(on_it, 0.5 * (one.value + other.value))
                 if stable:
                     found.append([*values, edge])
@@ -135,7 +109,7 @@ class GaitBranch:
     def flipped_outside(self) -> bool:
         """Whether all of it lies beyond a flip that is not on it: an odd number of multipliers below -1 throughout."""
         on_it = any(one.kind == "flip" for one in self.bifurcations)
-        return not on_it and critical_value("flip", self.points[0].solved.evaluated.data.DP) < 0.0
+        return not on_it and critical_value("flip", self.points[0].DP) < 0.0
 
 
 class Seed(NamedTuple):
@@ -170,9 +144,10 @@ class BranchFollower:
             start = self.solved_at(seed.z, seed.value, seed.steps)
             if start is None:
                 continue
-            sooner = (step.z - start.x[:-1] for step in start.evaluated.data.steps[: seed.steps - 1])
+            gait = start.evaluated.data
             like = [branch for branch in branches if branch.period == seed.steps]
-            if any(np.abs(off).max() < SAME for off in sooner) or any(self.lies_on(branch, start) for branch in like):
+            sooner = any(np.abs(step.z - gait.z).max() < SAME for step in gait.steps[:-1])
+            if sooner or any(self.lies_on(branch, gait) for branch in like):
                 continue
             rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
             behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
@@ -185,7 +160,7 @@ class BranchFollower:
                 (*reversed(behind.crossings), *ahead.crossings),
             )
             # between a flip and the first gait beyond it a branch that is known has no points
-            if not any(self.lies_on(found, branch.points[0].solved) for branch in like):
+            if not any(self.lies_on(found, branch.points[0]) for branch in like):
                 branches.append(found)
         for branch in branches:  # grows on the way
             if 2 * branch.period <= periods and branch not in known:
@@ -196,27 +171,25 @@ class BranchFollower:
         """Of gaits of so many steps."""
         return GaitEquations(self.step_map, period, self.span.size)
 
-    def solved_at(self, z: Floats, value: float, period: int) -> Solved[IteratedMap] | None:
-        """The gait near z at a value of the parameter; None if Newton's method finds none."""
+    def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
+        """The point of the curve of gaits near z at a value of the parameter; None if Newton's method finds none."""
         fixed = np.append(np.zeros(z.size), 1.0)
         found = corrected(
-            self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, 20
+            self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, EVALUATIONS
         )
-        if isinstance(found, NotConverged) or found.evaluated.data.period_s < SHORTEST_STEP_S:
-            return None
-        return found
+        return None if isinstance(found, NotConverged) else found
 
-    def lies_on(self, branch: GaitBranch, gait: Solved[IteratedMap]) -> bool:
+    def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
         """Whether a gait is on a branch already, at whichever of its steps it is looked at."""
-        value = float(gait.x[-1]) * self.span.size
-        starts = [gait.x[:-1], *(step.z for step in gait.evaluated.data.steps)]
+        value, effort = gait.value, Effort(self.control.tolerance, EVALUATIONS)
+        starts = [gait.z, *(step.z for step in gait.steps)]
         for one, other in pairwise(branch.points):
             if not min(one.value, other.value) <= value <= max(one.value, other.value) or one.value == other.value:
                 continue
             share = (value - one.value) / (other.value - one.value)
             guess = one.z + share * (other.z - one.z)
-            here = self.solved_at(guess, value, branch.period)
-            if here is not None and min(float(np.max(np.abs(here.x[:-1] - z))) for z in starts) < SAME:
+            here = gait_near(self.step_map, guess, value, effort, branch.period)
+            if isinstance(here, Cycle) and min(float(np.max(np.abs(here.z - z))) for z in starts) < SAME:
                 return True
         return False
 
@@ -234,7 +207,7 @@ class BranchFollower:
                 found.append(replace(branch, ends=(first, branch.ends[1])))
         return found
 
-    def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[IteratedMap] | None:
+    def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[Cycle] | None:
         """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away.
 
         Its tangent is turned so that the halves of its cycle part further.
@@ -248,16 +221,14 @@ class BranchFollower:
                 return found if parting > 0.0 else replace(found, tangent=-found.tangent)
         return None
 
-    def trace(self, start: Solved[IteratedMap], period: int) -> GaitBranch:
+    def trace(self, start: Solved[Cycle], period: int) -> GaitBranch:
         """The branch from a gait along its tangent until it ends."""
         equations = self.equations(period)
-        points, before, last, end = [self.point(start, period)], None, start, None
+        points, before, last, end = [self.point(start)], None, start, None
         bifurcations, crossings = list[Bifurcation](), list[Crossing]()
-        step = (
-            min(self.control.first, 0.5 * float(np.linalg.norm(apart(start, period))))
-            if period > 1
-            else self.control.first
-        )
+        step = self.control.first
+        if period > 1:
+            step = min(step, 0.5 * float(np.linalg.norm(apart(start.evaluated.data))))
         while end is None:
             if len(points) >= self.most:
                 end = BranchEnd(points[-1].value, f"{self.most} points are used up")
@@ -268,13 +239,13 @@ class BranchFollower:
                 break
             solved, step = following
             end, solved = self.within(equations, last, solved)
-            if period % 2 == 0 and halves_meet(last, solved, period):
+            if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
                 end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
                 break
             segment = Segment(equations, last, solved, self.control.tolerance)
             located = (bifurcation_in(segment, kind, equations.scale) for kind in KINDS)
             bifurcations += [one for one in located if one is not None]
-            points.append(self.point(solved, period))
+            points.append(self.point(solved))
             one, other = points[-2:]
             for monitor, ahead, after in zip(self.step_map.monitors, one.monitors, other.monitors, strict=True):
                 if monitor.limit is not None and (ahead - monitor.limit) * (after - monitor.limit) < 0.0:
@@ -286,20 +257,19 @@ class BranchFollower:
         first = BranchEnd(points[0].value, "start")
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
-    def near_enough(self, last: Solved[IteratedMap]) -> Callable[[Solved[IteratedMap]], bool]:
+    def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
         """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
-        before = multipliers_of(last.evaluated.data.DP)
+        critical = [one for one in last.evaluated.data.multipliers if 1.0 / NEAR_CIRCLE < abs(one) < NEAR_CIRCLE]
 
-        def near(found: Solved[IteratedMap]) -> bool:
-            after = multipliers_of(found.evaluated.data.DP)
-            critical = [one for one in before if 1.0 / NEAR_CIRCLE < abs(one) < NEAR_CIRCLE]
+        def near(found: Solved[Cycle]) -> bool:
+            after = found.evaluated.data.multipliers
             return all(min(abs(one - other) for other in after) < TURN_OF_MULTIPLIERS for one in critical)
 
         return near
 
     def within(
-        self, equations: GaitEquations, last: Solved[IteratedMap], solved: Solved[IteratedMap]
-    ) -> tuple[BranchEnd | None, Solved[IteratedMap]]:
+        self, equations: GaitEquations, last: Solved[Cycle], solved: Solved[Cycle]
+    ) -> tuple[BranchEnd | None, Solved[Cycle]]:
         """A point that has left the span is brought back to its end, where the branch ends."""
         value = equations.value(solved.x)
         if value in self.span:
@@ -314,20 +284,11 @@ class BranchFollower:
         along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent
         return BranchEnd(edge, "end of the span"), replace(at_edge, tangent=along)
 
-    def point(self, solved: Solved[IteratedMap], period: int) -> GaitPoint:
-        """What is kept of a gait."""
+    def point(self, solved: Solved[Cycle]) -> Cycle:
+        """The gait at a point of the curve, watched."""
         self.advance()
-        cycle, value, z = solved.evaluated.data, float(solved.x[-1]) * self.span.size, solved.x[:-1]
-        return GaitPoint(
-            value,
-            z,
-            multipliers_of(cycle.DP),
-            strike_to_strike(cycle.steps),
-            np.array([step.length_m for step in cycle.steps]),
-            np.array([step.angle for step in cycle.steps]),
-            self.step_map.watch(z, value, period),
-            solved,
-        )
+        gait = solved.evaluated.data
+        return replace(gait, monitors=self.step_map.watch(gait.z, gait.value, len(gait.steps)))
 
 
 def steps_word(n: int) -> str:
@@ -335,15 +296,15 @@ def steps_word(n: int) -> str:
     return "step" if n == 1 else "steps"
 
 
-def apart(solved: Solved[IteratedMap], period: int) -> Floats:
+def apart(gait: Cycle) -> Floats:
     """From a gait's first state to that half a cycle on: zero where it is a gait of half as many steps."""
-    return np.asarray(solved.evaluated.data.steps[period // 2 - 1].z - solved.x[:-1])
+    return np.asarray(gait.steps[len(gait.steps) // 2 - 1].z - gait.z)
 
 
-def halves_meet(last: Solved[IteratedMap], solved: Solved[IteratedMap], period: int) -> bool:
+def halves_meet(last: Cycle, gait: Cycle) -> bool:
     """Whether a branch has come to the gait of half as many steps: its cycle's halves are one, or changed places."""
-    parted = apart(solved, period)
-    return bool(np.abs(parted).max() < SAME or apart(last, period) @ parted < 0.0)
+    parted = apart(gait)
+    return bool(np.abs(parted).max() < SAME or apart(last) @ parted < 0.0)
 
 
 def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:

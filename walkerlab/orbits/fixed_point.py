@@ -16,11 +16,11 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
 from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Floats, NotConverged, newton
-from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, StepEquations, on_section, section_of
+from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
-from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.orbits.step_map import Cycle, Stepper, gait_near
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -41,8 +41,8 @@ MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.
 
 
 @dataclass(frozen=True)
-class Gait:
-    """A fixed point of the step map, SI units."""
+class RigidGait:
+    """What a step of a gait shows, SI units."""
 
     state: State  # just after the heel strike
     period: float  # s
@@ -86,24 +86,23 @@ class Gait:
         return tuple(found)
 
 
-def measured(walker: Standing, units: Units, tolerances: Tolerances, z: Floats, DP: Floats) -> Gait | None:
-    """The gait at section coordinates z (d,), after walking one step of it; None if that step does not end.
+def measured(walker: Standing, units: Units, tolerances: Tolerances, gait: Cycle) -> RigidGait | None:
+    """The gait after walking one step of it; None if that step does not end.
 
     walker  the unit walker, whose units are `units`
-    DP      (d, d) derivative of the step map there
     """
-    start = on_section(walker, z)
+    start = on_section(walker, gait.z)
     step = take_walk(walker, tolerances, start, 1, sampled=True)
     if step.steps == 0 or step.samples is None:
         return None
     swing = step.samples.state[step.samples.step == 0]
     apart = swing[:, SWING] - swing[:, STANCE]
     rate, n = 1.0 / units.time, len(start) // 2
-    return Gait(
+    return RigidGait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
         period=float(step.periods_s[0]) * units.time,
         step_length=float(step.lengths_m[0]) * units.length,
-        multipliers=tuple(multipliers_of(DP).tolist()),
+        multipliers=tuple(gait.multipliers.tolist()),
         residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
         energy=step.mean_energy * units.energy,
         energy_drift=step.energy_drift * units.energy,
@@ -157,7 +156,7 @@ class GaitSearch:
     followed       from where, in words
     """
 
-    gaits: tuple[Gait, ...]
+    gaits: tuple[RigidGait, ...]
     chosen: int | None
     reason: str
     random_hits: tuple[int, ...] = ()
@@ -175,7 +174,7 @@ class GaitSearch:
         )
 
     @property
-    def gait(self) -> Gait | None:
+    def gait(self) -> RigidGait | None:
         """The chosen gait."""
         return None if self.chosen is None else self.gaits[self.chosen]
 
@@ -215,9 +214,9 @@ class SlopeBranch:
     In s^2 both gaits of the small-slope theory are smooth, and polynomials through the last points foretell the next.
     """
 
-    def __init__(self, shooting: Shooting, walker: Standing, seed: SmallSlopeSeed) -> None:
-        """Start from a seed of `walker`, on whatever slope."""
-        self.shooting, self.walker, self.seed = shooting, walker, seed
+    def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
+        """Start from a seed of the walker that has this step map over the slope (rad)."""
+        self.step_map, self.seed = step_map, seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
         """How far the gait can be followed (rad), and z (3,) at `slope` > 0 (rad); None if it is lost before."""
@@ -251,11 +250,11 @@ class SlopeBranch:
     def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
         """(y, T) near where it is expected; None if Newton's method finds no gait there."""
         s = math.exp(log_s)
-        equations = StepEquations(self.shooting, section_of(on_slope(self.walker, s**3)))
-        solved = newton(equations, state_at(s, expected), LOOSE * s, EVALUATIONS_ON_THE_WAY, SHORTEST_MOVE)
-        if isinstance(solved, NotConverged):
+        effort = Effort(LOOSE * s, EVALUATIONS_ON_THE_WAY, SHORTEST_MOVE)
+        gait = gait_near(self.step_map, state_at(s, expected), s**3, effort)
+        if isinstance(gait, NotConverged):
             return None
-        found = scaled(s, solved.x, float(solved.evaluated.data.time[0]))
+        found = scaled(s, gait.z, gait.step.period_s)
         moved = np.abs(found - expected)
         near = moved[:3].max() <= JUMP * np.abs(found[:3]).max() and moved[3] <= JUMP_IN_TIME * found[3]
         return found if near else None
@@ -274,8 +273,13 @@ def scaled(s: float, z: Floats, period: float) -> Floats:
 @lru_cache(maxsize=16)
 def branches(walker: Standing, settings: SearchSettings) -> tuple[SlopeBranch, ...]:
     """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
-    looking = Shooting(walker, settings.looking)
-    return tuple(SlopeBranch(looking, walker, seed) for seed in seeds(walker))
+    looking = over_slope(walker, settings.looking)
+    return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
+
+
+def over_slope(walker: Standing, tolerances: Tolerances) -> RigidMap:
+    """The step map of a unit walker over the slope (rad)."""
+    return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
 
 
 def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
@@ -287,11 +291,10 @@ def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
 
 @dataclass
 class FoundGait:
-    """A gait with what led to it."""
+    """A gait of the unit walker, what it is in SI, and what led to it."""
 
-    z: Floats
-    DP: Floats  # derivative of the step map there
-    gait: Gait
+    cycle: Cycle
+    gait: RigidGait
     by: list[str]
 
 
@@ -307,7 +310,7 @@ class Search:
         self.drawn = 0
         self.followed = FOLLOWED if walker.passive else LED
         self.looking = Shooting(self.walker, settings.looking)
-        self.equations = StepEquations(Shooting(self.walker, settings.solving), section_of(self.walker))
+        self.step_map = over_slope(self.walker, settings.solving)
 
     def follow_seeds(self) -> None:
         """Follow the gaits of the small-slope theory, which is of passive walkers, to the walker's slope."""
@@ -333,7 +336,7 @@ class Search:
             passive.draw(generator, self.settings.random_starts)
             family = RigidMap(partial(partly_driven, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=POINTS_OF_A_LEAD)
-            for branch in follower.family([Seed(found.z, 0.0) for found in passive.found], 1):
+            for branch in follower.family([Seed(found.cycle.z, 0.0) for found in passive.found], 1):
                 end, name = max(branch.points, key=lambda point: point.value), f"passive gait at {slope:.3g} rad"
                 if end.value < 1.0 - SAME or not self.keep(end.z, name):
                     self.lost.append(f"the {name} is lost at {end.value:.0%} of the way to this slope and drive")
@@ -346,7 +349,8 @@ class Search:
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
         starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
-        led = self.looking.lead(self.equations.section, [(found.z, found.DP) for found in self.found], starts)
+        known = [(found.cycle.z, found.cycle.DP) for found in self.found]
+        led = self.looking.lead(section_of(self.walker), known, starts)
         for z, gait in zip(starts, led, strict=True):
             if gait >= 0:
                 self.found[gait].by.append(RANDOM_START)
@@ -363,24 +367,22 @@ class Search:
             return True
         settings = self.settings
         least, enough = settings.solved_residual, settings.residual
-        solved = newton(self.equations, z, least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
-        if isinstance(solved, NotConverged):
+        effort = Effort(least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
+        cycle = gait_near(self.step_map, z, float(self.walker.slope), effort)
+        if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
             return False
-        z, DP = solved.x, solved.evaluated.data.DP[0]
-        if self.walker.slope == 0.0 and self.stands(z):
-            return False
-        if self.known(z, by):
+        if self.known(cycle.z, by):
             return True
-        gait = measured(self.walker, self.units, settings.solving, z, DP)
+        gait = measured(self.walker, self.units, settings.solving, cycle)
         if gait is None or gait.residual > enough:
             return False
-        self.found.append(FoundGait(z, DP, gait, [by]))
+        self.found.append(FoundGait(cycle, gait, [by]))
         return True
 
     def known(self, z: Floats, by: str) -> bool:
         """Whether z is one of the gaits found, which is then noted to be found again."""
         for found in self.found:
-            if np.abs(found.z - z).max() < SAME * np.abs(z).max():
+            if np.abs(found.cycle.z - z).max() < SAME * np.abs(z).max():
                 found.by.append(by)
                 return True
         return False
@@ -400,7 +402,7 @@ class Search:
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
 
 
-def preference(gait: Gait) -> tuple[bool, int, float]:
+def preference(gait: RigidGait) -> tuple[bool, int, float]:
     """Smallest of the gait to walk: a stable one, whose leg does not swing back and forth, soonest rid of disturbances.
 
     A leg that swings back passes its foot through the ground, which the model does not see.
@@ -408,7 +410,7 @@ def preference(gait: Gait) -> tuple[bool, int, float]:
     return not gait.stable, gait.swings, gait.spectral_radius
 
 
-def choice(gaits: tuple[Gait, ...]) -> tuple[int | None, str]:
+def choice(gaits: tuple[RigidGait, ...]) -> tuple[int | None, str]:
     """Which gait to walk of those that the ground can carry, by `preference`; and why."""
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:

@@ -60,6 +60,16 @@ class NotConverged:
     singular: bool = False
 
 
+class Effort(NamedTuple):
+    """How closely something is solved, and how hard; see `newton`."""
+
+    tolerance: float
+    most: int = MAX_EVALUATIONS
+    shortest: float = 1.0
+    growth: float = 1.0
+    rounding: float = ROUNDING
+
+
 def newton(
     equations: Equations[D],
     guess: Floats,

@@ -14,17 +14,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.orbits.attractors import settled
-from walkerlab.orbits.bifurcations import Bifurcation, Kind, critical_value, eigenvector
+from walkerlab.orbits.bifurcations import Bifurcation, GaitEquations, Kind, critical_value, eigenvector
 from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
-from walkerlab.orbits.families import BranchEnd, BranchFollower, GaitBranch, ValueSpan, why_lost
-from walkerlab.orbits.newton import Equations, Evaluated, Floats, NotConverged
-from walkerlab.orbits.step_map import IteratedMap, StepMap, multipliers_of, walk_steps
+from walkerlab.orbits.families import EVALUATIONS, BranchEnd, GaitBranch, ValueSpan, why_lost
+from walkerlab.orbits.newton import Effort, Equations, Evaluated, Floats, NotConverged
+from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import Outcome
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
@@ -33,6 +32,7 @@ MAPS = 256  # of values of the second parameter, kept
 CELLS = (72, 36)
 NOTHING = -1  # no walk goes on
 TRANSIENT, KEPT = 400, 96  # steps
+SOLVED = Effort(1e-12, EVALUATIONS)  # gaits of cells
 KICK = 1e-3  # away from an unstable gait, coordinates being of magnitude one
 
 
@@ -40,30 +40,27 @@ MapAt = Callable[[float], StepMap | None]
 """Step maps over the first parameter, by the value of the second; None where that makes no walker."""
 
 
-def critical_gaits(
-    map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]
-) -> Equations[IteratedMap | None]:
+def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> Equations[Cycle | None]:
     """P^n(z) - z = 0 and a test function, over x = (z, first / its scale, second / its scale), for gaits of n steps."""
     maps = lru_cache(MAPS)(map_at)
 
-    def cycle(x: Floats) -> IteratedMap | None:
+    def gait(x: Floats) -> Evaluated[Cycle] | None:
         step_map = maps(float(x[-1]) * scales[1])
-        walked = None if step_map is None else walk_steps(step_map, x[:-2], float(x[-2]) * scales[0], period)
-        return None if walked is None or walked.outcome is not Outcome.WALKED else walked
+        found = None if step_map is None else GaitEquations(step_map, period, scales[0])(x[:-1])
+        return None if found is None or found.outcome is not Outcome.WALKED else found
 
-    def equations(x: Floats) -> Evaluated[IteratedMap | None]:
+    def equations(x: Floats) -> Evaluated[Cycle | None]:
         """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
         d, reach = x.size - 2, REACH * np.eye(x.size)
-        beside = (cycle(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
-        walked = [one for one in (cycle(x), *beside) if one is not None]
+        beside = (gait(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
+        walked = [one for one in (gait(x), *beside) if one is not None]
         if len(walked) < 1 + 2 * x.size:
             return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
-        here, tests = walked[0], np.array([critical_value(kind, one.DP) for one in walked])
-        jacobian = np.zeros((d + 1, d + 2))
-        jacobian[:d, :d], jacobian[:d, d] = here.DP - np.eye(d), scales[0] * here.Dp
-        jacobian[:d, d + 1] = (walked[-2].z - walked[-1].z) / (2.0 * REACH)
-        jacobian[d] = (tests[1::2] - tests[2::2]) / (2.0 * REACH)
-        return Evaluated(Outcome.WALKED, np.append(here.z - x[:d], tests[0]), jacobian, here)
+        here, tests = walked[0], np.array([critical_value(kind, one.data.DP) for one in walked])
+        by_second = (walked[-2].value - walked[-1].value) / (2.0 * REACH)
+        of_tests = (tests[1::2] - tests[2::2]) / (2.0 * REACH)
+        jacobian = np.vstack((np.column_stack((here.jacobian, by_second)), of_tests))
+        return Evaluated(Outcome.WALKED, np.append(here.value, tests[0]), jacobian, here.data)
 
     return equations
 
@@ -115,7 +112,7 @@ def curve_through(
 
 
 def traced(
-    equations: Equations[IteratedMap | None], start: Solved[IteratedMap | None], spans: tuple[ValueSpan, ValueSpan],
+    equations: Equations[Cycle | None], start: Solved[Cycle | None], spans: tuple[ValueSpan, ValueSpan],
     points: int, advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
@@ -162,15 +159,8 @@ class Regions:
     period: NDArray[np.int64]
 
 
-class CellGait(NamedTuple):
-    """A gait of one step at a cell."""
-
-    z: Floats
-    stable: bool
-    away: Floats  # (d,) a start beside it, towards what grows
-
-
-Row = list[CellGait | None]
+Row = list[Cycle | None]
+"""Gaits of one step, cell by cell."""
 Points = list[Floats | None]
 
 
@@ -189,59 +179,54 @@ def regions_of(
     begin = int(np.argmin(np.abs(second - own)))
     known = known_gaits(branches, first)
     for order in (range(begin, CELLS[1]), range(begin - 1, -1, -1)):
-        gaits: Row = known
+        guesses = known
         points: Points = [None] * len(first)
         for row in order:
             step_map = map_at(float(second[row]))
             if step_map is not None:
-                gaits = corrected_row(BranchFollower(step_map, spans[0]), first, gaits)
+                gaits = corrected_row(step_map, first, guesses)
+                guesses = [None if gait is None else gait.z for gait in gaits]
                 period[:, row], points = settled_row(step_map, first, gaits, points)
             advance()
     return Regions(first, second, period)
 
 
-def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Row:
+def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
     """Near each value a gait of one step from the branches, a stable one if there is one."""
-    found: Row = [None] * len(values)
+    found, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
             continue
         for one, other in pairwise(branch.points):
             low, high = sorted((one.value, other.value))
             for place in np.flatnonzero((values >= low) & (values <= high) & (low < high)):
-                share = (values[place] - one.value) / (other.value - one.value)
-                z = one.z + share * (other.z - one.z)
-                present = found[place]
-                if present is None or (one.stable and not present.stable):
-                    found[place] = CellGait(z, one.stable, z)
+                if found[place] is None or (one.stable and not stable[place]):
+                    share = (values[place] - one.value) / (other.value - one.value)
+                    found[place], stable[place] = one.z + share * (other.z - one.z), one.stable
     return found
 
 
-def corrected_row(follower: BranchFollower, values: Floats, before: Row) -> Row:
+def corrected_row(step_map: StepMap, values: Floats, before: Points) -> Row:
     """The gaits at the cells of a row, from those of the row before and from neighbours in the row itself."""
     row: Row = [None] * len(values)
     places = list(range(len(values)))
     for order, step in ((places, -1), (places[::-1], 1)):
         for place in order:
-            beside = row[place + step] if 0 <= place + step < len(values) else None
+            neighbour = row[place + step] if 0 <= place + step < len(values) else None
+            beside = None if neighbour is None else neighbour.z
             for guess in (before[place], beside) if step < 0 else (beside,):
                 present = row[place]
                 if guess is None or (present is not None and present.stable):
                     continue
-                found = gait_near(follower, guess.z, float(values[place]))
-                if found is not None and (present is None or found.stable):
+                found = gait_near(step_map, guess, float(values[place]), SOLVED)
+                if isinstance(found, Cycle) and (present is None or found.stable):
                     row[place] = found
     return row
 
 
-def gait_near(follower: BranchFollower, z: Floats, value: float) -> CellGait | None:
-    """The gait of one step that Newton's method finds from z."""
-    solved = follower.solved_at(z, value, 1)
-    if solved is None:
-        return None
-    DP, gait = solved.evaluated.data.DP, solved.x[:-1]
-    largest = multipliers_of(DP)[0]
-    return CellGait(gait, bool(abs(largest) < 1.0), gait + KICK * eigenvector(DP, largest.real))
+def away_from(gait: Cycle) -> Floats:
+    """A start beside an unstable gait, towards what grows."""
+    return gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
 
 
 def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[NDArray[np.int64], Points]:
@@ -257,7 +242,7 @@ def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -
             continue
         point = None
         # on the attractors of its neighbours, and beside its unstable gait
-        starts = (points[place - 1] if place else None, before[place], None if gait is None else gait.away)
+        starts = (points[place - 1] if place else None, before[place], None if gait is None else away_from(gait))
         for start in (one for one in starts if one is not None):
             here = settled(step_map, start, float(values[place]), TRANSIENT, KEPT)
             if not isinstance(here, Outcome):

@@ -25,7 +25,9 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_gait import ContactGait, find_contact_gait, with_contact
+from walkerlab.orbits.contact_gait import EFFORT, with_contact
+from walkerlab.orbits.contact_map import OwnPads, step_of
+from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -34,7 +36,7 @@ GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
 WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10  # of the walks that are timed, and of those that show their numerical error
 ABSOLUTE = 0.01  # absolute tolerance in relative ones
 REPEATS = 3
-MAX_EVALUATIONS = 30  # of Newton's method
+SEARCH = EFFORT._replace(most=30)
 
 
 class ContactFactors(NamedTuple):
@@ -97,26 +99,24 @@ class Distance:
 
 
 @dataclass(frozen=True)
-class RigidGait:
-    """What the distances are measured from."""
-
-    period: float
-    length: float
-    motion: Motion  # of the walk from the rigid start
-
-
-@dataclass(frozen=True)
 class Limit:
-    """A scene and its rigid counterpart."""
+    """A scene, and what its distances are measured from: the rigid gait and the walk from the rigid start.
+
+    steps     of that walk
+    sampling  s
+    every     of a series' settings which are taken
+    """
 
     ground: JudgedGround
-    rigid: RigidGait
+    period_s: float
+    length_m: float
+    motion: Motion
     steps: int
-    sampling: float  # s
-    every: int = 1  # of the settings of a series
+    sampling: float
+    every: int = 1
 
     def series(
-        self, name: str, walker: ContactWalker, gait: ContactGait, start: Callable[[ContactWalker], State] | None = None
+        self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
         """The distances along a series, each gait searched from the one before; ends where a gait is lost.
 
@@ -128,25 +128,25 @@ class Limit:
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break
-            gait, step, check = near, near.step, self.gait(changed, near, CHECK_TOLERANCE)
-            off = step.period_s - self.rigid.period
+            gait, step, check = near, step_of(near), self.gait(changed, near, CHECK_TOLERANCE)
+            off = step.period_s - self.period_s
             distance = Distance(
                 setting,
                 step.period_s,
                 step.length_m,
                 step.slip_m,
                 off,
-                step.length_m - self.rigid.length,
-                abs(off if check is None else check.step.period_s - step.period_s),
+                step.length_m - self.length_m,
+                abs(off if check is None else check.period_s - step.period_s),
             )
             found.append(distance if start is None else self.walked(distance, changed, start(changed)))
         return found
 
-    def gait(self, walker: ContactWalker, near: ContactGait, tolerance: float) -> ContactGait | None:
+    def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
         """The gait on this ground near another one's; None if it is not found."""
-        how = settings(tolerance)
-        found = find_contact_gait(walker, self.ground, how, near.z, near.step.length_m, most=MAX_EVALUATIONS)
-        return found if isinstance(found, ContactGait) else None
+        pads = OwnPads(lambda _: walker, self.ground, settings(tolerance), near.step.length_m)
+        found = gait_near(pads, near.z, 0.0, SEARCH)
+        return found if isinstance(found, Cycle) else None
 
     def walked(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
         """With the whole walk from the rigid start beside."""
@@ -167,9 +167,9 @@ class Limit:
         legs = motion_of_legs(sampled.samples.states, walker)
         motion = sampled_at_strikes(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
         phases = np.linspace(0.0, 1.0, PHASES)
-        aligned = difference_in_phase(motion, self.rigid.motion, phases)
-        smooth = between_impacts(motion, self.rigid.motion, phases)
-        _, raw = difference_in_time(motion, self.rigid.motion)
+        aligned = difference_in_phase(motion, self.motion, phases)
+        smooth = between_impacts(motion, self.motion, phases)
+        _, raw = difference_in_time(motion, self.motion)
         return replace(
             distance,
             angle=float(np.abs(aligned.angle[smooth]).max()),

@@ -7,9 +7,11 @@ leg, stance leg, and a shank whose knee was free during the impact. A compass ha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from copy import copy
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from threading import local
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +22,7 @@ from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_lengths, swing_foot
-from walkerlab.orbits.newton import Evaluated
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_lengths
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.outcome import Outcome
@@ -119,8 +120,8 @@ class Memory(NamedTuple):
     pivots: Any  # (d,)
 
 
-class Shooting:
-    """The step map of walkers that are alike, with the memory to evaluate it."""
+class Shooting(local):
+    """The step map of walkers that are alike, with the memory to evaluate it: each thread has its own."""
 
     def __init__(self, like: Standing, tolerances: Tolerances) -> None:
         """Steps at these tolerances."""
@@ -238,23 +239,6 @@ def follow(model: Standing, section: StrikeSection, memory: Memory, known: Known
     return NOWHERE
 
 
-class StepEquations:
-    """P(z) - z = 0 of a walker; a 'step' that is too short to be one has no value."""
-
-    def __init__(self, shooting: Shooting, section: StrikeSection) -> None:
-        """Steps of `shooting` from a walker's section."""
-        self.shooting, self.section, self.unity = shooting, section, np.eye(len(section.basis))
-
-    def __call__(self, z: Floats) -> Evaluated[Steps]:
-        """Residual and its derivative at z (d,)."""
-        step = self.shooting.walk(self.section, z)
-        if step.outcome is not Outcome.WALKED:
-            return Evaluated(step.outcome, z, self.unity, step)
-        if step.time[0] < SHORTEST_STEP:
-            return Evaluated(Outcome.NO_HEEL_STRIKE, z, self.unity, step)
-        return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - self.unity, step)
-
-
 class RigidMap(StepMap):
     """The rigid model: its coordinates just after the heel strike, of the similar walker of unit size."""
 
@@ -266,10 +250,13 @@ class RigidMap(StepMap):
 
     tolerances = WATCHED
 
-    def __init__(self, walker_at: Callable[[float], Standing | None], scale: float, like: Standing) -> None:
+    def __init__(
+        self, walker_at: Callable[[float], Standing | None], scale: float, like: Standing, exact: Tolerances = EXACT
+    ) -> None:
         """A family of walkers.
 
         like       one of them
+        exact      tolerances of its steps
         walker_at  the walker at a value of the parameter; None where it makes no walker
         scale      magnitude of changes of the parameter that matter
         """
@@ -280,12 +267,18 @@ class RigidMap(StepMap):
             if walker is None:
                 return None
             unit, units = unit_walker(walker)
-            return Similar(unit, units, section_of(unit))
+            section, n = section_of(unit), len(unit.arm_x)
+            feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
+            return Similar(unit, units, section, feet.tolist(), float(unit.radius), float(-section.start[SWING]))
 
         self._unit_at = unit_at
         self.scale = scale
         self.names = SECTION_NAMES[: int(like.coordinates)]
-        self._like, self._exact, self._quick = like, Shooting(like, EXACT), Shooting(like, QUICK)
+        self._like, self._exact = like, Shooting(like, exact)
+
+    @cached_property
+    def _quick(self) -> Shooting:
+        return Shooting(self._like, QUICK)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """One step, with its exact derivative along the section."""
@@ -293,19 +286,19 @@ class RigidMap(StepMap):
         if unit is None:
             return no_step(Outcome.REJECTED, z.size)
         step = self._exact.walk(unit.section, z, derived=derived)
-        if step.outcome is not Outcome.WALKED:
-            return no_step(step.outcome, z.size)
+        if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
+            standing = step.outcome is Outcome.WALKED
+            return no_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
         ahead, period_s, DP = step.z[0], float(step.time[0]) * unit.units.time, step.DP[0]
-        after = on_section(unit.walker, ahead)
-        rolled = -unit.walker.radius * (after[SWING] - z[0])  # the foot behind is the one that stood
-        length_m = float(rolled - swing_foot(unit.walker, after)[1]) * unit.units.length
-        return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, float(ahead[0]), period_s)
+        angle = float(ahead[0])
+        length_m = unit.step_length(float(z[0]), angle) * unit.units.length
+        return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Least normal force, largest friction ratio, deepest scuff."""
         unit = self._unit_at(p)
         assert unit is not None, "what is watched was walked"
-        walker, units, _ = unit
+        walker, units = unit.walker, unit.units
         taken = take_walk(walker, WATCHED, on_section(walker, z), steps)
         extremes = (taken.min_normal_force, taken.max_friction_ratio, taken.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
@@ -314,7 +307,7 @@ class RigidMap(StepMap):
         """Walk over footholds (m), after a push just after the heel strike that z is."""
         unit = self._unit_at(p)
         assert unit is not None, "what is disturbed has a gait"
-        walker, units, section = unit
+        walker, units, section = unit.walker, unit.units, unit.section
         if push_N_s != 0.0:
             z = coordinates_of(walker, pushed_at_hip(walker, on_section(walker, z), push_N_s / units.impulse))
         rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
@@ -343,7 +336,7 @@ class RigidMap(StepMap):
         unit, none = self._unit_at(p), np.zeros(0)
         if unit is None:
             return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
-        _, units, section = unit
+        units, section = unit.units, unit.section
         if tangent is None:
             walked = self._quick.walk(section, z, steps, derived=False)
             periods = np.diff(walked.time, prepend=0.0) * units.time
@@ -364,8 +357,19 @@ class RigidMap(StepMap):
 
 
 class Similar(NamedTuple):
-    """The unit walker that a walker is similar to, the units, and its section."""
+    """The unit walker that a walker is similar to, the units, its section, and its feet there."""
 
     walker: Standing
     units: Units
     section: StrikeSection
+    feet: list[list[float]]  # of each body: angle from the slope's normal at z = 0, its change with theta_2, levers
+    radius: float
+    apart: float  # rad, less the sum of the legs' angles with both feet on the slope
+
+    def step_length(self, before: float, after: float) -> float:
+        """Length of a step, by the stance leg's angles just after the heel strikes that begin and end it."""
+        behind = 0.0  # from the foot that stood to the one that landed
+        for start, turning, x, y in self.feet:
+            psi = start + after * turning
+            behind += math.cos(psi) * x - math.sin(psi) * y
+        return self.radius * (before + after + self.apart) - behind

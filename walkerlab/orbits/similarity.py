@@ -35,6 +35,8 @@ class Units(NamedTuple):
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""
     length, mass = float(walker.leg_length), float(walker.mass)
+    if length == mass == walker.gravity == 1.0:
+        return walker, Units(1.0, 1.0, 1.0)
     units = Units(length, mass, math.sqrt(length / walker.gravity))
     inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
     scales = {

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.orbits.newton import Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
@@ -25,6 +26,8 @@ REMEMBERED = 4096  # walkers built so far
 CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
 """Offsets and weights of formulas of second order for a first derivative."""
+unity = lru_cache(np.eye)
+nothing = partial(np.zeros, 0)
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,15 @@ class DisturbedWalk:
     z: Floats
 
 
-class StepMap(Protocol):
-    """A walker's step from section to section, over one parameter.
+class Stepper(Protocol):
+    """A walker's step from section to section, over one parameter: all that a gait is solved on."""
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        """One step from z (d,) at the parameter's value p, with its derivative; REJECTED where p makes no walker."""
+
+
+class StepMap(Stepper, Protocol):
+    """A walker's step from section to section, with what its families are followed by.
 
     names       the section's coordinates, all of magnitude one
     monitors    what `watch` measures
@@ -103,9 +113,6 @@ class StepMap(Protocol):
     monitors: tuple[Monitor, ...]
     scale: float
     tolerances: Tolerances
-
-    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step from z (d,) at the parameter's value p, with its derivative; REJECTED where p makes no walker."""
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """(monitors,) the worst of each over some steps."""
@@ -146,12 +153,6 @@ class StepMap(Protocol):
         )
 
 
-def strike_to_strike(steps: Sequence[MappedStep]) -> Floats:
-    """(n,) durations of the steps of a gait from heel strike to heel strike, wherever its section lies."""
-    waits = [step.period_s - step.strike_s for step in steps]
-    return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(steps)])
-
-
 def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome, Floats]:
     """How a step from z (d,) ends near p, and the derivative (d,) of where it leads with respect to the parameter.
 
@@ -174,58 +175,102 @@ def no_step(outcome: Outcome, d: int) -> MappedStep:
     return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class IteratedMap:
-    """Some steps in a row.
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """Some steps in a row; of a gait they lead back to where they begin.
 
-    outcome  of the last step
-    steps    those that were taken
-    z        (d,) where they led
-    DP, Dp   derivatives of all steps together
+    outcome   of the last step
+    value     of the parameter
+    z         (d,) where they begin
+    steps     those that were taken
+    DP, Dp    derivatives of where all of them together lead; Dp where it is asked for
+    monitors  the worst of each over the steps, where they are on a branch
     """
 
     outcome: Outcome
-    steps: tuple[MappedStep, ...]
+    value: float
     z: Floats
+    steps: tuple[MappedStep, ...]
     DP: Floats
-    Dp: Floats
+    Dp: Floats = field(default_factory=nothing)
+    monitors: Floats = field(default_factory=nothing)
+
+    def returning(self) -> Evaluated[Cycle]:
+        """What a gait makes zero, P^n(z) - z, and its derivative by z."""
+        off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
+        return Evaluated(self.outcome, off, self.DP - unity(self.z.size), self)
+
+    @property
+    def residual(self) -> float:
+        """Largest component of P^n(z) - z."""
+        return self.returning().residual
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """(d,) of the whole cycle, largest first."""
+        return multipliers_of(self.DP)
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def step(self) -> MappedStep:
+        """The step of a gait of one step."""
+        (step,) = self.steps
+        return step
 
     @property
     def period_s(self) -> float:
         """Duration of the steps."""
         return math.fsum(step.period_s for step in self.steps)
 
+    @property
+    def periods_s(self) -> Floats:
+        """(n,) durations of a gait's steps from heel strike to heel strike, wherever the section lies."""
+        waits = [step.period_s - step.strike_s for step in self.steps]
+        return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(self.steps)])
 
-def walk_steps(step_map: StepMap, z: Floats, p: float, n: int, by_parameter: bool = True) -> IteratedMap:
-    """n steps from z (d,) at p, by the chain rule; with how they change with p, where that is wanted."""
+    @property
+    def lengths_m(self) -> Floats:
+        """(n,) of the steps."""
+        return np.array([step.length_m for step in self.steps])
+
+    @property
+    def angles(self) -> Floats:
+        """(n,) of the stance leg just after each heel strike (rad)."""
+        return np.array([step.angle for step in self.steps])
+
+
+def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
+    """n steps from z (d,) at p, with their derivative by z."""
     steps: list[MappedStep] = []
-    DP, Dp = np.eye(z.size), np.zeros(z.size)
-    outcome = Outcome.WALKED
+    at, DP = z, unity(z.size)
     for _ in range(n):
-        step = step_map.step(z, p)
-        outcome, beside = step.outcome, 0.0 * z
-        if outcome is Outcome.WALKED and by_parameter:
-            outcome, beside = along_parameter(step_map, z, p)
-        if outcome is not Outcome.WALKED:
-            break
-        DP, Dp = step.DP @ DP, step.DP @ Dp + beside
-        z = step.z
+        step = step_map.step(at, p)
+        if step.outcome is not Outcome.WALKED:
+            return Cycle(step.outcome, p, z, tuple(steps), DP)
+        at, DP = step.z, step.DP @ DP if steps else step.DP
         steps.append(step)
-    return IteratedMap(outcome, tuple(steps), z, DP, Dp)
+    return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
 
 
-def gait_near(step_map: StepMap, z: Floats, p: float, n: int, tolerance: float) -> IteratedMap | None:
-    """The cycle of the gait of n steps near z (d,) at p; None if Newton's method finds none.
+def with_parameter(step_map: StepMap, cycle: Cycle) -> Cycle:
+    """The cycle with its derivative by the parameter; its outcome is that of a walk beside it that ends."""
+    at, Dp = cycle.z, 0.0 * cycle.z
+    for step in cycle.steps:
+        outcome, beside = along_parameter(step_map, at, cycle.value)
+        if outcome is not Outcome.WALKED:
+            return replace(cycle, outcome=outcome, Dp=Dp)
+        at, Dp = step.z, step.DP @ Dp + beside
+    return replace(cycle, Dp=Dp)
 
-    tolerance  on where it leads, less z
-    """
 
-    def residual(z: Floats) -> Evaluated[IteratedMap]:
-        cycle = walk_steps(step_map, z, p, n, by_parameter=False)
-        return Evaluated(cycle.outcome, cycle.z - z, cycle.DP - np.eye(z.size), cycle)
-
-    solved = newton(residual, z, tolerance)
-    return None if isinstance(solved, NotConverged) else solved.evaluated.data
+def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
+    """The gait of n steps near z (d,) at p, by Newton's method."""
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, *effort)
+    return solved if isinstance(solved, NotConverged) else solved.evaluated.data
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.ground import Ground
+from walkerlab.config.ground import Footholds
 
 
-def foothold_heights(ground: Ground, steps: int) -> NDArray[np.float64] | None:
+def foothold_heights(ground: Footholds, steps: int) -> NDArray[np.float64] | None:
     """Heights (steps + 1,) in m over the slope of a walk's footholds, its start's first; None where all are zero.
 
     Those drawn are independent and normal; how many are asked for does not change the first.

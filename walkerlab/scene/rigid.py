@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from walkerlab.config.drives import Hip
-from walkerlab.config.ground import Ground
+from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
@@ -36,7 +36,7 @@ class RigidScene:
     names: tuple[str, ...]  # of the state's numbers
     knee_m: tuple[float, float] | None  # the knee in its thigh's frame
     outputs: tuple[Output, ...]  # what in time is wanted
-    ground: Ground
+    ground: Footholds
 
     def walk(
         self,

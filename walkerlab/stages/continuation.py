@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.ground import Ground
+from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.config.schema import Output
 from walkerlab.config.walkers import without_contact
@@ -36,19 +36,18 @@ from walkerlab.orbits.families import (
     BranchFollower,
     Crossing,
     GaitBranch,
-    GaitPoint,
     Seed,
     ValueSpan,
     ends_at,
     steps_word,
 )
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.newton import Floats
+from walkerlab.orbits.newton import Effort, Floats
 from walkerlab.orbits.plane import CONTROL as CURVE_CONTROL
 from walkerlab.orbits.plane import BifurcationCurve, Regions, curve_through, regions_of
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import IteratedMap, Monitor, StepMap, gait_near, strike_to_strike
+from walkerlab.orbits.step_map import Cycle, Monitor, StepMap, gait_near
 from walkerlab.outcome import outcome_of
 from walkerlab.scene.endings import causes, without_pads
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
@@ -84,7 +83,7 @@ TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 EVERY = 3  # which samples are kept beside those at heel strikes
 
-TIGHTEST = 1e-13  # what gaits are solved to whose numerical error is told
+TIGHTEST = Effort(1e-13)  # what gaits are solved to whose numerical error is told
 OF_A_GAIT = ("step_period_s", "step_length_m")  # what a family's numerical error is told of
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -554,16 +553,13 @@ def sample_again(followed: Followed) -> dict[str, Any] | None:
     tighter, by = tightened(step_map.tolerances)
     otherwise = step_map.at(tighter)
     again = [
-        (point, gait_near(otherwise, point.z, point.value, branch.period, TIGHTEST))
+        (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [
-        (
-            np.max(np.abs(strike_to_strike(cycle.steps) - point.periods_s)),
-            np.max(np.abs([step.length_m for step in cycle.steps] - point.lengths_m)),
-        )
-        for point, cycle in again
-        if cycle is not None
+        (np.max(np.abs(gait.periods_s - point.periods_s)), np.max(np.abs(gait.lengths_m - point.lengths_m)))
+        for point, gait in again
+        if isinstance(gait, Cycle)
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
     largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
@@ -736,25 +732,16 @@ class Mark(NamedTuple):
     after: int
     kind: str
     value: float
-    cycle: IteratedMap
-
-    @property
-    def periods(self) -> Floats:
-        """Durations of the steps there (s)."""
-        return strike_to_strike(self.cycle.steps)
-
-    @property
-    def angles(self) -> list[float]:
-        """The stance leg's just after each heel strike there (rad)."""
-        return [step.angle for step in self.cycle.steps]
+    periods: Floats  # durations of the steps there (s)
+    angles: Floats  # of the stance leg just after each heel strike there (rad)
 
 
 def marks_on(branch: GaitBranch) -> list[Mark]:
     """The bifurcations of a branch in their order along it."""
     return [
-        Mark(index, one.kind, one.value, one.point.evaluated.data)
+        Mark(index, one.kind, one.value, one.gait.periods_s, one.gait.angles)
         for index, (before, after) in enumerate(pairwise(branch.points))
-        for one in branch.bifurcations if one.lies_between(before.solved, after.solved)
+        for one in branch.bifurcations if one.lies_between(before, after)
     ]  # fmt: skip
 
 
@@ -763,8 +750,7 @@ def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
     for parent in branches:
         for one in parent.bifurcations:
             if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
-                cycle = one.point.evaluated.data
-                return [Mark(-1, one.kind, one.value, replace(cycle, steps=(*cycle.steps, *cycle.steps)))]
+                return [Mark(-1, one.kind, one.value, np.tile(one.gait.periods_s, 2), np.tile(one.gait.angles, 2))]
     return []
 
 
@@ -806,7 +792,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
     }
 
 
-def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
+def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
     """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
@@ -817,7 +803,7 @@ def motion(point: GaitPoint, period: int, config: ContactConfig, parameter: Para
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     knee = knee_of(assembly_of(changed.walker, rigid=True))
-    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS, Ground())
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS, Footholds())
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)
     if walk.steps < steps or walk.samples is None:
         return

@@ -15,9 +15,10 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.design import ON_BOUND, Floats, Point, Question, optima, searched
+from walkerlab.orbits.design import ON_BOUND, Aim, Floats, Point, optima, searched
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gait_numbers, gradients
+from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.robustness import Scales, Standpoint
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import gait_near, multipliers_of
@@ -28,7 +29,7 @@ from walkerlab.stages.robustness import Subject, contact_subject, section_coordi
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
-RESIDUAL: Final = 1e-10
+SOLVED: Final = Effort(1e-10)
 MEETING: Final = 1e-3  # between magnitudes of multipliers
 LABELS: Final = {
     "to": Label("", "number of the config"),
@@ -53,7 +54,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress)
     gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(asked.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
-    question = Question(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
+    question = Aim(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
     begun = gaits.at(own)
@@ -162,9 +163,11 @@ class Gaits:
 
     def near(self, at: Standpoint, z: Floats) -> tuple[Standpoint, dict[str, float]] | None:
         """The gait near z (d,) with its numbers; None where it has not all that are wanted."""
-        cycle = gait_near(at.step_map, z, at.p, 1, RESIDUAL)
-        here = at if cycle is None else at._replace(z=cycle.z, A=cycle.DP)
-        numbers = None if cycle is None else gait_numbers(here, self.wanted)
+        cycle = gait_near(at.step_map, z, at.p, SOLVED)
+        if isinstance(cycle, NotConverged):
+            return None
+        here = at._replace(z=cycle.z, A=cycle.DP)
+        numbers = gait_numbers(here, self.wanted)
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (here, numbers)
 
 

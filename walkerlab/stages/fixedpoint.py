@@ -9,7 +9,7 @@ from walkerlab.config.drives import drives_of
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
-from walkerlab.orbits.fixed_point import Gait, GaitSearch, find_gaits
+from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import printed, real_and_imaginary, rows_group
@@ -93,12 +93,12 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
     return {**sets[config.equations], **driven, "state_names": list(coordinates(config)), "equation_sets": sets}
 
 
-def numbers_of(gait: Gait) -> dict[str, Label]:
+def numbers_of(gait: RigidGait) -> dict[str, Label]:
     """What is stored and printed of a gait, with or without knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
 
 
-def gait_summary(gait: Gait) -> dict[str, Any]:
+def gait_summary(gait: RigidGait) -> dict[str, Any]:
     """One gait in SI units."""
     return {
         "state": list(gait.state),

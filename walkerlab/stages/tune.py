@@ -16,9 +16,10 @@ from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rate
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits import scaled_starts
-from walkerlab.orbits.contact_gait import ContactGait, GaitAnswer
-from walkerlab.orbits.contact_map import angled_bodies, turning_bodies
+from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.orbits.contact_map import angled_bodies, step_of, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
+from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.paper.printed import TABLE_2
@@ -267,7 +268,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
     said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
     if gait is None:
         return said
-    step = gait.step
+    step = step_of(gait)
     return {
         **said,
         "state": gait.z.tolist(),
@@ -390,7 +391,7 @@ def map_group(found: TuneRun) -> Group:
     )
 
 
-def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
+def gait_group(gait: Cycle, scene: ContactScene) -> Group:
     """The contact gait on its section."""
     coordinates = section_coordinates(scene)
     names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
@@ -400,7 +401,7 @@ def gait_group(gait: ContactGait, scene: ContactScene) -> Group:
         {
             "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
             "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
-            "derivative": Variable(gait.step.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+            "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
             **numbered(gait.z.size, "multiplier", "number"),
             **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
         }

@@ -11,7 +11,6 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
-from walkerlab.orbits.contact_gait import ContactGait
 from walkerlab.orbits.rigid_limit import (
     ALL,
     ALL_POINT,
@@ -22,10 +21,10 @@ from walkerlab.orbits.rigid_limit import (
     Distance,
     Extrapolation,
     Limit,
-    RigidGait,
     extrapolated,
     observed_orders,
 )
+from walkerlab.orbits.step_map import Cycle
 from walkerlab.paper.printed import ANGLE_ERROR
 from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_drives
 from walkerlab.scene.parts import assembly_of
@@ -88,7 +87,7 @@ class LimitFindings:
 def limit_findings(
     config: ContactConfig,
     scene: ContactScene,
-    gait: ContactGait,
+    gait: Cycle,
     rigid_gait: Mapping[str, Any],
     walk: RigidWalkResult,
     progress: Progress,
@@ -106,7 +105,9 @@ def limit_findings(
     motion = sampled_at_strikes(seen)
     limit = Limit(
         scene.ground,
-        RigidGait(float(rigid_gait["period_s"]), float(rigid_gait["step_length_m"]), motion),
+        float(rigid_gait["period_s"]),
+        float(rigid_gait["step_length_m"]),
+        motion,
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
         1 if is_plain_compass(config) else OTHERS_EVERY,
@@ -130,7 +131,7 @@ def limit_findings(
     for name in gaits:
         found[name] = limit.series(name, scene.walker, gait)
         progress.advance()
-    return LimitFindings(walked, limit.rigid.period, gait.step.period_s, found, extrapolated(found[STICTION]))
+    return LimitFindings(walked, limit.period_s, gait.period_s, found, extrapolated(found[STICTION]))
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
-from walkerlab.orbits.fixed_point import Gait, find_gaits
+from walkerlab.orbits.fixed_point import RigidGait, find_gaits
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.parts import assembly_of
@@ -149,7 +149,7 @@ def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
 
 
 @cache
-def gait_of(walker: Standing, seed: int) -> Gait | None:
+def gait_of(walker: Standing, seed: int) -> RigidGait | None:
     """The gait that a search finds, once: most cases of a catalogue are one walker on other ground."""
     return find_gaits(walker, seed).gait
 
