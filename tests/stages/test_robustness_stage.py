@@ -99,6 +99,8 @@ def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
     summary = raised.value.partial.summary
     assert summary["gaits"][0]["spectral_radius"] > 1.0
     assert not summary["gait_sensitivity_norm"]
+    assert "What moves the gait" not in "".join(answer("robustness", {**summary, "sensitivity": []}))
+    assert any("spectral_radius" in line for line in answer("robustness", summary))
     assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
 
 
