@@ -246,13 +246,13 @@ def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
     An intrinsic behind an overload would give memory of the overload's own frame.
     """
 
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class Scratch(AbstractTemplate):  # type: ignore[misc]
         key = function
 
         def generic(self, given: Any, named: Any) -> Any:  # noqa: ARG002 - numba calls it so
             return signature(types.Array(types.float64, dimensions, "C"), *given)
 
-    infer_global(function)(Template)
+    infer_global(function)(Scratch)
 
     def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
         like = called.args[0]
