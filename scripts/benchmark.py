@@ -48,7 +48,7 @@ from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
 from walkerlab.stages.accuracy import OFF_THE_GAIT
-from walkerlab.stages.continuation import FamilyQuestion, contact_branches, rigid_branches
+from walkerlab.stages.continuation import FamilyQuestion, search_of
 from walkerlab.stages.progress import Silent
 from walkerlab.stages.runner import Options, execute
 from walkerlab.stages.tune import MAP_RTOL
@@ -240,10 +240,17 @@ def family_lines(watch: Stopwatch) -> Iterator[Line]:
     """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
     config = load().config
     rigid = FamilyQuestion(config, parameter_of("slope_rad", config), ValueSpan(1e-4, 0.1), periods=16, points=400)
-    yield at_most("rigid branches to period 16", watch(lambda: rigid_branches(rigid, Silent())), "s", 5.0, 2.5)
+    yield at_most("rigid branches to period 16", watch(lambda: branches_of("rigid", rigid)), "s", 5.0, 2.5)
     contact = FamilyQuestion(config, parameter_of("slope_deg", config), ValueSpan(0.2, 4.2), periods=1, points=400)
-    seconds = watch(lambda: contact_branches(contact, Silent()))
+    seconds = watch(lambda: branches_of("contact", contact))
     yield at_most("contact branch from 0.2 deg to beyond its first flip", seconds, "s", 60.0, 30.0)
+
+
+def branches_of(model: str, asked: FamilyQuestion) -> None:
+    """Follow the branches of a model."""
+    search = search_of(model, asked, Silent())
+    assert search is not None, "there is a gait to begin from"
+    search.branches()
 
 
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:

@@ -22,8 +22,9 @@ from typing import NamedTuple
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.orbits.families import ValueSpan
+from walkerlab.orbits.family_search import first_flip
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.stages.continuation import FamilyQuestion, contact_branches, first_flip, rigid_branches
+from walkerlab.stages.continuation import FamilyQuestion, search_of
 from walkerlab.stages.progress import Silent
 
 SPAN = ValueSpan(3.9, 4.5)  # deg; holds every flip that is asked for
@@ -63,7 +64,13 @@ def question(config: Config) -> FamilyQuestion:
 
 def flip(ground: Ground) -> float:
     """Where the contact model's gait of one step first doubles its period (deg)."""
-    found = first_flip(contact_branches(question(config_of(ground)), Silent())[0].branches)
+    return flip_of("contact", config_of(ground))
+
+
+def flip_of(model: str, config: Config) -> float:
+    """The first flip of a model in the span (deg)."""
+    search = search_of(model, question(config), Silent())
+    found = None if search is None else first_flip(search.branches().branches)
     assert found is not None, "the span holds the flip"
     return found[0]
 
@@ -100,9 +107,7 @@ def main() -> None:
     parser.add_argument("--damping", type=float, default=1.0, help="power of the stiffness that the damping goes with")
     parser.add_argument("--frictions", type=float, nargs="+", default=[0.5, 1.0, 2.0], help="of its coefficients")
     asked = parser.parse_args()
-    found = first_flip(rigid_branches(question(load().config), Silent())[0].branches)
-    assert found is not None, "the rigid walker's flip is in the span"
-    rigid = found[0]
+    rigid = flip_of("rigid", load().config)
     print(f"rigid model: {rigid:.7f} deg")
     velocity, ball, point = asked.velocities[-1], asked.radii[0], asked.radii[-1]
     stiffer = [Ground(velocity, point, factor, factor**asked.damping) for factor in asked.factors]

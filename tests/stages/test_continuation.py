@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,8 +12,10 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.orbits import family_search
 from walkerlab.orbits import plane as plane_of_gaits
 from walkerlab.orbits.families import ValueSpan
+from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.scene.families import rigid_map
@@ -239,9 +242,9 @@ def test_bad_questions_end_in_words(sets, said):
 def follow_coarsely(*sets):
     """With the attractor at fewer values, and without gaits of other numbers of steps than 1, 2, 4."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(continuation, "RIGID_SAMPLES", continuation.AttractorSampling(36, 500, 96, 12, 400))
-        patch.setattr(continuation, "OTHER_PERIODS", ())
-        patch.setattr(continuation, "STARTS", 0)
+        patch.setitem(THOROUGHNESS, "rigid", replace(THOROUGHNESS["rigid"], values=36, exponents=12, averaged=400))
+        patch.setattr(family_search, "OTHER_PERIODS", ())
+        patch.setattr(family_search, "STARTS", 0)
         return follow(*sets, "periods=4").summary
 
 

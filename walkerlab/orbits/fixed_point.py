@@ -62,6 +62,7 @@ class RigidGait:
     cost_of_transport: float  # work given over weight and distance
     swings: int = 1  # how often the swing leg passes the stance leg in a step
     found_by: tuple[str, ...] = ()  # the searches that led here
+    z: tuple[float, ...] = ()  # section coordinates of the unit walker
 
     @property
     def spectral_radius(self) -> float:
@@ -116,6 +117,7 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, gait: Cycle
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
         swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
+        z=tuple(gait.z.tolist()),
     )
 
 

@@ -20,9 +20,7 @@ from walkerlab.config.schema import Config
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
-from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.shooting import RigidMap
-from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.parameter import PHYSICAL, SLOPE_RAD, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
@@ -76,15 +74,7 @@ def followed(walker_at: Callable[[float], Standing | None], span: ValueSpan, val
         return ()
     gaits = [gait for gait in find_gaits(walker, settings=QUICK).gaits if not gait.objections]
     follower = BranchFollower(RigidMap(walker_at, span.size, walker), span, most=POINTS)
-    return follower.family([Seed(section_of(walker, gait.state), value) for gait in gaits], 1)
-
-
-def section_of(walker: Standing, state: tuple[float, ...]) -> Floats:
-    """Section coordinates of a state, as the step map has them."""
-    _, units = unit_walker(walker)
-    z = np.array(state)[walker.section[: walker.coordinates]]
-    z[1:] *= units.time
-    return z
+    return follower.family([Seed(np.array(gait.z), value) for gait in gaits], 1)
 
 
 def walkable(branches: tuple[GaitBranch, ...]) -> Iterator[Met]:

@@ -1,0 +1,207 @@
+"""What is stored of families of gaits: branches with their bifurcations, attractors, curves, and gaits that walk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from walkerlab.config.ground import Footholds
+from walkerlab.config.reads import ContactConfig
+from walkerlab.config.schema import Output
+from walkerlab.labels import Label
+from walkerlab.mechanics.rigid import knee_of
+from walkerlab.orbits.families import GaitBranch
+from walkerlab.orbits.family_search import RIGID, Family
+from walkerlab.orbits.newton import Floats
+from walkerlab.orbits.plane import BifurcationCurve, Regions
+from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import Cycle, Monitor
+from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
+from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.stages.numerical_error import evenly_spread
+from walkerlab.stages.simulate import trajectory_group
+from walkerlab.stages.walk import only_at
+from walkerlab.store.columns import columns, labelled, real_and_imaginary
+from walkerlab.store.content import Attribute, Group, Variable
+
+MOTIONS_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
+STRIDE = 2  # steps, after which each leg is where it was
+TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
+ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
+EVERY = 3  # which samples are kept beside those at heel strikes
+
+MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
+PERIOD = Label("1", "steps of the gait")
+STANCE = Label("rad", "stance leg just after each heel strike", name="stance_angle")
+CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
+BIFURCATIONS = {"kind": KIND, "period": PERIOD, "branch": Label("1", "number of the branch")}
+EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "its standard error")}
+POINTS = {
+    "stable": Label("1", "whether disturbances die out"),
+    "periods_s": Label("s", "durations of the steps", ("step",), name="step_period"),
+    "lengths_m": Label("m", "lengths of the steps", ("step",), name="step_length"),
+    "angles": replace(STANCE, dims=("step",)),
+    "z": Label("1", "section coordinates", ("coordinate",), name="section"),
+}
+ATTRACTORS = {
+    "period": Label("1", "steps after which it repeats; 0: never"),
+    "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
+    "angles": replace(STANCE, dims=("visit",)),
+}
+MARKS = {
+    "after": Label("1", "point before a bifurcation; -1: none", name="mark_after"),
+    "kind": replace(KIND, name="mark_kind"),
+    "periods": Label("s", "durations of the steps there", ("step",), name="mark_step_period"),
+    "angles": Label("rad", "stance leg just after each heel strike there", ("step",), name="mark_stance_angle"),
+}
+
+
+def groups(
+    found: Sequence[Family], said: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
+    second: Parameter | None,
+) -> dict[str, Group]:  # fmt: skip
+    """One group a branch and a curve, and one for bifurcations, exponents and attractor of each model.
+
+    said    the summary, of which branches, bifurcations and curves are stored as tables too
+    second  key of the plane, if there is one
+    """
+    value = {"value": Label(parameter.unit, parameter.key)}
+    stored: dict[str, Group] = {}
+    if said["branches"]:
+        ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
+        overview = columns(said["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
+        stored["branches"] = Group(overview, {"over": parameter.key})
+    if said["curves"]:
+        stored["curves"] = Group(columns(said["curves"], CURVES, "curve"))
+    for one in found:
+        if one.step_map is None:
+            continue
+        own: dict[str, Group] = {}
+        if second is not None:
+            labels = Label(parameter.unit, parameter.key), Label(second.unit, second.key)
+            own |= {f"curve_{number}": curve_group(curve, *labels) for number, curve in enumerate(one.curves)}
+            if one.regions is not None:
+                own["regions"] = regions_group(one.regions, *labels)
+        for number, branch in enumerate(one.branches):
+            marks = [*birth_of(branch, one.branches), *marks_on(branch)]
+            own[f"branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, value)
+        rows = [row for row in said["bifurcations"] if row["model"] == one.model]
+        if rows:
+            multipliers = [complex(*row["multiplier"]) for row in rows]
+            both = real_and_imaginary("multiplier", multipliers, ("bifurcation",), "critical multiplier")
+            own["bifurcations"] = Group({**columns(rows, value | BIFURCATIONS, "bifurcation"), **both})
+        if one.exponents:
+            own["lyapunov"] = Group(columns(one.exponents, value | EXPONENTS, "sample"))
+        if one.attractors.found:
+            own["attractor"] = Group(columns(one.attractors.found, value | ATTRACTORS, "sample"))
+        if one.model == RIGID:
+            own |= motions(one.branches, config, parameter)
+        stored |= {f"{one.model}/{name}": group for name, group in own.items()}
+    return stored
+
+
+def curve_group(curve: BifurcationCurve, first: Label, second: Label) -> Group:
+    """A curve over the plane of both parameters."""
+    over = {"value": labelled(curve.first, first, "point"), "second": labelled(curve.second, second, "point")}
+    return Group(over, {"kind": curve.kind, "period": curve.period})
+
+
+def regions_group(regions: Regions, first: Label, second: Label) -> Group:
+    """What walks settle on over the plane of both parameters."""
+    periods = "steps after which walks repeat themselves; 0: never, -1: none goes on"
+    axes = {"value": labelled(regions.first, first, "first"), "second": labelled(regions.second, second, "second")}
+    return Group({**axes, "period": Variable(regions.period, ("first", "second"), "1", periods)})
+
+
+class Mark(NamedTuple):
+    """A bifurcation among the points of a branch: after which point, and the steps of the gait there."""
+
+    after: int
+    kind: str
+    value: float
+    periods: Floats  # durations of the steps there (s)
+    angles: Floats  # of the stance leg just after each heel strike there (rad)
+
+
+def marks_on(branch: GaitBranch) -> list[Mark]:
+    """The bifurcations of a branch in their order along it."""
+    return [
+        Mark(index, one.kind, one.value, one.gait.periods_s, one.gait.angles)
+        for index, (before, after) in enumerate(pairwise(branch.points))
+        for one in branch.bifurcations if one.lies_between(before, after)
+    ]  # fmt: skip
+
+
+def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
+    """The flip that a branch begins at: its parent's gait, twice."""
+    for parent in branches:
+        for one in parent.bifurcations:
+            if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
+                return [Mark(-1, one.kind, one.value, np.tile(one.gait.periods_s, 2), np.tile(one.gait.angles, 2))]
+    return []
+
+
+def branch_group(
+    branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[Monitor], value: Mapping[str, Label]
+) -> Group:
+    """The gaits of a branch in their order along it, and where on it its bifurcations are.
+
+    value  label of the parameter's values
+    """
+    points = branch.points
+    multipliers = [point.multipliers for point in points]
+    variables = {
+        **columns(points, {**value, **POINTS}, "point"),
+        **real_and_imaginary("multiplier", multipliers, ("point", "multiplier"), "multiplier"),
+    }
+    for place, monitor in enumerate(monitors):
+        label = Label(monitor.unit, monitor.meaning)
+        variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
+    if marks:
+        labels = MARKS | {"value": Label(value["value"].unit, "where it is", name="mark_value")}
+        variables |= columns(marks, labels, "mark")
+    attrs: dict[str, Attribute] = {
+        "period": branch.period,
+        "begins": branch.ends[0].reason,
+        "ends": branch.ends[1].reason,
+    }
+    return Group(variables, attrs)
+
+
+def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
+    """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
+    return {
+        f"branch_{number}/motion_{place}": group
+        for number, branch in enumerate(branches)
+        if branch.period <= LONGEST
+        for place in evenly_spread(len(branch.points), MOTIONS_OF_BRANCH)
+        for group in motion(branch.points[place], branch.period, config, parameter)
+    }
+
+
+def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
+    """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
+    changed = parameter.config_at(config, point.value)
+    if changed is None:
+        return
+    walker = rigid_walker(changed, changed.equations)
+    unit, units = unit_walker(walker)
+    section, n = on_section(unit, point.z), len(walker.arm_x)
+    start = (*section[:n], *(rate / units.time for rate in section[n:]))
+    steps = max(period, STRIDE)
+    knee = knee_of(assembly_of(changed.walker, rigid=True))
+    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS, Footholds())
+    walk = scene.walk(start, steps, TOLERANCES, sampled=True)
+    if walk.steps < steps or walk.samples is None:
+        return
+    changes = np.flatnonzero(np.diff(walk.samples.step))
+    kept = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, EVERY), changes, changes + 1)))
+    seen = trajectory_group(scene, walk, only_at(walk.samples, kept))
+    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
