@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from printed_compass import released_mass_matrix
 from system_rates import rate_of
+from tree_equations import mass_matrix_and_bias
 
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import on_ground
 from walkerlab.mechanics.assembly import Anchor
-from walkerlab.mechanics.equations import mass_matrix_and_bias
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
 STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from system_rates import rate_of
+from tree_equations import mass_matrix_and_bias
 
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.energy import kinetic_energy, potential_energy
@@ -15,7 +16,6 @@ from walkerlab.ground.friction import Frictionless
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import on_ground
 from walkerlab.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
-from walkerlab.mechanics.equations import mass_matrix_and_bias
 from walkerlab.mechanics.parts import Assembly, Body, Revolute
 
 angles = st.tuples(*[st.floats(-3.0, 3.0)] * 4)

@@ -13,7 +13,6 @@ from walkerlab.paper.appendix_a import (
     RigidWalker,
     feet_on_slope,
     impact,
-    impact_jacobian,
     kinetic_energy,
     step_length,
     swing_foot_height,
@@ -135,19 +134,6 @@ def test_impact_mirrors(walker, half_angle, w_1, w_2):
     before = (*at_heel_strike(walker, half_angle), w_1, w_2)
     mirrored = impact(walker._replace(slope=-walker.slope), *(-value for value in before))
     assert mirrored == tuple(-value for value in impact(walker, *before))
-
-
-@given(half_angles, rates, rates)
-def test_impact_jacobian_is_its_slope(half_angle, w_1, w_2):
-    before = np.array([*at_heel_strike(PAPER, half_angle), w_1, w_2])
-    J = np.empty((4, 4))
-    impact_jacobian(PAPER, *before, J)
-    for j in range(4):
-        ahead, behind = before.copy(), before.copy()
-        ahead[j] += 1e-5
-        behind[j] -= 1e-5
-        slope = (np.array(impact(PAPER, *ahead)) - np.array(impact(PAPER, *behind))) / 2e-5
-        assert J[:, j] == pytest.approx(slope, rel=1e-7, abs=1e-7)
 
 
 @given(walkers, half_angles)

@@ -8,7 +8,7 @@ positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
@@ -152,32 +152,6 @@ def impact(
     r2 = B_22 * omega_2
     scale = 1.0 / (A_11 * A_22 - A_12 * A_12)
     return theta_2, theta_1, (A_11 * r2 - A_12 * r1) * scale, (A_22 * r1 - A_12 * r2) * scale
-
-
-def impact_jacobian(
-    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float, J: Any
-) -> None:
-    """Write the derivative of `impact` with respect to the state before it into J (4, 4).
-
-    From A dw+ = dB w- + B dw- - dA w+, with dA and dB along the angle between the legs.
-    """
-    s1, c1 = sine_cosine(theta_1)
-    s2, c2 = sine_cosine(theta_2)
-    A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)
-    _, dA_12, _, _, dB_12, _ = impact_matrices(walker, -(s2 * c1 - c2 * s1))
-    _, _, swing_after, stance_after = impact(walker, theta_1, theta_2, omega_1, omega_2)
-    scale = 1.0 / (A_11 * A_22 - A_12 * A_12)
-    r1 = dB_12 * omega_2 - dA_12 * swing_after
-    r2 = -dA_12 * stance_after
-    along_swing = (A_11 * r2 - A_12 * r1) * scale
-    along_stance = (A_22 * r1 - A_12 * r2) * scale
-    for j in range(4):
-        J[0, j], J[1, j] = 0.0, 0.0
-    J[0, 1], J[1, 0] = 1.0, 1.0
-    J[2, 0], J[2, 1] = -along_swing, along_swing
-    J[3, 0], J[3, 1] = -along_stance, along_stance
-    J[2, 2], J[2, 3] = -A_12 * B_11 * scale, (A_11 * B_22 - A_12 * B_12) * scale
-    J[3, 2], J[3, 3] = A_22 * B_11 * scale, (A_22 * B_12 - A_12 * B_22) * scale
 
 
 def as_printed(model: Standing) -> Standing:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from typing import Final
 
-from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker
+from walkerlab.paper.appendix_a import RigidWalker
 
 COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
@@ -167,7 +167,3 @@ def walker_of_the_paper(c21_sign: float) -> RigidWalker:
     """
     length, mass, hip, gravity = (entry.value for entry in TABLE_1)
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
-
-
-SIGNS: Final = {"as-printed": AS_PRINTED, "corrected": CORRECTED}
-"""What each set of equations has for the sign of C_21 in (A.5)."""

@@ -62,14 +62,6 @@ def paper_numbers(results: Results) -> Sequence[Row]:
     return rows
 
 
-def unit_of(row: Row) -> str:
-    """The unit of a number in brackets; empty for a pure number."""
-    unit = str(row.get("unit") or "")
-    if unit == "not given":
-        return " (unit not given)"
-    return f" ({unit})" if unit not in ("", "1") else ""
-
-
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
     summary, notes = results.summary("compare"), words.terms("paper.notes")
