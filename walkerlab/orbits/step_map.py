@@ -26,7 +26,7 @@ REMEMBERED = 4096  # walkers built so far
 CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
 """Offsets and weights of formulas of second order for a first derivative."""
-unity = lru_cache(np.eye)
+unity = lru_cache(np.eye)  # shared: never written to
 nothing = partial(np.zeros, 0)
 
 
