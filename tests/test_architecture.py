@@ -15,6 +15,7 @@ PACKAGE = Path(walkerlab.__file__).parent
 LAYERS = (
     "api",
     "cli",
+    "explore",
     "sweeps",
     "stages",
     "report",

@@ -112,6 +112,24 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
             print(draw_walker(file, Target(to, output), request.console))
 
+    @command(app, "config", "sets", "runs")
+    def explore(
+        request: Request,
+        port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 is any that is free.")] = 0,
+    ) -> None:
+        """Serve walks of a config under changes that are asked for over HTTP, until Ctrl-C."""
+        with exit_on_failure("explore", request):
+            from walkerlab.explore.server import Server
+            from walkerlab.explore.walks import Question
+
+            assert request.resolved
+            server = Server(port, Question(request.config, tuple(request.sets or ()), request.runs, {}, ()))
+            try:
+                print(f"http://{server.host}/?token={server.token}", flush=True)
+                server.serve_forever()
+            finally:
+                server.close()
+
     @command(app, "runs", "quiet")
     def animate(
         request: Request,
