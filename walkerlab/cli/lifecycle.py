@@ -116,7 +116,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def explore(
         request: Request,
         port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 is any that is free.")] = 0,
-        no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser; none is opened yet.")] = False,
+        no_browser: Annotated[
+            bool, typer.Option("--no-browser", help="Open no browser (none is opened so far).")
+        ] = False,
     ) -> None:
         """Serve walks of a config under changes that are asked for over HTTP, until Ctrl-C."""
         with exit_on_failure("explore", request):
@@ -127,6 +129,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             server = Server(port, Question(request.config, tuple(request.sets or ()), request.runs, {}, ()))
             try:
                 print(f"http://{server.host}/?token={server.token}", flush=True)
+                if not no_browser:
+                    request.console.detail("there is no page yet; ask by POST /api/walk")
                 server.serve_forever()
             finally:
                 server.close()

@@ -58,7 +58,7 @@ class Handler(BaseHTTPRequestHandler):
 
     server: Server
 
-    def do_POST(self) -> None:  # noqa: N802 (the library's name)
+    def do_POST(self) -> None:
         """Answer `/api/walk`."""
         origin = self.headers.get("Origin", f"http://{self.server.host}")
         if self.headers.get("Host") != self.server.host or origin != f"http://{self.server.host}":

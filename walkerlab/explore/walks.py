@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
-from walkerlab.report.sections import motion
+from walkerlab.report.blocks import Walker
+from walkerlab.report.outcomes import MODELS
+from walkerlab.report.sections.motion import STYLES
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.resolve import resolve
@@ -58,14 +60,13 @@ def answered(question: Question) -> tuple[int, dict[str, Any]]:
         found[target] = dict(answer.content.summary)
         if answer.no_answer is not None:
             said = answer.no_answer
-            error = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
-            found[target]["error"] = error
+            found[target]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
             if target == "fixedpoint":
                 break
         track = track_in(answer.content.groups.get("trajectory"))
         if track is not None and target != "fixedpoint":
             thin = track.thinned(sampling_gap(config))
             strikes = found[target].get("touch_times_s", [])
-            meta = motion.Walker(motion.MODELS[target], motion.STYLES[target], thin, tuple(strikes), ()).meta
+            meta = Walker(MODELS[target], STYLES[target], thin, tuple(strikes), ()).meta
             found.setdefault("tracks", {})[target] = {"meta": meta, "floats": thin.packed()}
     return 200, found
