@@ -116,9 +116,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def explore(
         request: Request,
         port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 is any that is free.")] = 0,
-        no_browser: Annotated[
-            bool, typer.Option("--no-browser", help="Open no browser (none is opened so far).")
-        ] = False,
+        no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
     ) -> None:
         """Serve walks of a config under changes that are asked for over HTTP, until Ctrl-C."""
         with exit_on_failure("explore", request):
