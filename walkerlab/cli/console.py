@@ -78,14 +78,15 @@ class Console:
         if self.open_page:
             self.shown = self.show(path)
 
-    def show(self, page: Path) -> bool:
-        """Open a page in the user's browser; whether there is one that took it, and a note if there is none."""
+    def show(self, page: Path | str) -> bool:
+        """Open a file or an address in the user's browser; whether one took it, and a note if there is none."""
         # Imported here: few pages are shown.
         import webbrowser
 
-        opened = webbrowser.open(page.resolve().as_uri())
+        place = page if isinstance(page, str) else page.resolve()
+        opened = webbrowser.open(place if isinstance(place, str) else place.as_uri())
         if not opened:
-            self.note(f"no browser was found; the page is {page.resolve()}")
+            self.note(f"no browser was found; the page is {place}")
         return opened
 
     def refresh(self) -> None:

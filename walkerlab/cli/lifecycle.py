@@ -118,17 +118,17 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 is any that is free.")] = 0,
         no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
     ) -> None:
-        """Serve walks of a config under changes that are asked for over HTTP, until Ctrl-C."""
+        """Serve a page on which every number is a slider and the walker walks with it, until Ctrl-C."""
         with exit_on_failure("explore", request):
             from walkerlab.explore.server import Server
             from walkerlab.explore.walks import Question
 
             assert request.resolved
-            server = Server(port, Question(request.config, tuple(request.sets or ()), request.runs, {}, ()))
+            server = Server(port, Question(request.config, tuple(request.sets or ()), request.runs, {}))
             try:
-                print(f"http://{server.host}/?token={server.token}", flush=True)
+                print(server.url, flush=True)
                 if not no_browser:
-                    request.console.detail("there is no page yet; ask by POST /api/walk")
+                    request.console.show(server.url)
                 server.serve_forever()
             finally:
                 server.close()

@@ -1,56 +1,151 @@
-"""The server of `walkerlab explore`: the loopback address alone, a token, one worker that computes."""
+"""The server of `walkerlab explore`: the loopback address alone, a token, workers that compute."""
 
 import json
 import secrets
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from mimetypes import guess_type
+from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
 
-from walkerlab.explore.walks import STAGES, Question, answered
+from walkerlab.config.files import builtin_names
+from walkerlab.errors import ConfigError
+from walkerlab.explore import walks
+from walkerlab.explore.jobs import Job
+from walkerlab.explore.page import rendered
+from walkerlab.explore.walks import Answered, Question
 from walkerlab.workers import Worker, WorkerDiedError
 
 LONGEST_BODY = 100_000
+SUPERSEDED = "a newer question was asked meanwhile"
+COOKIE = "walkerlab-explore"
+
+
+def failed(status: int, message: str, advice: str = "") -> Answered:
+    """An answer that is an error."""
+    return status, {"error": {"message": message, "advice": advice}}
+
+
+class Desk:
+    """One worker; of the questions that wait for it only the newest is answered."""
+
+    def __init__(self, drops: bool = False) -> None:
+        """Start it.
+
+        drops  whether a newer question ends the work on an older one
+        """
+        self.drops = drops
+        self.worker = self._hired()
+        self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
+
+    @staticmethod
+    def _hired() -> Worker:
+        return Worker(("walkerlab.explore.walks",))
+
+    def ask(self, call: Callable[[], Answered]) -> Answered:
+        """What the call returns there, once the worker is free; status 409 if a newer question came meanwhile."""
+        with self._count:
+            self._newest += 1
+            number = self._newest
+        if self.drops and self._turn.locked():
+            self.worker.process.kill()
+        with self._turn:
+            if number != self._newest:
+                return failed(409, SUPERSEDED)
+            try:
+                return self.worker.do(call)
+            except WorkerDiedError as error:
+                self.worker = self._hired()
+                if self.drops and number != self._newest:
+                    return failed(409, SUPERSEDED)
+                return failed(500, error.message, error.advice)
+            except Exception as error:
+                return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+
+    def close(self) -> None:
+        """End the worker at once, whatever it is at."""
+        self.worker.process.kill()
+        self.worker.ended()
 
 
 class Server(ThreadingHTTPServer):
-    """Answers questions about one config; of those that wait, only the newest."""
+    """Answers questions about one config, and about the built-in ones."""
 
     daemon_threads = True
 
     def __init__(self, port: int, base: Question) -> None:
         """Listen; port 0 is any that is free."""
         super().__init__(("127.0.0.1", port), Handler)
-        self.base = base
-        self.token = secrets.token_urlsafe(16)
-        self.worker = Worker(("walkerlab.explore.walks",))
-        self._turn, self._newest = threading.Lock(), 0
+        self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
+        # what is drawn in the background keeps nobody waiting who turns a number
+        self.desk, self.background = Desk(), Desk(drops=True)
 
     @property
     def host(self) -> str:
         """As a browser names this server."""
         return f"127.0.0.1:{self.server_port}"
 
-    def ask(self, question: Question) -> tuple[int, dict[str, Any]]:
-        """The answer once the worker is free; status 409 if a newer question came meanwhile."""
-        self._newest += 1
-        number = self._newest
-        with self._turn:
-            if number != self._newest:
-                return 409, {"error": {"message": "a newer question was asked meanwhile"}}
-            try:
-                return self.worker.do(partial(answered, question))
-            except WorkerDiedError as error:
-                self.worker = Worker(("walkerlab.explore.walks",))
-                return 500, {"error": {"message": error.message, "advice": error.advice}}
+    @property
+    def url(self) -> str:
+        """Where the page is, token included."""
+        return f"http://{self.host}/?token={self.token}"
 
     def close(self) -> None:
-        """End the worker at once, whatever it is at, and listen no more."""
-        self.worker.process.kill()
-        self.worker.ended()
+        """End what computes, and listen no more."""
+        for one in (self.desk, self.background, self.job):
+            one.close()
         self.server_close()
+
+    def question(self, body: Mapping[str, Any]) -> Question:
+        """What a body asks about; TypeError if it has not the form of a question."""
+        changes, models = body.get("set", {}), body.get("models", list(walks.STAGES))
+        if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
+            raise TypeError
+        question = replace(self.base, changes=changes, models=models)
+        named = body.get("config")
+        if named is None or named == self.base.config:
+            return question
+        if named not in builtin_names():
+            raise TypeError
+        return replace(question, config=named, sets=())
+
+    def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
+        """The answer to a question that was posted; TypeError if it has not the form of one."""
+        question = self.question(body)
+        if path == "/api/walk":
+            return self.desk.ask(partial(walks.walked, question))
+        if path == "/api/numbers":
+            return walks.numbers(question)
+        if path == "/api/along":
+            return self.background.ask(partial(walks.along, question))
+        if path == "/api/save":
+            return saved(question, body.get("name"))
+        if path == "/api/job":
+            return self.job.begin(body.get("kind"), question)
+        return failed(404, f"there is no {path}")
+
+
+def saved(question: Question, name: Any) -> Answered:
+    """Write the config into the working folder, over no file."""
+    if not isinstance(name, str) or not name or Path(name).name != name:
+        return failed(400, "a config is saved under a name without folders, such as mine.yaml")
+    path = Path(name).with_suffix(".yaml")
+    try:
+        text = walks.as_file(question, path.stem)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except ConfigError as error:
+        return question.refused(error)
+    except FileExistsError:
+        return failed(409, f"{path} exists already.", "Choose another name: no file is written over.")
+    except OSError as error:
+        return failed(500, f"{path} cannot be written: {error.strerror}.")
+    return 200, {"file": str(path.resolve()), "text": text}
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -58,35 +153,72 @@ class Handler(BaseHTTPRequestHandler):
 
     server: Server
 
+    def do_GET(self) -> None:
+        """The page, the progress of a job, and the files that a job made."""
+        address = urlsplit(self.path)
+        if not self.local():
+            return None
+        if address.path == "/":
+            given = parse_qs(address.query).get("token", [""])[0]
+            if not self.allowed(given):
+                return None
+            page = rendered(self.server.base)
+            return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy, cookie=True)
+        cookies = SimpleCookie(self.headers.get("Cookie", ""))
+        if not self.allowed(cookies[COOKIE].value if COOKIE in cookies else self.bearer()):
+            return None
+        if address.path == "/api/job":
+            return self.answer(*self.server.job.progress())
+        runs = self.server.base.runs.resolve()
+        file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
+        if not address.path.startswith("/runs/") or not file.is_relative_to(runs) or not file.is_file():
+            return self.answer(*failed(404, f"there is no {address.path}"))
+        return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
+
     def do_POST(self) -> None:
-        """Answer `/api/walk`."""
-        origin = self.headers.get("Origin", f"http://{self.server.host}")
-        if self.headers.get("Host") != self.server.host or origin != f"http://{self.server.host}":
-            return self.send(403, "only pages of this server may ask")
-        given = self.headers.get("Authorization", "").encode()
-        if not secrets.compare_digest(given, f"Bearer {self.server.token}".encode()):
-            return self.send(401, "the token of the printed address is missing")
-        if self.path != "/api/walk":
-            return self.send(404, "there is /api/walk")
+        """Answer a question."""
+        if not self.local() or not self.allowed(self.bearer()):
+            return None
         try:
             length = int(self.headers.get("Content-Length", 0))
             if not 0 <= length <= LONGEST_BODY:
-                return self.send(413, f"at most {LONGEST_BODY} bytes")
-            body = json.loads(self.rfile.read(length))
-            changes, models = body.get("set", {}), body.get("models", list(STAGES))
-            if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= STAGES.keys():
-                raise TypeError
+                return self.answer(*failed(413, f"at most {LONGEST_BODY} bytes"))
+            self.answer(*self.server.answer(urlsplit(self.path).path, json.loads(self.rfile.read(length))))
         except (ValueError, AttributeError, TypeError, RecursionError):
-            return self.send(400, 'a question is JSON: {"set": {KEY: VALUE}, "models": ["rigid", "contact"]}')
-        return self.send(*self.server.ask(replace(self.server.base, changes=changes, models=models)))
+            form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
+            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is a built-in one's name"))
 
-    def send(self, status: int, said: str | dict[str, Any]) -> None:
-        """Send an object; a text is an error's message."""
-        value = {"error": {"message": said}} if isinstance(said, str) else said
-        body = json.dumps(value, allow_nan=False).encode()
+    def local(self) -> bool:
+        """Whether it is this server's own page that asks; whoever else does is told so."""
+        own = f"http://{self.server.host}"
+        if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
+            return True
+        self.answer(*failed(403, "only pages of this server may ask"))
+        return False
+
+    def bearer(self) -> str:
+        """The token in the header."""
+        return self.headers.get("Authorization", "").removeprefix("Bearer ")
+
+    def allowed(self, token: str) -> bool:
+        """Whether that is the token; who has another one is told so."""
+        if secrets.compare_digest(token.encode(), self.server.token.encode()):
+            return True
+        self.answer(*failed(401, "the token of the printed address is missing", "Open the address as it was printed."))
+        return False
+
+    def answer(self, status: int, value: Mapping[str, Any]) -> None:
+        """Send an object."""
+        self.send(status, json.dumps(value, allow_nan=False).encode(), "application/json")
+
+    def send(self, status: int, body: bytes, kind: str, policy: str = "", cookie: bool = False) -> None:
+        """Send a file."""
         self.send_response(status)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(body)))
+        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
+        headers |= {"Content-Security-Policy": policy} if policy else {}
+        headers |= {"Set-Cookie": f"{COOKIE}={self.server.token}; HttpOnly; SameSite=Strict"} if cookie else {}
+        for name, value in headers.items():
+            self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
 

@@ -1,21 +1,27 @@
 """What a question is answered with, in the worker: the stages' summaries and the motion to draw."""
 
 import json
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from walkerlab.errors import ConfigError
-from walkerlab.report.blocks import Walker
-from walkerlab.report.outcomes import MODELS
-from walkerlab.report.sections.motion import STYLES
-from walkerlab.report.tracks import sampling_gap, track_in
+from walkerlab.config.files import DEFAULT
+from walkerlab.config.schema import Config
+from walkerlab.config.writer import extending
+from walkerlab.errors import ConfigError, WalkerlabError
+from walkerlab.explore.numbers import adjustable
+from walkerlab.report.results import Results
+from walkerlab.report.sections import motion
 from walkerlab.stages.in_memory import InMemory, Keys
 from walkerlab.stages.resolve import resolve
+from walkerlab.store.content import Content, Group
 
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}
+Answered = tuple[int, dict[str, Any]]
+"""Status and object of an answer."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,29 @@ class Question:
     sets: tuple[str, ...]
     runs: Path
     changes: Mapping[str, Any]
-    models: Sequence[str]
+    models: Sequence[str] = ()
+
+    @property
+    def options(self) -> list[str]:
+        """As they are typed after a command."""
+        named = [] if self.config is None else ["-c", self.config]
+        return [*named, *(part for text in self.all_sets for part in ("--set", text))]
+
+    @property
+    def all_sets(self) -> list[str]:
+        """Every change as `--set` has it."""
+        plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
+        return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
+
+    def read(self) -> Config:
+        """The config that is asked about; ConfigError if it is not usable."""
+        return resolve(self.config, self.all_sets, None, self.runs).loaded.config
+
+    def refused(self, error: WalkerlabError) -> Answered:
+        """What is said of a config that is not usable, with the change that is to blame if one is named."""
+        key = next((key for key in self.changes if key in error.message), next(iter(self.changes), None))
+        value = None if key is None else self.changes[key]
+        return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
 @cache
@@ -42,31 +70,80 @@ def memory() -> tuple[InMemory, Keys]:
     return InMemory(), Keys()
 
 
-def answered(question: Question) -> tuple[int, dict[str, Any]]:
-    """The status and the object of an answer."""
-    changes = [f"{key}={json.dumps(value)}" for key, value in question.changes.items()]
-    try:
-        config = resolve(question.config, [*question.sets, *changes], None, question.runs).loaded.config
-    except ConfigError as error:
-        key = next((key for key in question.changes if key in error.message), next(iter(question.changes), None))
-        value = None if key is None else question.changes[key]
-        return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
+def walked(question: Question) -> Answered:
+    """The gait and the walks, with what a player has to know to show them."""
     stages, keys = memory()
-    found: dict[str, Any] = {}
-    for target in ("fixedpoint", *(STAGES[model] for model in question.models)):
-        if target == "contact-sim" and config.contact is None:
-            continue
-        answer = stages.answer(config, target, keys.of(config, target), again=False)
-        found[target] = dict(answer.content.summary)
-        if answer.no_answer is not None:
-            said = answer.no_answer
-            found[target]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
-            if target == "fixedpoint":
+    try:
+        config = question.read()
+        wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
+        # The walks first: they leave the gait behind, and it is then there without being sought again.
+        answers = {
+            stage: stages.answer(config, stage, keys.of(config, stage), again=False)
+            for stage in (*wanted, "fixedpoint")
+        }
+    except ConfigError as error:
+        return question.refused(error)
+    found: dict[str, Any] = {"command": shlex.join(["walkerlab", "simulate", *question.options])}
+    walks: dict[str, Content] = {}
+    for stage in ("fixedpoint", *wanted):
+        said = answers[stage].no_answer
+        found[stage] = dict(answers[stage].content.summary)
+        if said is not None:
+            found[stage]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
+            if stage == "fixedpoint":
                 break
-        track = track_in(answer.content.groups.get("trajectory"))
-        if track is not None and target != "fixedpoint":
-            thin = track.thinned(sampling_gap(config))
-            strikes = found[target].get("touch_times_s", [])
-            meta = Walker(MODELS[target], STYLES[target], thin, tuple(strikes), ()).meta
-            found.setdefault("tracks", {})[target] = {"meta": meta, "floats": thin.packed()}
+        elif stage != "fixedpoint":
+            walks[stage] = answers[stage].content
+    if (player := motion.player(Results(config, walks))) is not None:
+        found["scene"] = player.scene
+        tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
+        found["tracks"] = dict(zip((stage for stage in STAGES.values() if stage in walks), tracks, strict=True))
     return 200, found
+
+
+def numbers(question: Question) -> Answered:
+    """What can be turned."""
+    try:
+        return 200, {"numbers": list(adjustable(replace(question, changes={}).read(), question.read()))}
+    except ConfigError as error:
+        return question.refused(error)
+
+
+def along(question: Question) -> Answered:
+    """Gaits over one key: for each model the places, numbers and stability of its branches.
+
+    The question's changes hold the block `continuation`: key, ends and points.
+    """
+    stages, keys = memory()
+    try:
+        config = question.read()
+        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), again=False)
+    except ConfigError as error:
+        return question.refused(error)
+    branches = {
+        path: group for path, group in answer.content.groups.items() if path.count("/") == 1 and "value" in group.variables
+    }  # fmt: skip
+    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches.items() if walkable(group)]
+    return 200, {"over": config.continuation.over, "curves": curves}
+
+
+def walkable(branch: Group) -> bool:
+    """Whether on even one gait of a branch the ground never has to pull."""
+    forces = branch.variables.get("min_normal_force_N")
+    return forces is None or bool((forces.values > 0.0).any())
+
+
+def curve(branch: Group) -> dict[str, list[Any]]:
+    """The numbers along a branch, of each gait's first step."""
+    period, length = branch["step_period"][:, 0], branch["step_length"][:, 0]
+    multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
+    found = {
+        "value": branch["value"], "stable": branch["stable"], "period_s": period, "step_length_m": length,
+        "speed_m_s": length / period, "spectral_radius": multipliers,
+    }  # fmt: skip
+    return {name: values.tolist() for name, values in found.items()}
+
+
+def as_file(question: Question, name: str) -> str:
+    """The config as a file that extends the one that was started from and says only what differs; ConfigError."""
+    return extending(question.config or DEFAULT, replace(question, changes={}, sets=()).read(), question.read(), name)

@@ -7,8 +7,7 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.report.blocks import Picture
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.store.artifact import Stored
-from walkerlab.store.content import Group
+from walkerlab.store.content import Content, Group
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +23,7 @@ class Results:
     """
 
     config: Config
-    stored: Mapping[str, Stored] = field(default_factory=dict)
+    stored: Mapping[str, Content] = field(default_factory=dict)
     pictures: tuple[Picture, ...] = ()
     absent: tuple[LeftOut, ...] = ()
     pending: tuple[str, ...] = ()

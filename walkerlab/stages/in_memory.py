@@ -72,7 +72,7 @@ class InMemory:
         results: dict[str, Content] = {}
         for stage in self.graph.needed_for(target, config):
             key = (keys[stage.name], again and stage.walks)
-            if stage.name == target or key not in self._inputs:
+            if key not in self._inputs:
                 inputs = {name: results[name] for name in stage.inputs(config)}
                 task = task_of(stage, config, inputs, jobs=1, parts=Parts(None, ""), again=again)
                 answer = task.run(progress)
@@ -81,6 +81,8 @@ class InMemory:
                 self._inputs[key] = answer
                 if len(self._inputs) > self.remembered:
                     self._inputs.popitem(last=False)
+            elif stage.name == target:
+                return self._inputs[key]
             self._inputs.move_to_end(key)
             found = self._inputs[key]
             if found.no_answer is not None:

@@ -22,6 +22,12 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
+    shown = player(results)
+    return None if shown is None else Section("motion", "The walk", (shown,))
+
+
+def player(results: Results) -> Player | None:
+    """The walks of both models, as far as they are there; None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
     # the first steps are shown, of the model that takes longest over them
     end = max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
@@ -32,7 +38,7 @@ def section(results: Results) -> Section | None:
     config, torso = results.config, results.config.walker.torso
     length = config.walker.leg_length_m
     steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
-    player = Player(
+    return Player(
         title="The walk.",
         caption=words("motion.caption", max(steps.values()), MAX_STEPS),
         alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
@@ -47,7 +53,6 @@ def section(results: Results) -> Section | None:
         ground=ground(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
     )
-    return Section("motion", "The walk", (player,))
 
 
 def walker(results: Results, stage: str, track: Track) -> Walker:

@@ -13,16 +13,20 @@ from walkerlab.store.artifact import Stored
 def section(results: Results) -> Section:
     """Config, and provenance of each result."""
     blocks: list[PageBlock] = [Code("The config of this run, defaults included", to_yaml(results.config).strip())]
-    if results.stored:
-        made = list(results.stored.values())
+    made = files(results)
+    if made:
         note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
         digests = table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note)
         blocks += [table("When each result was made", RESULT_COLUMNS, made), software_table(results), digests]
         commands = dict.fromkeys(result.provenance.command_line for result in made)
         blocks.append(Code("Command lines", "\n".join(commands)))
-    made_by = [result.provenance for result in results.stored.values()]
-    finding = words("closing.provenance", made_by)
+    finding = words("closing.provenance", [result.provenance for result in made])
     return Section("provenance", "Where this comes from", tuple(blocks), finding)
+
+
+def files(results: Results) -> list[Stored]:
+    """The results that were read from files."""
+    return [result for result in results.stored.values() if isinstance(result, Stored)]
 
 
 RESULT_COLUMNS = (
@@ -52,11 +56,11 @@ def took_s(result: Stored) -> float:
 def software_table(results: Results) -> Table:
     """Versions, and the machine; more than one column only if results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
-    for stage, result in results.stored.items():
+    for result in files(results):
         made = result.provenance
         versions = {"walkerlab": made.package_version, "commit": made.git_commit or "unknown"}
         versions |= {**dict(sorted(made.library_versions.items())), "platform": made.platform}
-        used.setdefault(tuple(versions.items()), []).append(stage)
+        used.setdefault(tuple(versions.items()), []).append(result.identity.stage)
     columns = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
     lines = [Column(name, name) for name in dict.fromkeys(name for versions in columns.values() for name in versions)]
     return side_by_side("Software and machine", lines, columns, head="software", numeric=False)

@@ -11,9 +11,9 @@ const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 
 // The numbers of a walker, and their values at an instant.
 class Track {
-  constructor(element) {
-    Object.assign(this, JSON.parse(element.dataset.meta));
-    const bytes = Uint8Array.from(atob(element.dataset.floats), (letter) => letter.charCodeAt(0));
+  constructor(meta, packed) {
+    Object.assign(this, meta);
+    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
     const floats = new Float32Array(bytes.buffer);
     this.all = {};
     this.channels.forEach((name, index) => (this.all[name] = floats.subarray(index * this.samples, (index + 1) * this.samples)));
@@ -396,21 +396,16 @@ function element(name, attributes, text) {
   return made;
 }
 
-// The player: one clock, and everything that follows it.
-function play(root) {
+// The player: one clock, and everything that follows it; returns what gives it other walks.
+function play(root, firstScene, firstTracks) {
   const find = (selector) => root.querySelector(selector);
-  const scene = JSON.parse(root.dataset.player);
-  const tracks = [...root.querySelectorAll(".track")].map((place) => new Track(place));
-  tracks.forEach((track) => (track.alone = tracks.length === 1));
-  const end = Math.max(...tracks.map((track) => track.end));
-  const strikes = [0, ...tracks[tracks.length - 1].strikes, end];
+  let [scene, tracks, plots, end, round, strikes] = [{}, [], [], 0, 0, [0]];
   const [walk, foot] = [
     new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
     new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
   ];
   const [slider, clock, button] = [find(".time"), find(".clock"), find(".play")];
-  const close = tracks[tracks.length - 1];
-  let [time, playing, last, frame, colours] = [0, false, 0, 0, {}];
+  let [time, playing, last, frame, colours, close, readout] = [0, false, 0, 0, {}];
 
   const seek = (next, still = true) => {
     if (still) stop();
@@ -418,8 +413,23 @@ function play(root) {
     for (const track of tracks) track.seek(time);
     show();
   };
-  const plots = makePlots(root, tracks, seek);
-  const readout = makeReadout(find(".readout"), tracks);
+  // Other walks are taken up where these are: in the same step, as far into it.
+  const change = (newScene, newTracks) => {
+    const step = Math.max(0, strikes.findLastIndex((strike) => strike <= time));
+    const share = (time - strikes[step]) / (strikes[step + 1] - strikes[step]) || 0;
+    [scene, tracks, close] = [newScene, newTracks, newTracks[newTracks.length - 1]];
+    tracks.forEach((track) => (track.alone = tracks.length === 1));
+    end = Math.max(...tracks.map((track) => track.end));
+    strikes = [0, ...close.strikes, end];
+    round = scene.repeats && close.strikes.length > 1 ? strikes[2 * Math.floor(close.strikes.length / 2)] : end;
+    const to = Math.min(step, strikes.length - 2);
+    slider.max = end;
+    plots = makePlots(root, tracks, seek);
+    readout = makeReadout(find(".readout"), tracks);
+    time = clamp(strikes[to] + share * (strikes[to + 1] - strikes[to]), 0, end);
+    for (const track of tracks) track.seek(time);
+    if (walk.width) show();
+  };
 
   const show = () => {
     const leg = find(".which").value === "-1" ? close.stance : Number(find(".which").value);
@@ -442,8 +452,8 @@ function play(root) {
     if (!playing) return;
     const next = time + (Math.min(now - last, 100) / 1000) * Number(find(".speed").value);
     last = now;
-    if (next < end) seek(next, false);
-    else if (find(".loop").checked) seek(0, false);
+    if (find(".loop").checked && next >= round) seek(next - round, false);
+    else if (next < end) seek(next, false);
     else return seek(end);
     requestAnimationFrame(tick);
   };
@@ -473,7 +483,6 @@ function play(root) {
     actions[action]();
   });
   for (const one of root.querySelectorAll("[data-do]")) one.addEventListener("click", actions[one.dataset.do]);
-  slider.max = end;
   slider.addEventListener("input", () => seek(Number(slider.value)));
   find(".which").addEventListener("change", () => show());
   find(".walk").addEventListener("pointermove", (event) => {
@@ -502,28 +511,38 @@ function play(root) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   // Whoever asked for less motion starts at a quarter of the speed, and nothing ever moves by itself.
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
+  change(firstScene, firstTracks);
   fit();
+  return { change, start, walk };
 }
+
+// What a player is told in the page itself.
+const told = (root) => [
+  JSON.parse(root.dataset.player),
+  [...root.querySelectorAll(".track")].map(({ dataset }) => new Track(JSON.parse(dataset.meta), dataset.floats)),
+];
 
 function makePlots(root, tracks, seek) {
   const place = (name) => root.querySelector(`[data-view=${name}]`);
+  for (const old of root.querySelectorAll(".views .sheet")) old.remove();
+  const drawn = (name, there) => !(place(name).hidden = !there);
   const start = (track, name) => Float32Array.from(track.all[name], (value, _, all) => value - track.all[name][0]);
   const series = (track, x, y, said, dash) => ({ track, x, y, said: `${track.name.split(" ")[0].toLowerCase()} ${said}`, style: track.style, dash });
   const made = [];
-  const phase = new Plot(place("phase"), ["angle (rad)", "angular velocity (rad/s)"], "rad/s", false, seek);
-  const choice = root.querySelector(".leg");
-  const turn = () => {
-    const leg = choice.value;
-    phase.draw(tracks.map((track) => series(track, track.all[`a${leg}`], track.all[`v${leg}`], "")), `Angular velocity of leg ${Number(leg) + 1} over its angle: closed loops, one for each model`);
-  };
-  if (tracks.every((track) => track.has("v0"))) {
+  if (drawn("phase", tracks.every((track) => track.has("v0")))) {
+    const phase = new Plot(place("phase"), ["angle (rad)", "angular velocity (rad/s)"], "rad/s", false, seek);
+    const choice = root.querySelector(".leg");
+    const turn = () => {
+      const leg = choice.value;
+      phase.draw(tracks.map((track) => series(track, track.all[`a${leg}`], track.all[`v${leg}`], "")), `Angular velocity of leg ${Number(leg) + 1} over its angle: closed loops, one for each model`);
+    };
     turn();
-    choice.addEventListener("change", () => {
+    choice.onchange = () => {
       turn();
       seek(Number(root.dataset.time));
-    });
+    };
     made.push(phase);
-  } else place("phase").remove();
+  }
   const angles = new Plot(place("angles"), ["time (s)", "angle (rad)"], "rad", true, seek);
   angles.draw(
     tracks.flatMap((track) => [0, 1].map((leg) => series(track, track.all.t, track.all[`a${leg}`], `leg ${leg + 1}`, leg ? "dashed" : ""))),
@@ -532,20 +551,21 @@ function makePlots(root, tracks, seek) {
   made.push(angles);
   const parts = [["ke", "kinetic", ""], ["pe", "potential", "dashed"], ["me", "sum", "dotted"]];
   const with_energy = tracks.filter((track) => track.has("me"));
-  if (with_energy.length) {
+  if (drawn("energies", with_energy.length)) {
     const energies = new Plot(place("energies"), ["time (s)", "change since the start (J)"], "J", true, seek);
     energies.draw(
       with_energy.flatMap((track) => parts.map(([name, said, dash]) => series(track, track.all.t, start(track, name), said, dash))),
       "Changes of kinetic and potential energy and of their sum over time, for each model",
     );
     made.push(energies);
-  } else place("energies").remove();
+  }
   return made;
 }
 
 // A table of what each model has at the instant; returns the function that fills it in.
 function makeReadout(table, tracks) {
   const rows = [["a0", "angle of leg 1 (rad)"], ["a1", "angle of leg 2 (rad)"], ["v0", "velocity of leg 1 (rad/s)"], ["v1", "velocity of leg 2 (rad/s)"], ["ke", "kinetic energy (J)"], ["pe", "potential energy (J)"], ["me", "their sum (J)"]].filter(([name]) => tracks.some((track) => track.has(name)));
+  for (const part of [table.tHead, table.tBodies[0]]) part.replaceChildren();
   const head = table.tHead.insertRow();
   for (const [index, text] of ["", ...tracks.map((track) => track.name)].entries()) {
     const cell = document.createElement(index ? "th" : "td");
@@ -588,13 +608,13 @@ function load(mark, walk) {
 
 function begin(old, next) {
   old.replaceWith(next);
-  play(next);
+  play(next, ...told(next));
   next.focus();
   next.scrollIntoView({ block: "nearest" });
 }
 
 const pristine = document.querySelector("[data-player]")?.cloneNode(true);
-for (const root of document.querySelectorAll("[data-player]")) play(root);
+for (const root of document.querySelectorAll("[data-player]")) play(root, ...told(root));
 for (const diagram of document.querySelectorAll(".diagram")) {
   const marks = [...diagram.querySelectorAll("[data-gait]")];
   for (const [index, mark] of marks.entries()) {

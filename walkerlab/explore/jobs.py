@@ -1,0 +1,81 @@
+"""What is made of a config in the folder of all runs while the page goes on: a report, or a film."""
+
+import contextlib
+import json
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+from walkerlab.explore.walks import Answered, Question
+
+KINDS = ("report", "gif")
+
+
+class Job:
+    """One at a time; commands as they are typed, so that what is made is what they make."""
+
+    def __init__(self) -> None:
+        """Nothing is asked for yet."""
+        self._process: subprocess.Popen[str] | None = None
+        self._lock, self._thread = threading.Lock(), None
+        self._told: dict[str, Any] = {"running": False}
+
+    def begin(self, kind: object, question: Question) -> Answered:
+        """Start one; status 409 while another one runs."""
+        if kind not in KINDS:
+            raise TypeError
+        with self._lock:
+            if self._told["running"]:
+                return 409, {"error": {"message": "one is being made already", "advice": "Wait until it is there."}}
+            self._told = {"running": True, "kind": kind, "said": ""}
+        threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
+        return 200, dict(self._told)
+
+    def progress(self) -> Answered:
+        """What was said last, and in the end where the file is."""
+        return 200, dict(self._told)
+
+    def close(self) -> None:
+        """End what runs."""
+        if self._process is not None:
+            self._process.terminate()
+
+    def _make(self, kind: str, question: Question) -> None:
+        runs = question.runs.resolve()
+        of_config = [*question.options, "--runs", str(runs), "--json"]
+        try:
+            if kind == "report":
+                made = self._command("report", *of_config)
+                file = Path(made["run_dir"]) / made["html"]
+            else:
+                walk = "simulate" if question.models == ["rigid"] else "contact-sim"
+                folder = Path(self._command(walk, *of_config)["run_dir"])
+                file = folder / f"{walk}.gif"
+                self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
+            self._told = {"running": False, "kind": kind, "url": f"/runs/{file.resolve().relative_to(runs)}"}
+        except (RuntimeError, OSError, KeyError, ValueError) as error:
+            self._told = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+
+    def _command(self, *words: str) -> dict[str, Any]:
+        """What a command prints as JSON; RuntimeError with what it said last if it fails."""
+        command = [sys.executable, "-m", "walkerlab", *words]
+        lines = []
+        # Into a file: a pipe that nobody reads meanwhile would fill.
+        with tempfile.TemporaryFile("w+") as output:
+            self._process = subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True)
+            assert self._process.stderr is not None
+            for line in self._process.stderr:
+                lines.append(line.strip())
+                self._told = {**self._told, "said": line.strip()}
+            status = self._process.wait()
+            output.seek(0)
+            printed = output.read()
+        if status != 0:
+            raise RuntimeError(next((line for line in lines if line.startswith("error:")), "\n".join(lines[-2:])))
+        with contextlib.suppress(json.JSONDecodeError):
+            found: dict[str, Any] = json.loads(printed)
+            return found
+        return {}

@@ -1,0 +1,46 @@
+"""The page of `walkerlab explore`: the report's player and style, and a script that asks the server."""
+
+import base64
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import FileSystemLoader
+from markupsafe import Markup
+
+from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.explore.walks import Question
+from walkerlab.report import page as report
+from walkerlab.report.blocks import Player
+
+TEMPLATES = Path(__file__).parent / "templates"
+SEEN = "Each leg is a line from hip to foot; leg 2 is hollow. The ground's forces are arrows."
+
+
+@dataclass(frozen=True)
+class ServedPage:
+    """A page, and what its header allows it to load and to run."""
+
+    html: str
+    policy: str
+
+
+def rendered(base: Question) -> ServedPage:
+    """The page for a config."""
+    own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
+    script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    environment = report.environment()
+    environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
+    named = base.config or DEFAULT
+    html = environment.get_template("explore.html.j2").render(
+        configs=list(dict.fromkeys([named, *builtin_names()])),
+        anchor="walk",
+        # Whatever is asked for later is drawn in this one.
+        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),
+        # The only texts that are markup already: files of this package.
+        style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
+        script=Markup(script),
+    )
+    allowed = "default-src 'none'; img-src data: blob:; connect-src 'self'; style-src 'unsafe-inline'"
+    return ServedPage(html, f"{allowed}; script-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'")
