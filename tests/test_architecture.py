@@ -15,7 +15,7 @@ PACKAGE = Path(walkerlab.__file__).parent
 LAYERS = (
     "api",
     "cli",
-    "explore",
+    "explorer",
     "sweeps",
     "stages",
     "report",

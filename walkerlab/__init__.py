@@ -20,6 +20,7 @@ __all__ = [
     "continue_gait",
     "dataset",
     "design",
+    "explore",
     "find_gait",
     "kneed",
     "open_run",

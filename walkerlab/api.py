@@ -392,6 +392,30 @@ def robustness(
     return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
 
 
+def explore(
+    walker: Any = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    runs: str | Path = RUNS,
+    **keys: Any,
+) -> Any:
+    """The page of `walkerlab explore` in a notebook's frame; its `url` is for a browser, its `close()` ends it.
+
+    walker     from `compass`, `kneed` or `walker`
+    slope_deg  positive downhill, deg
+    contact    the ground, from `contact`; None is the rigid model alone
+    runs       the folder of all runs, for reports and films that the page is asked for
+    keys       other keys of a config
+    """
+    from walkerlab.explorer.server import Server
+    from walkerlab.explorer.walks import ExploredConfig, sets_of
+
+    config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
+    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}))
+    server.begin()
+    return server
+
+
 BOUNDED = ("over", "keep")
 
 

@@ -120,11 +120,11 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Serve a page on which every number is a slider and the walker walks with it, until Ctrl-C."""
         with exit_on_failure("explore", request):
-            from walkerlab.explore.server import Server
-            from walkerlab.explore.walks import Question
+            from walkerlab.explorer.server import Server
+            from walkerlab.explorer.walks import ExploredConfig
 
             assert request.resolved
-            server = Server(port, Question(request.config, tuple(request.sets or ()), request.runs, {}))
+            server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
             try:
                 print(server.url, flush=True)
                 if not no_browser:

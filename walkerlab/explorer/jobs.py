@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from walkerlab.explore.walks import Answered, Question
+from walkerlab.explorer.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
 
@@ -23,7 +23,7 @@ class Job:
         self._lock, self._thread = threading.Lock(), None
         self._told: dict[str, Any] = {"running": False}
 
-    def begin(self, kind: object, question: Question) -> Answered:
+    def begin(self, kind: object, question: ExploredConfig) -> Answered:
         """Start one; status 409 while another one runs."""
         if kind not in KINDS:
             raise TypeError
@@ -43,7 +43,7 @@ class Job:
         if self._process is not None:
             self._process.terminate()
 
-    def _make(self, kind: str, question: Question) -> None:
+    def _make(self, kind: str, question: ExploredConfig) -> None:
         runs = question.runs.resolve()
         of_config = [*question.options, "--runs", str(runs), "--json"]
         try:

@@ -1,5 +1,6 @@
 """The server of `walkerlab explore`: the loopback address alone, a token, workers that compute."""
 
+import contextlib
 import json
 import secrets
 import threading
@@ -15,10 +16,10 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from walkerlab.config.files import builtin_names
 from walkerlab.errors import ConfigError
-from walkerlab.explore import walks
-from walkerlab.explore.jobs import Job
-from walkerlab.explore.page import rendered
-from walkerlab.explore.walks import Answered, Question
+from walkerlab.explorer import walks
+from walkerlab.explorer.jobs import Job
+from walkerlab.explorer.page import rendered
+from walkerlab.explorer.walks import Answered, ExploredConfig
 from walkerlab.workers import Worker, WorkerDiedError
 
 LONGEST_BODY = 100_000
@@ -45,7 +46,7 @@ class Desk:
 
     @staticmethod
     def _hired() -> Worker:
-        return Worker(("walkerlab.explore.walks",))
+        return Worker(("walkerlab.explorer.walks",))
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
         """What the call returns there, once the worker is free; status 409 if a newer question came meanwhile."""
@@ -78,12 +79,13 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, port: int, base: Question) -> None:
+    def __init__(self, port: int, base: ExploredConfig) -> None:
         """Listen; port 0 is any that is free."""
         super().__init__(("127.0.0.1", port), Handler)
         self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
         # what is drawn in the background keeps nobody waiting who turns a number
         self.desk, self.background = Desk(), Desk(drops=True)
+        self._beside: threading.Thread | None = None
 
     @property
     def host(self) -> str:
@@ -95,13 +97,24 @@ class Server(ThreadingHTTPServer):
         """Where the page is, token included."""
         return f"http://{self.host}/?token={self.token}"
 
+    def begin(self) -> None:
+        """Serve beside what else this process does."""
+        self._beside = threading.Thread(target=self.serve_forever, daemon=True)
+        self._beside.start()
+
+    def _repr_html_(self) -> str:
+        """The page, in a notebook."""
+        return f'<iframe src="{self.url}" width="100%" height="900" style="border: 0"></iframe>'
+
     def close(self) -> None:
         """End what computes, and listen no more."""
+        if self._beside is not None:
+            self.shutdown()
         for one in (self.desk, self.background, self.job):
             one.close()
         self.server_close()
 
-    def question(self, body: Mapping[str, Any]) -> Question:
+    def question(self, body: Mapping[str, Any]) -> ExploredConfig:
         """What a body asks about; TypeError if it has not the form of a question."""
         changes, models = body.get("set", {}), body.get("models", list(walks.STAGES))
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
@@ -130,7 +143,7 @@ class Server(ThreadingHTTPServer):
         return failed(404, f"there is no {path}")
 
 
-def saved(question: Question, name: Any) -> Answered:
+def saved(question: ExploredConfig, name: Any) -> Answered:
     """Write the config into the working folder, over no file."""
     if not isinstance(name, str) or not name or Path(name).name != name:
         return failed(400, "a config is saved under a name without folders, such as mine.yaml")
@@ -163,7 +176,7 @@ class Handler(BaseHTTPRequestHandler):
             if not self.allowed(given):
                 return None
             page = rendered(self.server.base)
-            return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy, cookie=True)
+            return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy)
         cookies = SimpleCookie(self.headers.get("Cookie", ""))
         if not self.allowed(cookies[COOKIE].value if COOKIE in cookies else self.bearer()):
             return None
@@ -211,16 +224,19 @@ class Handler(BaseHTTPRequestHandler):
         """Send an object."""
         self.send(status, json.dumps(value, allow_nan=False).encode(), "application/json")
 
-    def send(self, status: int, body: bytes, kind: str, policy: str = "", cookie: bool = False) -> None:
+    def send(self, status: int, body: bytes, kind: str, policy: str = "") -> None:
         """Send a file."""
         self.send_response(status)
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
-        headers |= {"Content-Security-Policy": policy} if policy else {}
-        headers |= {"Set-Cookie": f"{COOKIE}={self.server.token}; HttpOnly; SameSite=Strict"} if cookie else {}
+        if policy:
+            # The page's own links, to reports, carry no token.
+            cookie = f"{COOKIE}={self.server.token}; HttpOnly; SameSite=Strict"
+            headers |= {"Content-Security-Policy": policy, "Set-Cookie": cookie}
         for name, value in headers.items():
             self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(body)
+        with contextlib.suppress(ConnectionError):  # whoever asked has left the page
+            self.end_headers()
+            self.wfile.write(body)
 
     def log_message(self, *_: object) -> None:
         """Nothing is said of single requests."""

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.files import DEFAULT
+from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, WalkerlabError
-from walkerlab.explore.numbers import adjustable
+from walkerlab.explorer.numbers import adjustable
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
 from walkerlab.stages.in_memory import InMemory, Keys
@@ -25,7 +26,7 @@ Answered = tuple[int, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Question:
+class ExploredConfig:
     """A config, changed.
 
     config   as `--config` has it
@@ -53,9 +54,10 @@ class Question:
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
-    def read(self) -> Config:
-        """The config that is asked about; ConfigError if it is not usable."""
-        return resolve(self.config, self.all_sets, None, self.runs).loaded.config
+    @property
+    def loaded(self) -> LoadedConfig:
+        """The config that is asked about, with what is doubtful of it; ConfigError if it is not usable."""
+        return resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refused(self, error: WalkerlabError) -> Answered:
         """What is said of a config that is not usable, with the change that is to blame if one is named."""
@@ -64,17 +66,25 @@ class Question:
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
+def sets_of(config: Config) -> tuple[str, ...]:
+    """What makes a config of the built-in paper config, as `--set` has it."""
+    paper = ExploredConfig(None, (), Path(), {}).loaded.config.model_dump(mode="json")
+    values = config.model_dump(mode="json").items()
+    return tuple(f"{key}={json.dumps(value)}" for key, value in values if key != "name" and value != paper[key])
+
+
 @cache
 def memory() -> tuple[InMemory, Keys]:
     """What this process remembers of earlier questions."""
     return InMemory(), Keys()
 
 
-def walked(question: Question) -> Answered:
+def walked(question: ExploredConfig) -> Answered:
     """The gait and the walks, with what a player has to know to show them."""
     stages, keys = memory()
     try:
-        config = question.read()
+        loaded = question.loaded
+        config = loaded.config
         wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks first: they leave the gait behind, and it is then there without being sought again.
         answers = {
@@ -84,6 +94,7 @@ def walked(question: Question) -> Answered:
     except ConfigError as error:
         return question.refused(error)
     found: dict[str, Any] = {"command": shlex.join(["walkerlab", "simulate", *question.options])}
+    found["warnings"] = list(loaded.warnings)
     walks: dict[str, Content] = {}
     for stage in ("fixedpoint", *wanted):
         said = answers[stage].no_answer
@@ -101,29 +112,27 @@ def walked(question: Question) -> Answered:
     return 200, found
 
 
-def numbers(question: Question) -> Answered:
+def numbers(question: ExploredConfig) -> Answered:
     """What can be turned."""
     try:
-        return 200, {"numbers": list(adjustable(replace(question, changes={}).read(), question.read()))}
+        return 200, {"numbers": list(adjustable(replace(question, changes={}).loaded.config, question.loaded.config))}
     except ConfigError as error:
         return question.refused(error)
 
 
-def along(question: Question) -> Answered:
+def along(question: ExploredConfig) -> Answered:
     """Gaits over one key: for each model the places, numbers and stability of its branches.
 
     The question's changes hold the block `continuation`: key, ends and points.
     """
     stages, keys = memory()
     try:
-        config = question.read()
+        config = question.loaded.config
         answer = stages.answer(config, "continuation", keys.of(config, "continuation"), again=False)
     except ConfigError as error:
         return question.refused(error)
-    branches = {
-        path: group for path, group in answer.content.groups.items() if path.count("/") == 1 and "value" in group.variables
-    }  # fmt: skip
-    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches.items() if walkable(group)]
+    followed = [(path, group) for path, group in answer.content.groups.items() if "step_period" in group.variables]
+    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in followed if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 
 
@@ -144,6 +153,8 @@ def curve(branch: Group) -> dict[str, list[Any]]:
     return {name: values.tolist() for name, values in found.items()}
 
 
-def as_file(question: Question, name: str) -> str:
+def as_file(question: ExploredConfig, name: str) -> str:
     """The config as a file that extends the one that was started from and says only what differs; ConfigError."""
-    return extending(question.config or DEFAULT, replace(question, changes={}, sets=()).read(), question.read(), name)
+    return extending(
+        question.config or DEFAULT, replace(question, changes={}, sets=()).loaded.config, question.loaded.config, name
+    )

@@ -104,7 +104,7 @@ function show(status, answer, asked) {
   document.body.dataset.state = "shown";
   const stable = gait.stable ? "a stable gait" : "an unstable gait";
   const ends = Object.entries(MODELS).filter(([, stage]) => answer[stage]).map(([model, stage]) => `${model}: ${outcome(answer[stage])}`);
-  say([stable, ...ends].join("; "), ends.every((text) => text.includes("walked")) && gait.stable ? "good" : "fair");
+  say([stable, ...ends, ...answer.warnings].join("; "), ends.every((text) => text.includes("walked")) && gait.stable ? "good" : "fair");
   draw();
 }
 

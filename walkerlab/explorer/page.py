@@ -9,7 +9,7 @@ from jinja2 import FileSystemLoader
 from markupsafe import Markup
 
 from walkerlab.config.files import DEFAULT, builtin_names
-from walkerlab.explore.walks import Question
+from walkerlab.explorer.walks import ExploredConfig
 from walkerlab.report import page as report
 from walkerlab.report.blocks import Player
 
@@ -25,7 +25,7 @@ class ServedPage:
     policy: str
 
 
-def rendered(base: Question) -> ServedPage:
+def rendered(base: ExploredConfig) -> ServedPage:
     """The page for a config."""
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'

@@ -1,0 +1,189 @@
+"""The page of `walkerlab explore` in a real browser: dragged, typed, searched, gone back in, saved, and left alone."""
+
+import pytest
+from browser import Browser, executable
+from conftest import Served
+
+from walkerlab.config.loader import load
+
+PATH = executable()
+pytestmark = pytest.mark.skipif(PATH is None, reason="no Chromium is installed; `CHROMIUM` may name one")
+
+SAID = "document.getElementById('said').textContent"
+SHOWN = "document.getElementById('shown').textContent"
+STATE = "document.body.dataset.state"
+TIME = "Number(document.querySelector('[data-player]')?.dataset.time)"
+WALK = "document.querySelector('.walk').toDataURL()"
+PERIOD = "document.querySelector('#results tbody td').textContent"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    browser = Browser(PATH)
+    yield browser
+    browser.close()
+
+
+class Address:
+    def __init__(self, text):
+        self.text = text
+
+    def as_uri(self):
+        return self.text
+
+
+@pytest.fixture
+def page(browser, served):
+    browser.open(Address("about:blank"))
+    browser.open(Address(served.url))
+    browser.until(f"{STATE} === 'shown'")
+    return browser
+
+
+def slider(key, value, kind="input"):
+    return (
+        f"(() => {{ const r = document.getElementById('turn-{key}'); r.value = {value};"
+        f" r.dispatchEvent(new Event('{kind}')); return rows.get('{key}').fromRange(); }})()"
+    )
+
+
+def typed(page, key, text):
+    page.evaluate(
+        f"(() => {{ const t = rows.get('{key}').text; t.value = '{text}'; t.dispatchEvent(new Event('change')); }})()"
+    )
+
+
+def test_the_walker_walks_at_once_and_the_page_complains_of_nothing(page, served):
+    page.until(f"{TIME} > 0.2")
+    assert page.evaluate(SHOWN) == "Shown: paper"
+    assert page.complaints() == []
+    assert {url.split("/")[2] for url in page.requests()} == {f"127.0.0.1:{served.port}"}
+
+
+def test_a_slider_that_is_dragged_changes_the_walk_and_what_is_let_go_can_be_gone_back_to(page):
+    page.until(f"{TIME} > 0.2")
+    before = page.evaluate("history.length")
+    for place in range(400, 700, 10):
+        value = page.evaluate(slider("slope_deg", place))
+    assert page.evaluate("[history.length, location.hash]") == [before, ""]
+    page.until(f"{SHOWN} === 'Shown: paper with slope_deg {value}'")
+    assert page.evaluate(f"{TIME} > 0.2")  # it went on from where it was
+    page.evaluate(slider("slope_deg", 600, "change"))
+    page.until(f"{SHOWN}.startsWith('Shown: paper with slope_deg')")
+    hash_of_first = page.evaluate("location.hash")
+    typed(page, "walker.hip_mass_kg", "20")
+    page.until(f"{SHOWN}.endsWith('walker.hip_mass_kg 20')")
+    page.evaluate("history.back()")
+    page.until(f"!{SHOWN}.includes('hip_mass') && {STATE} === 'shown'")
+    assert page.evaluate("location.hash") == hash_of_first
+    page.evaluate("document.getElementById('reset').click()")
+    page.until(f"{SHOWN} === 'Shown: paper'")
+
+
+def test_the_address_alone_brings_a_walk_back(page, served):
+    page.open(Address(f"{served.url}#config=kneed&walker.hip_mass_kg=0.6"))
+    page.evaluate("location.reload()")
+    page.until(f"typeof rows !== 'undefined' && {SHOWN} === 'Shown: kneed with walker.hip_mass_kg 0.6'")
+    assert page.evaluate("document.getElementById('config').value") == "kneed"
+    assert page.evaluate("rows.get('walker.hip_mass_kg').text.value") == "0.6"
+
+
+def test_a_picture_is_never_taken_for_that_of_other_numbers(page):
+    first = page.evaluate(SHOWN)
+    typed(page, "walker.leg_mass_kg", "-4")
+    page.until(f"{STATE} === 'failed'")
+    assert "from 1e-12 to 1e6 (kg)" in page.evaluate(SAID)
+    assert page.evaluate(SHOWN) == first
+    assert page.evaluate("rows.get('walker.leg_mass_kg').place.classList.contains('wrong')")
+    typed(page, "walker.leg_mass_kg", "5")
+    page.until(f"{STATE} === 'shown'")
+    typed(page, "slope_deg", "30")
+    page.until(f"{SAID}.startsWith('No gait: no gait at a slope')")
+    assert page.evaluate("document.getElementById('place').hidden")
+    assert page.evaluate(f"{SHOWN} + {PERIOD}") == "Nothing walks: paper with slope_deg 30–"
+
+
+def test_any_other_key_is_found_and_turned(page):
+    page.evaluate("document.getElementById('search').value = 'gravity'; search()")
+    page.evaluate("document.querySelector('#found button').click()")
+    page.evaluate(slider("gravity_m_s2", 0, "change"))
+    page.until(f"{SHOWN} === 'Shown: paper with gravity_m_s2 1.962'")
+    page.evaluate("document.getElementById('search').value = 'zebra'; search()")
+    assert "No key" in page.evaluate("document.getElementById('found').textContent")
+
+
+def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
+    page.until("along.series?.length > 0")
+    page.evaluate("along.cursor.scrollIntoView()")
+    box = page.evaluate(
+        "(() => { const b = along.cursor.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()"
+    )
+    where = {"x": box[0] + 0.6 * box[2], "y": box[1] + 0.5 * box[3], "button": "left", "clickCount": 1}
+    for kind in ("mousePressed", "mouseReleased"):
+        page.call("Input.dispatchMouseEvent", type=kind, **where)
+    page.until(
+        f"{SHOWN}.startsWith('Shown: paper with slope_deg 2') || {SHOWN}.startsWith('Shown: paper with slope_deg 3')"
+    )
+
+
+def test_each_model_can_be_hidden(page):
+    both = page.evaluate(WALK)
+    page.evaluate("document.getElementById('contact').click()")
+    page.until(f"{WALK} !== '{both}'")
+    assert page.evaluate("document.querySelectorAll('[data-view=phase] path').length") == 1
+    page.evaluate("document.getElementById('contact').click()")
+    page.until("document.querySelectorAll('[data-view=phase] path').length === 2")
+
+
+def test_what_was_found_is_saved(page, served):
+    typed(page, "slope_deg", "3")
+    page.evaluate("document.getElementById('name').value = 'found.yaml'; document.getElementById('save').click()")
+    page.until("document.getElementById('made').textContent.startsWith('Saved')")
+    assert load(served.folder / "found.yaml").config == load(None, ["slope_deg=3", "name=found"]).config
+    page.evaluate("document.getElementById('save').click()")
+    page.until("document.getElementById('made').textContent.includes('exists already')")
+
+
+def test_a_film_is_made_and_linked(page):
+    typed(page, "slope_deg", "2.5")
+    page.evaluate("document.getElementById('contact').click()")
+    page.evaluate("document.getElementById('gif').click()")
+    page.until("!!document.querySelector('#made a') || document.getElementById('made').textContent.includes('rror')")
+    link = page.evaluate("document.querySelector('#made a')?.href")
+    kind = page.evaluate(
+        "fetch(document.querySelector('#made a').href).then((answer) => answer.headers.get('Content-Type'))"
+    )
+    assert link.endswith("simulate.gif")
+    assert kind == "image/gif"
+
+
+@pytest.mark.parametrize(("width", "dark"), [(400, True), (1440, False)])
+def test_nothing_is_wider_than_the_screen(browser, served, width, dark):
+    browser.open(Address("about:blank"))
+    browser.open(Address(served.url), width, 900, dark=dark, calm=True)
+    browser.until(f"{STATE} === 'shown'")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    assert browser.evaluate(TIME) == 0  # who asked for less motion starts it
+
+
+def test_the_keyboard_alone_turns_a_number(page):
+    page.evaluate("document.getElementById('turn-slope_deg').focus()")
+    page.press("ArrowRight", 39)
+    page.until(f"{SHOWN}.startsWith('Shown: paper with slope_deg 1.04')")
+    assert page.evaluate("document.activeElement.id") == "turn-slope_deg"
+
+
+def test_a_server_that_is_gone_is_told(browser, tmp_path):
+    one = Served(tmp_path)
+    try:
+        browser.open(Address(one.url))
+        browser.until(f"{STATE} === 'shown'")
+    finally:
+        one.close()
+    typed(browser, "slope_deg", "2")
+    browser.until(f"{SAID}.startsWith('The server does not answer')")
+    again = Served(tmp_path, "--port", str(one.port))
+    try:
+        browser.until(f"{SAID}.includes('Open the address as it was printed')")
+    finally:
+        again.close()

@@ -1,0 +1,211 @@
+"""`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
+
+import json
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Served
+
+import walkerlab
+from walkerlab.config.loader import load
+
+
+def settings(seed, count):
+    """Settings of three walkers at random."""
+    random = np.random.default_rng(seed)
+    for number in range(count):
+        config = ("paper", "simplest", "kneed")[number % 3]
+        changes = {"slope_deg": round(float(random.uniform(0.5, 4.0)), 3), "gravity_m_s2": float(random.uniform(1, 20))}
+        if config == "paper":
+            changes |= {"walker.hip_mass_kg": float(random.uniform(5, 20)), "walker.leg_mass_kg": 4.5}
+        yield config, changes
+
+
+def same(served, config, changes, models):
+    """The answer over the connection, compared with that of the command."""
+    status, said = served.walk(changes, models, config=config)
+    assert status == 200
+    for stage in ("fixedpoint", *(name for model, name in STAGES.items() if model in models)):
+        done = walkerlab.run(stage, config, set=changes, runs=served.folder / "asked")
+        if stage not in said:
+            assert "error" in said["fixedpoint"]
+            continue
+        if done.no_answer is not None:
+            assert said[stage]["error"] == done.summary["error"]
+        there = {key: value for key, value in said[stage].items() if key != "error"}
+        printed = {key: done.summary[key] for key in there}
+        assert json.loads(json.dumps(printed)) == there
+    return said
+
+
+STAGES = {"rigid": "simulate", "contact": "contact-sim"}
+
+
+@pytest.mark.parametrize(("config", "changes"), list(settings(1, 18)))
+def test_every_number_is_the_one_of_the_command(served, config, changes):
+    same(served, config, changes, ["rigid"])
+
+
+@pytest.mark.parametrize(
+    "changes", [{"slope_deg": 3}, {"contact.stiffness": 2e4, "contact.terrain": "after-mid-swing"}]
+)
+def test_every_number_of_the_contact_walk_is_the_one_of_the_command(served, changes):
+    said = same(served, "paper", changes, ["rigid", "contact"])
+    assert said["tracks"].keys() == {"simulate", "contact-sim"}
+
+
+def test_a_slope_without_a_gait_is_an_answer(served):
+    status, said = served.walk({"slope_deg": 20})
+    assert (status, said["fixedpoint"]["error"]["exit_code"]) == (200, 4)
+    assert "no gait" in said["fixedpoint"]["error"]["message"]
+    assert "simulate" not in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "message"),
+    [
+        ({"slope_deg": "steep"}, "slope_deg", "slope_deg"),
+        ({"walker.hip_mas_kg": 3}, "walker.hip_mas_kg", "did you mean walker.hip_mass_kg?"),
+        ({"slope_deg": 1, "walker.leg_mass_kg": -1}, "walker.leg_mass_kg", "from 1e-12 to 1e6 (kg)"),
+        ({"a: [": 1}, "a: [", ""),
+        ({"walker": None}, "walker", "walker"),
+        ({"": 1}, "", ""),
+    ],
+)
+def test_what_a_config_cannot_have_is_refused_with_the_commands_message(served, changes, key, message):
+    status, said = served.walk(changes)
+    assert (status, said["error"]["key"]) == (422, key)
+    assert message in said["error"]["message"]
+    assert served.asked("/api/numbers", {"set": changes})[0] == 422
+
+
+@pytest.mark.parametrize(
+    ("status", "path", "body", "headers"),
+    [
+        (401, "/api/walk", "{}", {"X": "y"}),
+        (401, "/api/walk", "{}", {"Authorization": "Bearer wrong"}),
+        (401, "/", None, {"X": "y"}),
+        (401, "/?token=wrong", None, {"X": "y"}),
+        (401, "/runs/paper/report.html", None, {"X": "y"}),
+        (403, "/api/walk", "{}", {"Origin": "http://elsewhere"}),
+        (403, "/api/walk", "{}", {"Host": "elsewhere:80"}),
+        (403, "/", None, {"Host": "elsewhere:80"}),
+        (400, "/api/walk", "no", {}),
+        (400, "/api/walk", "[]", {}),
+        (400, "/api/walk", '{"set": 3}', {}),
+        (400, "/api/walk", '{"models": ["walking"]}', {}),
+        (400, "/api/walk", '{"models": [[]]}', {}),
+        (400, "/api/walk", '{"config": "/etc/passwd"}', {}),
+        (400, "/api/walk", "[" * 50_000, {}),
+        (400, "/api/job", '{"kind": "anything"}', {}),
+        (413, "/api/walk", "x" * 100_001, {}),
+        (404, "/api/other", "{}", {}),
+        (404, "/runs/../../../etc/passwd", None, {}),
+        (404, "/runs/%2e%2e/%2e%2e/etc/passwd", None, {}),
+    ],
+)
+def test_who_may_not_ask_and_what_is_no_question_is_refused_in_words(served, status, path, body, headers):
+    found, said = served.asked(path, body, **({**served.bearer, **headers} if "X" not in headers else headers))
+    assert found == status
+    assert said["error"]["message"]
+
+
+def test_of_questions_that_pile_up_the_newest_is_answered_and_memory_stays_level(served):
+    statuses, last = [], []
+
+    def ask(slope):
+        last[:] = [served.walk({"slope_deg": slope})]
+        statuses.append(last[0][0])
+
+    served.walk({"slope_deg": 2})
+    before = resident_kB(served.process.pid)
+    for number in range(200):
+        thread = threading.Thread(target=ask, args=(1 + number / 100,))
+        thread.start()
+        time.sleep(0.01)
+    thread.join()
+    status, said = served.walk({"slope_deg": 2.5})
+    assert set(statuses) <= {200, 409}
+    assert statuses.count(409) > 10
+    assert (status, said["simulate"]["outcome"]) == (200, "walked")
+    assert resident_kB(served.process.pid) < before + 30_000
+
+
+def resident_kB(process):
+    fields = dict(line.split(":", 1) for line in Path(f"/proc/{process}/status").read_text().splitlines())
+    return int(fields["VmRSS"].split()[0])
+
+
+def test_a_config_is_saved_as_what_differs_and_over_no_file(served):
+    asked = {"set": {"slope_deg": 3, "walker.hip_mass_kg": 12}, "name": "mine.yaml"}
+    status, said = served.asked("/api/save", asked)
+    assert (status, Path(said["file"])) == (200, served.folder / "mine.yaml")
+    saved = load(served.folder / "mine.yaml").config
+    assert saved == load(None, ["slope_deg=3", "walker.hip_mass_kg=12", "name=mine"]).config
+    assert "leg_mass_kg" not in said["text"]
+    assert served.asked("/api/save", asked)[0] == 409
+    assert served.asked("/api/save", {**asked, "name": "../mine.yaml"})[0] == 400
+    assert served.asked("/api/save", {"set": {"slope_deg": 99}, "name": "steep"})[0] == 422
+
+
+def test_gaits_along_a_number_are_those_of_the_continuation(served):
+    span = {"over": "slope_deg", "from": 0.5, "to": 5.0, "points": 40, "periods": 1}
+    block = {f"continuation.{key}": value for key, value in span.items()}
+    status, said = served.asked("/api/along", {"set": block})
+    assert (status, said["over"]) == (200, "slope_deg")
+    summary = walkerlab.run("continuation", set=block, runs=served.folder / "asked").summary
+    [limit] = {branch["stable_range"][1] for branch in summary["branches"] if branch["stable_range"]}
+    stable = [x for curve in said["curves"] for x, is_so in zip(curve["value"], curve["stable"], strict=True) if is_so]
+    assert 0.9 * limit < max(stable) <= limit
+
+
+def test_what_can_be_turned_is_what_the_walker_has(served):
+    _, said = served.asked("/api/numbers", {"config": "simplest", "set": {"slope_deg": 0.4}})
+    keys = {number["key"]: number for number in said["numbers"]}
+    assert keys["slope_deg"]["value"] == pytest.approx(0.4)
+    assert not any(key.startswith("contact.") for key in keys)
+    _, said = served.asked("/api/numbers", {"config": "kneed"})
+    keys = {number["key"]: number for number in said["numbers"]}
+    assert keys["walker.thigh.mass_kg"]["unit"] == "kg"
+    assert "checkerboard" in keys["contact.terrain"]["words"]
+    for number in keys.values():
+        assert "words" in number or number["from"] <= number["start"] <= number["to"]
+
+
+@pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
+def test_the_server_ends_when_told_and_leaves_nothing_behind(tmp_path, told):
+    one = Served(tmp_path)
+    try:
+        began = time.monotonic()
+        one.process.send_signal(told)
+        assert one.process.wait(10) == 130
+        assert time.monotonic() - began < 2
+        assert not workers_of(one.process.pid)
+    finally:
+        one.close()
+
+
+def workers_of(process):
+    """Processes that this one has started and that are there still."""
+    return [file for file in Path("/proc").glob("[0-9]*/status") if f"PPid:\t{process}\n" in text_of(file)]
+
+
+def text_of(file):
+    try:
+        return file.read_text()
+    except OSError:
+        return ""
+
+
+def test_in_a_notebook_it_is_a_frame(tmp_path):
+    page = walkerlab.explore(walkerlab.kneed(), slope_deg=3, runs=tmp_path)
+    try:
+        assert f'<iframe src="{page.url}"' in page._repr_html_()
+        said = page.answer("/api/walk", {"models": ["rigid"]})[1]
+        assert said["fixedpoint"]["period_s"] == walkerlab.find_gait(walkerlab.kneed(), slope_deg=3).summary["period_s"]
+    finally:
+        page.close()
