@@ -1,42 +1,7 @@
-"""`walkerlab explore` as a process, and how it is asked."""
-
-import http.client
-import json
-import re
-import subprocess
-import sys
+"""One server for all tests of a file."""
 
 import pytest
-
-
-class Served:
-    def __init__(self, folder, *options):
-        command = [sys.executable, "-m", "walkerlab", "explore", "--no-browser", "--runs", "runs", *options]
-        self.folder = folder
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
-        self.url = self.process.stdout.readline().strip()
-        port, self.token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", self.url).groups()
-        self.port = int(port)
-        self.bearer = {"Authorization": f"Bearer {self.token}"}
-
-    def asked(self, path, body=None, **headers):
-        """Status and answer; the token is given unless other headers are."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
-        text = body if body is None or isinstance(body, str) else json.dumps(body)
-        connection.request("GET" if body is None else "POST", path, text, headers or self.bearer)
-        answer = connection.getresponse()
-        said = answer.read()
-        return answer.status, json.loads(said) if answer.headers[
-            "Content-Type"
-        ] == "application/json" else said.decode()
-
-    def walk(self, changes, models=("rigid",), **more):
-        return self.asked("/api/walk", {"set": changes, "models": models, **more})
-
-    def close(self):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
+from explored import Served
 
 
 @pytest.fixture(scope="module")

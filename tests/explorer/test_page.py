@@ -2,7 +2,7 @@
 
 import pytest
 from browser import Browser, executable
-from conftest import Served
+from explored import Served
 
 from walkerlab.config.loader import load
 

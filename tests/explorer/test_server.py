@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Served
+from explored import Served
 
 import walkerlab
 from walkerlab.config.loader import load

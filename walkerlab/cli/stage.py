@@ -12,7 +12,7 @@ import typer
 from walkerlab.cli.answers import answer, verdict
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
-from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.config.files import builtin_names, extendable
 from walkerlab.config.layers import setting_of
 from walkerlab.config.loader import load
 from walkerlab.config.writer import extending
@@ -63,11 +63,9 @@ def write_optimum(request: Request, report: StageReport) -> Path:
 
     Raises StorageError if the system refuses.
     """
-    typed = request.config or DEFAULT
-    file = Path(typed)
-    if typed not in builtin_names():
-        typed = os.path.relpath(file, report.run_dir) if file.is_file() and file.suffix != ".h5" else DEFAULT
-    base = load(file if typed != DEFAULT or request.config == DEFAULT else None).config
+    start = extendable(request.config)
+    base = load(Path(start)).config
+    typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
     settings = [setting_of(f"{key}={value!r}") for key, value in report.summary["best"].items()]
     best = request.loaded.variant(settings).model_copy(update={"design": base.design})
     text = extending(typed, base, best, f"{base.name}-optimum")

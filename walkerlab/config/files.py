@@ -38,6 +38,12 @@ def builtin_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
 
 
+def extendable(typed: str | None) -> str:
+    """What a config may extend that starts from the one that was typed: for a run, which has no file, the paper's."""
+    named = typed is not None and (typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5"))
+    return str(typed) if named else DEFAULT
+
+
 def builtin(name: str) -> ConfigFile:
     """The config `name` that comes with the package."""
     return ConfigFile(BUILTIN_FOLDER / f"{name}.yaml", f"built-in {name}.yaml")

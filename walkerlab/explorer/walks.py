@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.files import DEFAULT
-from walkerlab.config.loader import LoadedConfig
+from walkerlab.config.files import extendable
+from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, WalkerlabError
@@ -155,6 +155,5 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 def as_file(question: ExploredConfig, name: str) -> str:
     """The config as a file that extends the one that was started from and says only what differs; ConfigError."""
-    return extending(
-        question.config or DEFAULT, replace(question, changes={}, sets=()).loaded.config, question.loaded.config, name
-    )
+    start = extendable(question.config)
+    return extending(start, load(Path(start)).config, question.loaded.config, name)
