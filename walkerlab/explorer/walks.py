@@ -88,7 +88,7 @@ def walked(question: ExploredConfig) -> Answered:
         wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks first: they leave the gait behind, and it is then there without being sought again.
         answers = {
-            stage: stages.answer(config, stage, keys.of(config, stage), again=False)
+            stage: stages.answer(config, stage, keys.of(config, stage), again=False, anew=False)
             for stage in (*wanted, "fixedpoint")
         }
     except ConfigError as error:

@@ -134,20 +134,21 @@ class Sticks:
         return at_strikes, others
 
 
-def sticks_of(result: Stored) -> Sticks:
-    """The joints' places as a walk has stored them."""
-    trajectory, steps, walker = result["trajectory"], result["steps"], result.identity.config_slice["walker"]
+def sticks_of(result: Stored, under: str = "") -> Sticks:
+    """The joints' places as a walk has stored them, `under` a group if that is named."""
+    asked = result.identity.config_slice
+    trajectory, steps, walker = result[f"{under}trajectory"], result[f"{under}steps"], asked["walker"]
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
 
-    slope, hip, head = float(result.summary["slope_rad"]), joints("hip"), None
+    slope, hip, head = float(asked["slope_rad"]), joints("hip"), None
     if "torso_angle" in trajectory.variables:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
     radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
-    if result.identity.stage == RIGID_STAGE and walker["type"] == "compass":
+    if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
     ground = ground_levels(steps)
     landings = np.append(0.0, steps["touch_along_m"])

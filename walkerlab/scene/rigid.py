@@ -52,15 +52,23 @@ class RigidScene:
 
 
 def rigid_scene(config: SimulateConfig) -> RigidScene:
-    """The scene of a config: its equations, its method, and of the outputs those that it asks for."""
+    """The scene of a config: its equations, its method, its ground, and of the outputs those that it asks for."""
     settings = config.solver.rigid
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
+    return rigid_scene_on(config, config.ground, tolerances, config.outputs)
+
+
+def rigid_scene_on(
+    config: RigidConfig, ground: Footholds, tolerances: Tolerances, outputs: tuple[Output, ...]
+) -> RigidScene:
+    """The walker of a config on a ground."""
     return RigidScene(
         walker=rigid_walker(config, config.equations),
-        tolerances=Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS),
+        tolerances=tolerances,
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
-        outputs=config.outputs,
-        ground=config.ground,
+        outputs=outputs,
+        ground=ground,
     )
 
 

@@ -62,17 +62,19 @@ class InMemory:
         progress: Progress | None = None,
         *,
         again: bool = True,
+        anew: bool = True,
     ) -> StageAnswer:
         """The answer of a stage under a config, as the stage gives it when it is run.
 
         keys   of the stage and what it needs, from `Keys.of`
         again  whether walks are taken a second time for their numerical error
+        anew   whether the stage itself is computed even where another one has needed it already
         """
         progress = progress or Silent()
         results: dict[str, Content] = {}
         for stage in self.graph.needed_for(target, config):
             key = (keys[stage.name], again and stage.walks)
-            if key not in self._inputs:
+            if key not in self._inputs or (anew and stage.name == target):
                 inputs = {name: results[name] for name in stage.inputs(config)}
                 task = task_of(stage, config, inputs, jobs=1, parts=Parts(None, ""), again=again)
                 answer = task.run(progress)

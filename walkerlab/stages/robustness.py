@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.drives import drives_of
 from walkerlab.config.fields import leaves
+from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import ContactConfig, DesignConfig, RobustnessConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
@@ -36,12 +37,13 @@ from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import rigid_scene_on, rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.pieces import Piece, complete
 from walkerlab.stages.progress import Progress
+from walkerlab.stages.simulate import groups as groups_of_walk
 from walkerlab.store.columns import rows_group
-from walkerlab.store.content import Content
+from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 from walkerlab.workers import in_order
 
@@ -51,6 +53,7 @@ Rows = list[dict[str, Any]]
 RIGID: Final = "rigid"
 QUICK_CONTACT: Final = Tolerances("radau5", 1e-6, 1e-8, 1_000_000)  # of one step
 WALKS_AT_ONCE: Final = 25
+STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, "contact": 40_000}
 """On one rough ground, all walks together."""
 SLOPE: Final = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
@@ -105,7 +108,7 @@ def run(
     """
     refuse(config)
     found: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
-    unstable = []
+    unstable, steps = [], {}
     for subject in subjects(config, inputs, progress):
         here = subject.at()
         numbers = gait_numbers(here)
@@ -120,7 +123,10 @@ def run(
         complete(pieces, parts, f"robustness: {subject.model} model", progress, jobs)
         for name, rows in walked(subject.model, config, parts).items():
             found[name] += rows
+        steps[subject.model] = steps_walked(subject.model, config, parts)
     groups = {name: rows_group(found[name], labels, "row", "row") for name, labels in LABELS.items() if found[name]}
+    if steps and config.robustness.roughness_m:
+        groups |= rough_steps(config, steps) | rough_walk(config, inputs)
     content = Content(groups, {**found, "steps": config.robustness.steps})
     if unstable:
         why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
@@ -279,6 +285,45 @@ def rough_of(subject: Subject, roughness: float, seed: int, walks: range, most: 
     return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
 
 
+def steps_walked(model: str, config: RobustnessConfig, parts: Parts) -> Floats:
+    """Steps (roughness, walk) of a model's walks on rough ground."""
+    asked = config.robustness
+    places = range(0, asked.walks, WALKS_AT_ONCE)
+    rows = [[parts.kept[f"{model} rough {roughness:g} {first}"] for first in places] for roughness in asked.roughness_m]
+    return np.array([np.concatenate(row) for row in rows])
+
+
+def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> dict[str, Group]:
+    """The steps of every walk, as they are stored."""
+    about = "steps that a walk took; one that went on to the last step that was looked at has as many"
+    return {
+        "rough_steps": Group(
+            {
+                "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
+                "roughness_m": Variable(
+                    np.array(config.robustness.roughness_m), ("roughness",), "m", "standard deviation of the heights"
+                ),
+                "cut_off_at": Variable(
+                    np.array([cap(model, config) for model in steps]),
+                    ("model",),
+                    "1",
+                    "the last step that was looked at",
+                ),
+                "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
+            }
+        )
+    }
+
+
+def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
+    """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
+    gait = as_state(inputs["fixedpoint"].summary["state"])
+    heights = np.random.default_rng((config.seed, 0)).normal(0.0, max(config.robustness.roughness_m), STEPS_DRAWN)
+    scene = rigid_scene_on(config, Footholds(heights_m=tuple(heights.tolist())), EXACT, ("states",))
+    walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
+    return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
+
+
 def walked(model: str, config: RobustnessConfig, parts: Parts) -> dict[str, Rows]:
     """What the pieces of a model came to."""
     asked, kept = config.robustness, parts.kept
@@ -286,9 +331,8 @@ def walked(model: str, config: RobustnessConfig, parts: Parts) -> dict[str, Rows
         tuple(kept[f"{model} {disturbance} {sign:g}"][0] for sign in (1.0, -1.0)) for disturbance in DISTURBANCES
     )
     most, grounds = cap(model, config), []
-    for roughness in asked.roughness_m:
-        steps = [kept[f"{model} rough {roughness:g} {first}"] for first in range(0, asked.walks, WALKS_AT_ONCE)]
-        seen = rough_walks(np.concatenate(steps), most)
+    for roughness, steps in zip(asked.roughness_m, steps_walked(model, config, parts), strict=True):
+        seen = rough_walks(steps, most)
         error = {} if seen.standard_error is None else {"standard_error": seen.standard_error}
         told = {"mean_steps": seen.mean, **error, "walks": seen.walks, "capped": seen.capped, "method": seen.method}
         grounds.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})

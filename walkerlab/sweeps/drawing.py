@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
+from walkerlab.figures import robustness
+from walkerlab.figures.canvas import Drawing
 from walkerlab.figures.sweep import choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.blocks import Gallery, Picture, Section
@@ -44,7 +46,13 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
     group, question = swept.group, swept.question
     refuse_unknown(group, question.dims, names)
     shown = list(names) or choose(group, question.dims, question.names)
-    figure = drawn_figure(group, question.stage, question.names, question.dims, shown) if shown else None
+    figure: Drawing | None
+    if not names and robustness.can_be_drawn(group, question.names):
+        figure = robustness.over_one_number(group, question.names[0])
+    elif not names and (driven := robustness.actuations(group, question.names)) is not None:
+        figure = robustness.push_off_or_hip(group, driven)
+    else:
+        figure = drawn_figure(group, question.stage, question.names, question.dims, shown) if shown else None
     paths: list[Path] = []
     pictures: list[Picture] = []
     if figure is not None:
