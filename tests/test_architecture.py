@@ -145,3 +145,12 @@ def test_a_walk_from_a_given_start_loads_nothing_that_draws_or_seeks_gaits(tmp_p
     loaded = done.stdout.splitlines()[-1].split()
     assert "numba" in loaded
     assert {"matplotlib", "scipy.optimize", "walkerlab.orbits.fixed_point", "jinja2"} & set(loaded) == set()
+
+
+def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
+    command = [sys.executable, "-c", RUN, "fixedpoint", "--runs", str(tmp_path), "--force"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "there is a stable gait" in done.stdout
+    loaded = done.stdout.splitlines()[-1].split()
+    assert [name for name in loaded if name.startswith(("scipy.linalg", "walkerlab.report.sections", "jinja2"))] == []

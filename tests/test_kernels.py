@@ -359,3 +359,17 @@ def test_machine_code_names_records_by_their_layout_so_that_processes_agree(monk
     assert named != mangle_type(three)
     monkeypatch.setattr(two, "_code", three._code)  # numba's own number, counted up in each process
     assert mangle_type(two) == named
+
+
+def test_numba_multiplies_matrices_after_kernels_are_loaded():
+    """For whoever calls both: numba looks for the linear algebra that loading kernels leaves out."""
+    code = """
+import sys
+import numba, numpy as np
+from walkerlab import kernels
+assert not any(name.startswith("scipy.linalg") for name in sys.modules)
+A = np.arange(4.0).reshape(2, 2)
+print(np.array_equal(numba.njit(lambda a: a @ a)(A), A @ A), numba.njit(lambda a, b: np.convolve(a, b))(*A).tolist())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.split(maxsplit=1) == ["True", "[0.0, 2.0, 3.0]\n"], done.stderr

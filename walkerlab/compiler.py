@@ -7,6 +7,7 @@ import functools
 import gc
 import hashlib
 import importlib
+import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -79,6 +80,18 @@ def named_by_layout(record: Any) -> tuple[str, tuple[str, ...]]:
 
 if hasattr(Record, "mangling_args"):
     Record.mangling_args = property(named_by_layout)
+
+# With its first kernel numba loads scipy.linalg to see whether it is there, which takes longer than all of the kernels'
+# code. It is; numba looks again, and loads it, where a function multiplies matrices, which those here do not.
+BLAS = "scipy.linalg.cython_blas"
+if BLAS not in sys.modules:
+    sys.modules[BLAS] = None  # type: ignore[assignment]
+    try:
+        importlib.import_module("numba.np.arraymath")._HAVE_BLAS = True  # type: ignore[attr-defined]
+    except ImportError:
+        absent.append("numba.np.arraymath")
+    finally:
+        del sys.modules[BLAS]
 
 if absent:
     warnings.warn(

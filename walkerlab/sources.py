@@ -6,7 +6,7 @@ import hashlib
 import importlib.util
 import re
 from collections.abc import Iterable, Iterator
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import accumulate, chain
 from pathlib import Path
 
@@ -103,36 +103,45 @@ class Module:
     @cached_property
     def imports(self) -> list[str]:
         """Names that may be modules it imports, the packages above them and above itself included."""
-        names = {self.name, *self._imported(COMMENT.sub("", self.text.decode()).replace("\\\n", " "))}
-        own = {PACKAGE, self.name.partition(".")[0]}
-        chains = [accumulate(name.split("."), "{}.{}".format) for name in names if name.partition(".")[0] in own]
-        return sorted(set(chain.from_iterable(chains)))
-
-    def _imported(self, text: str) -> Iterator[str]:
-        for found in IMPORT.finditer(text):
-            if found["quoted"]:
-                yield found["quoted"]
-            else:
-                origin = None if found["modules"] else self._absolute(found["origin"])
-                yield from [origin] if origin else []
-                listed = (found["modules"] or found["names"].strip("() \t\n")).split(",")
-                names = [entry.split()[0] for entry in listed if entry.strip()]  # of 'a, b as c'
-                yield from (f"{origin}.{name}" if origin else name for name in names)
-
-    def _absolute(self, origin: str) -> str:
-        """The full name of what follows `from`, be it relative."""
-        name = origin.lstrip(".")
-        levels = len(origin) - len(name)
-        if not levels:
-            return name
-        parts = self.name.split(".")
-        above = parts[: len(parts) - levels + self.is_package]
-        return ".".join([*above, name] if name else above)
+        return imports_of(self.name, self.is_package, self.text)
 
     @cached_property
     def data(self) -> list[Path]:
         """Files of a package that are not Python, in its folder and in folders below that are no packages."""
         return sorted(data_files(self.path.parent)) if self.is_package else []
+
+
+@cache
+def imports_of(module: str, is_package: bool, source: bytes) -> list[str]:
+    """Names that may be modules a module imports, the packages above them and above itself included."""
+    text = COMMENT.sub("", source.decode()).replace("\\\n", " ")
+    own = {PACKAGE, module.partition(".")[0]}
+    names = {module, *(name for name in imported(module, is_package, text) if name.partition(".")[0] in own)}
+    return sorted(set(chain.from_iterable(accumulate(name.split("."), "{}.{}".format) for name in names)))
+
+
+def imported(module: str, is_package: bool, text: str) -> Iterator[str]:
+    """What a module's text without comments imports, by full names, and what it has in quotes that may be one."""
+    for found in IMPORT.finditer(text):
+        if found["quoted"]:
+            yield found["quoted"]
+        else:
+            origin = None if found["modules"] else absolute(module, is_package, found["origin"])
+            yield from [origin] if origin else []
+            listed = (found["modules"] or found["names"].strip("() \t\n")).split(",")
+            names = [entry.split()[0] for entry in listed if entry.strip()]  # of 'a, b as c'
+            yield from (f"{origin}.{name}" if origin else name for name in names)
+
+
+def absolute(module: str, is_package: bool, origin: str) -> str:
+    """The full name of what follows `from` in a module, be it relative."""
+    name = origin.lstrip(".")
+    levels = len(origin) - len(name)
+    if not levels:
+        return name
+    parts = module.split(".")
+    above = parts[: len(parts) - levels + is_package]
+    return ".".join([*above, name] if name else above)
 
 
 def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:

@@ -5,8 +5,8 @@ import pytest
 from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
 from walkerlab.cli.text import COLUMNS, described_summary
 from walkerlab.outcome import Outcome
+from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
-from walkerlab.report.sections.gaits import gait_table
 from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
 
 GAIT = {

@@ -27,10 +27,11 @@ from synthetic_results import (
 
 from walkerlab.config.loader import load
 from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
+from walkerlab.report.gaits import SETS, coordinate
 from walkerlab.report.registry import SECTIONS, lead, sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
-from walkerlab.report.sections.gaits import SETS, coordinate, every_gait
+from walkerlab.report.sections.gaits import every_gait
 from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch

@@ -1,4 +1,7 @@
-"""What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count."""
+"""What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count.
+
+A section of the page is imported by the answer that shows a part of it: the others are printed sooner.
+"""
 
 import math
 import shlex
@@ -8,12 +11,10 @@ from typing import Any
 
 from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
+from walkerlab.report import gaits
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import CHANNELS, MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
-from walkerlab.report.sections import adjustment, families, gaits, robustness, stability, walks
-from walkerlab.report.sections.families import parameter
-from walkerlab.report.sections.paper import numbers_table
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
 from walkerlab.report.words import words
 
@@ -116,10 +117,12 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 def each_step(summary: Summary) -> dict[str, Summary]:
     """What is known of each step that is shown, by its number; an ellipsis stands for the others."""
+    from walkerlab.report.sections.walks import of_step
+
     every = {key: found for key in OF_EACH_STEP if (found := summary.get(key))}
     return {
         str(place): {
-            key: "…" if place == "…" else walks.of_step(values[place - 1], key, summary)
+            key: "…" if place == "…" else of_step(values[place - 1], key, summary)
             for key, values in every.items()
             if place == "…" or place <= len(values)
         }
@@ -136,6 +139,8 @@ def elided(values: Sequence[Any]) -> list[Any]:
 
 def tune(summary: Summary) -> list[str | Table]:
     """Whether other initial velocities are needed, and what the contact model's own gait is."""
+    from walkerlab.report.sections import adjustment
+
     gait = summary["gait"]
     own = (
         side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
@@ -151,6 +156,8 @@ def compare(summary: Summary) -> list[str | Table]:
     errors = summary.get("numerical_error", {})
     told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
+        from walkerlab.report.sections.paper import numbers_table
+
         verdicts = summary["verdicts"]
         fared = listed(f"{many} {'is' if many == 1 else 'are'} {name}" for name, many in verdicts.items())
         head = f"Of {sum(verdicts.values())} numbers that the paper prints, {fared}."
@@ -191,6 +198,8 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 def extreme_cases(summary: Summary) -> list[str | Table]:
     """How many cases ended as they should, and those that did not."""
+    from walkerlab.report.sections.stability import family_table
+
     total = summary["passed"] + summary["failed"]
     head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
     failed = [case for case in summary["cases"] if not case["ok"]]
@@ -200,32 +209,40 @@ def extreme_cases(summary: Summary) -> list[str | Table]:
         for known in summary["known"]
         if not known["ok"]
     ]
-    return [head, stability.family_table(summary["cases"]), *said]
+    return [head, family_table(summary["cases"]), *said]
 
 
 def continuation(summary: Summary) -> list[str | Table]:
     """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
+    from walkerlab.report.sections import families
+
     branches = count(len(summary["branches"]), "branch", "branches")
-    head = f"{branches} of gaits over {parameter(summary)}."
+    head = f"{branches} of gaits over {families.parameter(summary)}."
     return [head, *families.findings(summary), families.bifurcations(summary)]
 
 
 def starts(summary: Summary) -> list[str | Table]:
     """How much walks, and to what."""
+    from walkerlab.report.sections.families import attractors
+
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    return [*told, families.attractors(summary)]
+    return [*told, attractors(summary)]
 
 
 def stood(summary: Summary) -> list[str | Table]:
     """What the gait stands, and what moves it."""
+    from walkerlab.report.sections import robustness
+
     return [*robustness.findings(summary), *robustness.tables(summary)]
 
 
 def best_walker(summary: Summary) -> list[str | Table]:
     """Where the optimum lies, and the config that has it."""
+    from walkerlab.report.sections.robustness import designed
+
     file = summary.get("config")
     told = [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
-    return [*robustness.designed(summary), *told]
+    return [*designed(summary), *told]
 
 
 def engines(summary: Summary) -> list[str | Table]:

@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import (
@@ -70,15 +69,19 @@ class Modes(NamedTuple):
 def linear_modes(walker: Standing) -> Modes | None:
     """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
-    M, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
-    equations(level, level.zero_state, s, c, F, U, M, r)
-    try:
-        rates, V = eigh(walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs, legs.T @ M @ legs)
-    except np.linalg.LinAlgError:
+    inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
+    equations(level, level.zero_state, s, c, F, U, inertias, r)
+    M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
+    # det(K - x M) = first x^2 - 2 half x + last
+    first, last = np.linalg.det(M), np.linalg.det(K)
+    half = 0.5 * (K[0, 0] * M[1, 1] + K[1, 1] * M[0, 0]) - K[0, 1] * M[0, 1]
+    if not last < 0.0 < first:
         return None
-    if rates[0] >= 0.0 or rates[1] <= 0.0:
-        return None
-    return Modes(math.sqrt(-rates[0]), math.sqrt(rates[1]), np.asarray(V))
+    root = half + math.copysign(math.sqrt(half * half - first * last), half)  # times first, without cancellation
+    oscillating, growing = sorted((root / first, last / root))
+    swinging, falling = K - oscillating * M, K - growing * M
+    V = np.array([[swinging[1, 1], -falling[0, 1]], [-swinging[0, 1], falling[0, 0]]])
+    return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
 
 
 def leg_columns(walker: Standing) -> Vector:

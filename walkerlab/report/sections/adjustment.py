@@ -5,10 +5,10 @@ from functools import partial
 from typing import Any
 
 from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
+from walkerlab.report.gaits import symbol
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
-from walkerlab.report.sections.gaits import symbol
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.report.words import words

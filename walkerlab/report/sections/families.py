@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from walkerlab.labels import in_words, with_unit
 from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Section, Walker
+from walkerlab.report.gaits import complex_number
 from walkerlab.report.numbers import number, whole
 from walkerlab.report.results import Results
-from walkerlab.report.sections.gaits import complex_number
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.report.words import words
