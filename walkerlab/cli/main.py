@@ -17,7 +17,7 @@ from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
-# thresholds of the garbage collector: what a command loads stays, and at the usual ones is looked through time and again
+# thresholds of the garbage collector: what a command loads stays, and at the usual ones it is searched again and again
 SELDOM = (300_000, 50, 100)
 
 
