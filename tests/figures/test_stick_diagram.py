@@ -130,3 +130,20 @@ def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
     plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
     tinted = [int((np.ptp(picture, axis=2) > 10).sum()) for picture in (plane, on_pads)]
     assert tinted[1] > tinted[0] + 200
+
+
+def test_the_leg_behind_pushes_off_just_after_each_landing():
+    driven = replace(sticks_of(both_models()["simulate"]), pushes=True)
+    for strike in driven.strikes[:-1]:
+        behind = driven.feet[np.searchsorted(driven.time, strike), :, 0].argmin()
+        assert [driven.pushing(strike + late) for late in (0.0, 0.05, 0.2)] == [behind, behind, None]
+    assert driven.pushing(0.0) is None
+    assert replace(driven, pushes=False).pushing(driven.strikes[0]) is None
+
+
+def test_a_film_shows_the_push_off():
+    walk = sticks_of(both_models()["simulate"])
+    at = np.array([walk.strikes[0] + 0.02])
+    (still,), (pushed,) = (list(pictures(replace(walk, pushes=pushes), at)) for pushes in (False, True))
+    changed = np.any(still != pushed, axis=2)
+    assert 100 < changed.sum() < 0.01 * changed.size

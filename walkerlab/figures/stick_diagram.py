@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry, styled
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, GREY, LEGS
+from walkerlab.figures.style import BLACK, GREY, LEGS, PURPLE
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
     JOINTS,
@@ -68,6 +68,7 @@ class Sticks:
     radius   of the soles' arcs, m; the feet are their lowest points
     head     (samples, 2), the torso's centre of mass; None without a torso
     ground   as `ground_levels` says
+    pushes   whether the trailing foot pushes off as the other one lands
     """
 
     time: Array
@@ -80,6 +81,13 @@ class Sticks:
     radius: float = 0.0
     head: Array | None = None
     ground: tuple[Array, Array] | None = None
+    pushes: bool = False
+
+    def pushing(self, time: float) -> int | None:
+        """The leg that pushes off at a time (s), for as long as an eye sees it; None if none does."""
+        step = int(np.searchsorted(self.strikes, time, side="right")) - 1
+        late = step < 0 or time - self.strikes[step] > SEEN_S
+        return None if late or not self.pushes else 1 - step % 2
 
     @property
     def top(self) -> Array:
@@ -151,10 +159,12 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
     ground = ground_levels(steps)
+    pushes = asked["push_off"]["impulse_N_s"] != 0.0
     landings = np.append(0.0, steps["touch_along_m"])
     landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head, ground
+        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head, ground,
+        pushes,
     )  # fmt: skip
 
 
@@ -307,6 +317,8 @@ FIGURE_2, FIGURE_6 = (
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
+SEEN_S, PUSH_SHARE = 0.08, 0.3
+"""How long a push-off is seen in a film, and how long it is drawn, in parts of the leg."""
 FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
 """Of a picture, in and pixels per in: both sides are even, as video formats want them."""
 OF_STAGE: dict[str, Illustration] = {RIGID_STAGE: FIGURE_2, CONTACT_STAGE: FIGURE_6}
@@ -343,11 +355,17 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
         looks += [{"color": look.colour} for look in LEGS] * sticks.has_soles + [{"color": BLACK}]
         parts = [axes.plot([], [], **look, linewidth=2.2)[0] for look in looks[: len(lines)]]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
+        (push,) = axes.plot([], [], color=PURPLE, linewidth=5.0, solid_capstyle="round", zorder=9)
         clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
         for time, places in zip(at, shown, strict=True):
             for line, joint in zip(parts, np.split(places, ends), strict=True):
                 line.set_data(*joint.T)
             hip.set_data(*places[:1].T)
+            leg = sticks.pushing(float(time))
+            own = np.split(places, ends)[leg or 0]
+            push.set_data(
+                *np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1]))).T if leg is not None else ([], [])
+            )
             clock.set_text(f"{time:.2f} s")
             canvas.draw()  # type: ignore[no-untyped-call]
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

@@ -134,6 +134,7 @@ class Walker:
     track     its motion, thinned
     strikes   times of its heel strikes, s
     stills    postures, each a line through its joints in mm along and below the slope
+    pushes    whether the trailing foot pushes off as the other one lands
     """
 
     name: str
@@ -142,6 +143,7 @@ class Walker:
     strikes: tuple[float, ...]
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
+    pushes: bool = False
 
     @property
     def meta(self) -> dict[str, object]:
@@ -149,6 +151,7 @@ class Walker:
         channels, samples = tuple(self.track.channels), int(self.track["t"].size)
         return {
             "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
+            "pushes": self.pushes,
         }  # fmt: skip
 
 

@@ -108,6 +108,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     period = np.concatenate([branch["step_period"].ravel() for branch in branches])
     across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
+    pushes = results.config.push_off.impulse_N_s != 0.0
     gap, unit = GAP * sampling_gap(results.config), summary["unit"]
     marks = []
     for branch, place, motion in moving:
@@ -117,7 +118,7 @@ def gait_diagram(results: Results) -> Diagram | None:
         if track is not None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
-            walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), ())
+            walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
             marks.append(GaitMark(across.place(x), up.place(y), name, stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
     return Diagram(

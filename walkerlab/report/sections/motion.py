@@ -66,6 +66,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
         ends="" if summary["outcome"] == WALKED else ends(summary["outcome"]),
+        pushes=results.config.push_off.impulse_N_s != 0.0,
     )
 
 

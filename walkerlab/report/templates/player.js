@@ -34,6 +34,12 @@ class Track {
     this.row = low;
     this.share = t[high] > t[low] ? clamp((time - t[low]) / (t[high] - t[low]), 0, 1) : 0;
     this.over = time > this.end + 1e-6;
+    this.time = time;
+  }
+  // The leg that pushes off, for as long as an eye sees it; -1 if none does.
+  get pushing() {
+    const step = this.strikes.findLastIndex((strike) => strike <= this.time);
+    return this.pushes && step >= 0 && this.time - this.strikes[step] < 0.08 ? 1 - (step % 2) : -1;
   }
   at(name) {
     const values = this.all[name];
@@ -185,6 +191,13 @@ function drawWalker(picture, scene, track, colours, scale, index) {
     c.rotate(scene.slope_rad);
     force(c, scene, track, leg, 0, 0, 0.3 * scale * scene.leg_m, 0.8 * scale * scene.leg_m);
     c.restore();
+  }
+  const leg = track.pushing;
+  if (leg >= 0) {
+    const [[x, y], [hx, hy]] = [joint(`f${leg}`), joint("h")];
+    c.strokeStyle = colours.bad;
+    c.lineWidth = 5;
+    arrow(c, x, y, 0.3 * (hx - x), 0.3 * (hy - y));
   }
   c.globalAlpha = 1;
 }
