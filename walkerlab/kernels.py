@@ -162,7 +162,7 @@ def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     return chosen
 
 
-class Reference(types.Type):
+class ByAddress(types.Type):
     """Numba's type of a NamedTuple that is handed on by its address: see `by_reference`."""
 
     def __init__(self, held: Any) -> None:
@@ -183,34 +183,34 @@ def by_reference(chosen: C) -> C:
     goes into taking them apart and together.
     """
 
-    def reference(value: Any, asked: Any) -> Reference:
-        return Reference(types.containers.BaseTuple.from_types([typeof_impl(field, asked) for field in value], chosen))
+    def reference(value: Any, asked: Any) -> ByAddress:
+        return ByAddress(types.containers.BaseTuple.from_types([typeof_impl(field, asked) for field in value], chosen))
 
     typeof_impl.register(chosen)(reference)
     return chosen
 
 
-@register_model(Reference)
+@register_model(ByAddress)
 class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Reference) -> None:
+    def __init__(self, manager: Any, kind: ByAddress) -> None:
         super().__init__(manager, kind, manager.lookup(kind.held).get_value_type().as_pointer())
 
 
 @infer_getattr
 class _ReferencedFields(AttributeTemplate):  # type: ignore[misc]
-    key = Reference
+    key = ByAddress
 
-    def generic_resolve(self, kind: Reference, name: str) -> Any:
+    def generic_resolve(self, kind: ByAddress, name: str) -> Any:
         return kind.held[kind.held.fields.index(name)] if name in kind.held.fields else None
 
 
-@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
-def _load_field(_context: Any, builder: Any, kind: Reference, value: Any, name: str) -> Any:
+@lower_getattr_generic(ByAddress)  # type: ignore[untyped-decorator]
+def _load_field(_context: Any, builder: Any, kind: ByAddress, value: Any, name: str) -> Any:
     return builder.load(cgutils.gep_inbounds(builder, value, 0, kind.held.fields.index(name)))
 
 
-@unbox(Reference)  # type: ignore[untyped-decorator]
-def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
+@unbox(ByAddress)  # type: ignore[untyped-decorator]
+def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
     held = c.unbox(kind.held, value)
     return NativeValue(cgutils.alloca_once_value(c.builder, held.value), held.is_error, held.cleanup)
 

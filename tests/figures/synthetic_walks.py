@@ -111,7 +111,7 @@ def ground(step, time, period):
     load[np.arange(time.size), 1 - step % 2] = WEIGHT
     begun = np.searchsorted(period * np.arange(1, steps_of(step) + 1), time, side="left").astype(float)
     gone = {"dissipated_damping_J": begun, "dissipated_friction_J": 0.1 * begun, "lost_at_edges_J": 0.0 * begun}
-    gone["book_mechanical_J"] = 150.0 - 1.1 * begun
+    gone["total_energy_J"] = 150.0 - 1.1 * begun
     energies = {name: Variable(values, ("time",), "J", name) for name, values in gone.items()}
     return over_time(normal_force_N=load, friction_force_N=0.2 * load) | energies
 

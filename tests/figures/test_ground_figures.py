@@ -45,6 +45,6 @@ def test_bars_stand_on_one_another():
 
 
 def test_what_was_not_stored_is_not_drawn():
-    results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "book_mechanical_J")})
+    results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "total_energy_J")})
     assert FORCES.why_left_out(results, {}) == "contact-sim: 'forces' is not among the config's outputs"
     assert LOST.why_left_out(results, {}) == "contact-sim: 'energies' is not among the config's outputs"

@@ -148,7 +148,7 @@ def test_books_balance_at_every_sample_and_only_lose(paper):
     lost = sum(trajectory[name] for name in channels)
     for name in channels:
         assert np.diff(trajectory[name]).min() >= -1e-9
-    book = trajectory["book_mechanical_J"]
+    book = trajectory["total_energy_J"]
     np.testing.assert_allclose(trajectory["residual_J"], book + lost - book[0], atol=1e-12)
     assert np.abs(trajectory["residual_J"]).max() < 1e-4  # read between the solver's steps
     total = paper.summary["dissipated_J"]

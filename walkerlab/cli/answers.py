@@ -29,7 +29,7 @@ SHOWN = 6
 def answer(stage: str, summary: Summary) -> list[str]:
     """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short.
 
-    No lines for a stage that came to nothing: that is told as an error.
+    No lines for a stage without a result: that is told as an error.
     """
     if not summary:
         return []

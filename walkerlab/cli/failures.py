@@ -34,7 +34,7 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def print_failed(error: WalkerlabError) -> None:
-        """With `--json`, the object of a command that came to nothing: the keys there always are, and the error."""
+        """With `--json`, the object of a command that failed: the keys there always are, and the error."""
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}

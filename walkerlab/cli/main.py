@@ -17,14 +17,13 @@ from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
 from walkerlab.stages.graph import PIPELINE, Graph, Stage
 
-# thresholds of the garbage collector: what a command loads stays, and at the usual ones it is searched again and again
-SELDOM = (300_000, 50, 100)
-
 
 def main() -> None:
     """Run the program on this process's arguments, and exit with its code."""
-    gc.set_threshold(*SELDOM)
-    atexit.register(gc.freeze)  # else a sixth of a second goes into collecting what ends with the process
+    # What a command loads stays to its end: to look for garbage in it, again and again and then once more, takes longer
+    # than a warm search for gaits.
+    gc.set_threshold(300_000, 50, 100)
+    atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
     def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:

@@ -20,7 +20,7 @@ from walkerlab.cli.console import Console
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
-    from walkerlab.stages.resolve import Asked
+    from walkerlab.stages.resolve import ResolvedRun
     from walkerlab.store.runfolder import RunFolder
 
 F = TypeVar("F", bound=Callable[..., None])
@@ -126,7 +126,7 @@ class Request:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
-    def asked(self) -> "Asked":
+    def asked(self) -> "ResolvedRun":
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
         from walkerlab.stages.resolve import resolve
 

@@ -96,7 +96,7 @@ def series_of(scene: str, results: Results) -> Iterator[Series]:
 def draw_methods(scene: str, results: Results) -> Drawn:
     """Run time on the left, right-hand sides on the right, a line for each method, crosses where it gave up.
 
-    Told: the conclusion, the reference, whether it is measured too, and what did not reach the end.
+    Caption: the conclusion, the reference, whether it is measured too, and what did not reach the end.
     """
     every, summary = list(series_of(scene, results)), results["accuracy"].summary
     reference = summary["reference"][scene]
@@ -165,7 +165,7 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series
 def draw_errors(scene: str, results: Results) -> Drawn:
     """Same law on the left, own law on the right, each with its legend: the same look means something else there.
 
-    Told: the reference, and the conclusion on the same law.
+    Caption: the reference, and the conclusion on the same law.
     """
     figure = blank(4.6)
     panels = (
@@ -204,7 +204,7 @@ def draw_engine(axes: Axes, one: Series, cost: str, values: Array) -> None:
 def draw_periods(scene: str, results: Results) -> Drawn:
     """Period of the last step over step size, own contact, with ADAMS's law and the rigid gait as levels.
 
-    Told: the conclusion, and the steps of what did not walk to the end.
+    Caption: the conclusion, and the steps of what did not walk to the end.
     """
     figure = blank(4.2)
     axes = figure.subplots()
@@ -241,7 +241,7 @@ LEAST = 1e-14
 def draw_limit(results: Results) -> Drawn:
     """Errors over run time, one setting a point, from the config's contact to the most rigid one.
 
-    Told: what both amount to, with point feet besides, and the paper's claim.
+    Caption: what both amount to, with point feet besides, and the paper's claim.
     """
     figure, of_the_paper = blank(3.6), redoes_the_paper(results)
     # feet that roll in both models too are not made points as well

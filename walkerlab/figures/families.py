@@ -153,7 +153,7 @@ BETWEEN: Final = 16
 def draw_branches(results: Results) -> Drawn:
     """Both quantities over the whole span on the left, over the part with bifurcations on the right if there are some.
 
-    Told: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
+    Caption: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
     """
     figure, summary = blank(5.6), results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
@@ -258,7 +258,7 @@ FARTHEST: Final = 1.6
 def draw_multipliers(results: Results) -> Drawn:
     """The complex plane on the left, magnitudes over the parameter on the right, a colour for each gait of one step.
 
-    Told: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
+    Caption: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
     """
     figure, largest = blank(3.6), 0.0
     left, right = figure.subplots(1, 2)
@@ -303,7 +303,7 @@ OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 def draw_plane(results: Results) -> Drawn:
     """Regions by what walks settle on, and every curve over them, by model, kind and period.
 
-    Told: what the curves divide, and how much of the plane settles on what.
+    Caption: what the curves divide, and how much of the plane settles on what.
     """
     figure = blank(4.4)
     axes = figure.subplots()

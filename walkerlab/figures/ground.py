@@ -23,7 +23,7 @@ from walkerlab.figures.walks import (
 
 NORMAL, FRICTION = "normal_force_N", "friction_force_N"
 FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
-TOTAL: Final = "book_mechanical_J"
+TOTAL: Final = "total_energy_J"
 LOST: Final = {
     "dissipated_damping_J": ("damping of the ground", BLUE),
     "dissipated_friction_J": ("friction", ORANGE),
@@ -42,7 +42,7 @@ NOTHING: Final = 1e-3
 def draw_forces(results: Results) -> Drawn:
     """Both forces in time on the left, one against the other on the right.
 
-    Told: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
+    Caption: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
     """
     result = results[CONTACT_STAGE]
     whole = walk_of(result, CONTACT)
@@ -98,7 +98,7 @@ def losses(walk: Walk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """A bar for each step, its causes on one another; told: how much a step loses (J), and to what."""
+    """A bar for each step, its causes on one another; caption: how much a step loses (J), and to what."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure = blank(2.9)
     axes = figure.subplots()

@@ -113,9 +113,9 @@ class Illustration:
     def drawn(self, results: Results) -> Drawing:
         """Its files and words; the same results give the same bytes."""
         with styled():
-            figure, told = self.draw(results)
+            figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
-        return Drawing(svg, png, self.title, self.say("caption", *told))
+        return Drawing(svg, png, self.title, self.say("caption", *caption_values))
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
         """The figure in a format, of a width in pt; what it has of pixels has so many an inch."""

@@ -84,7 +84,7 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 def draw_starts(results: Results) -> Drawn:
     """Both models' maps on the same axes, outcome as colour, lines where more steps are walked.
 
-    Told: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
+    Caption: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
     """
     cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
     across, up = cells[SWING], cells[STANCE]
@@ -129,7 +129,7 @@ NO_ATTRACTOR: Final = -1
 def draw_basins(results: Results) -> Drawn:
     """Attractors and failures by colour on the left, steps to settle by brightness on the right.
 
-    Told: what is walked, how much of the window walks, and to which attractors.
+    Caption: what is walked, how much of the window walks, and to which attractors.
     """
     summary, cells = results[BASIN].summary, results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
@@ -253,7 +253,7 @@ class OverStiffness:
 
 
 def draw_stiction(results: Results) -> Drawn:
-    """Outcome on the left, error on the right; told: what is walked, and how many cells come out how."""
+    """Outcome on the left, error on the right; caption: what is walked, and how many cells come out how."""
     cells = results[MAPS]["stiction"]
     made = OverStiffness.of(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
@@ -272,7 +272,7 @@ def draw_stiction(results: Results) -> Drawn:
 
 
 def draw_step(results: Results) -> Drawn:
-    """Verdict on the left, error on the right; told: what is walked, and how many cells come out how."""
+    """Verdict on the left, error on the right; caption: what is walked, and how many cells come out how."""
     cells = results[MAPS]["step"]
     names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
     made = OverStiffness.of(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))

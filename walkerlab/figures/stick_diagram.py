@@ -291,8 +291,8 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 def draw_cycle(stage: str, results: Results) -> Drawn:
     """A model's walker on its pads, or on its plane.
 
-    Told: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of the
-    contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
+    Caption: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of
+    the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
     """
     result = results[stage]
     sticks, pads = sticks_of(result), result.groups.get("terrain")
@@ -300,11 +300,11 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
     strikes = sticks.strikes[:CYCLE]
     steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1, 0]), strict=True)
-    told = list(steps), strikes.size == CYCLE, sticks.head is not None
+    caption_values = list(steps), strikes.size == CYCLE, sticks.head is not None
     if stage == RIGID_STAGE:
-        return figure, told
+        return figure, caption_values
     pitch = None if pads is None else result.summary["pitch_m"]
-    return figure, (*told, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
+    return figure, (*caption_values, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
 
 
 FIGURE_2, FIGURE_6 = (

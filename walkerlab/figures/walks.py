@@ -187,8 +187,8 @@ def redoes_the_procedure(results: Results) -> bool:
 def draw_adjusted(results: Results) -> Drawn:
     """The rigid model from its start, the contact model from the adjusted one, a row for each link.
 
-    It is called as in the paper if the walker is its compass, else by what it does first. Told: what the start was, how
-    much is shown, and whether there are links.
+    It is called as in the paper if the walker is its compass, else by what it does first. Caption: what the start was,
+    how much is shown, and whether there are links.
     """
     result, named = results[TUNE_STAGE], redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
@@ -215,7 +215,7 @@ STATES_IN_TIME = (
 def draw_states(results: Results) -> Drawn:
     """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker.
 
-    Told: how much is shown, and how the walks went.
+    Caption: how much is shown, and how the walks went.
     """
     walks, extent = shown(walks_with(results, STATES))
     first = walks[0]
@@ -253,7 +253,7 @@ ALIGNED_ERRORS = Need(
 def draw_differences(results: Results) -> Drawn:
     """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
 
-    Told: the largest errors of all that was compared, in both ways, and the paper's.
+    Caption: the largest errors of all that was compared, in both ways, and the paper's.
     """
     (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
@@ -276,11 +276,11 @@ def draw_differences(results: Results) -> Drawn:
         one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
-    told = []
+    caption_values = []
     for _, words, name, _ in QUANTITIES:
         at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
-        told.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
-    return figure, (told, ANGLE_ERROR.text if of_the_paper else "")
+        caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
+    return figure, (caption_values, ANGLE_ERROR.text if of_the_paper else "")
 
 
 CYCLES = 20
@@ -293,7 +293,7 @@ ARROW_LENGTH = 0.06
 
 
 def draw_cycles(results: Results) -> Drawn:
-    """A phase plane for each leg, both on the same scales; told: how much is shown, and how the walks went."""
+    """A phase plane for each leg, both on the same scales; caption: how much is shown, and how the walks went."""
     walks, extent = shown(walks_with(results, STATES), CYCLES)
     figure = blank(4.2)
     axes = list(figure.subplots(1, 2, sharex=True, sharey=True))
@@ -361,8 +361,8 @@ FEW = 0.005
 def draw_energies(results: Results) -> Drawn:
     """A row for each energy.
 
-    Told: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are impacts,
-    and how the walks went.
+    Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
+    impacts, and how the walks went.
     """
     walks, extent = shown(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)

@@ -53,7 +53,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
     tree, members = tree_about(assembly, root), places.members
     A, B = (members.T @ pairs @ members for pairs in (tree.A, tree.B))
-    picked = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
+    section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**torso, **knees}
     reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
     shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
@@ -67,8 +67,8 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
         foot_y=to_foot[:, 1],
         E=reductions,
         roles=places.roles,
-        section=[*picked, *[0] * (n + 1 - len(picked))],
-        coordinates=len(picked),
+        section=[*section_indices, *[0] * (n + 1 - len(section_indices))],
+        coordinates=len(section_indices),
         thigh=thigh,
         shank=shank,
         mass=tree.mass,

@@ -115,8 +115,8 @@ def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | Non
     # z z' summed over all steps: X = A X A' + B B'
     d = len(B)
     summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
-    carried = np.einsum("ij,jk,ik->i", C, summed, C)
-    return np.asarray(np.sqrt((D**2).sum(axis=0) + np.maximum(carried, 0.0)))
+    later = np.einsum("ij,jk,ik->i", C, summed, C)
+    return np.asarray(np.sqrt((D**2).sum(axis=0) + np.maximum(later, 0.0)))
 
 
 @dataclass(frozen=True)

@@ -51,17 +51,17 @@ class AdamsStart:
 class AdamsWalk:
     """The walk of the contact model from there, and what explains it.
 
-    rigid           the same start in the rigid model, both feet on the config's slope
-    airborne_from   s, from when on no foot of the contact model is in contact; None if one always is
-    carried_later   N, the most that the contact model's ground carries once the rigid one's would have to pull
-    normal          (samples, leg) N, normal forces of the contact model
-    mechanical      (samples,) J, kinetic and potential energy of the contact model
+    rigid               the same start in the rigid model, both feet on the config's slope
+    airborne_from       s, from when on no foot of the contact model is in contact; None if one always is
+    later_normal_force  N, the most that the contact model's ground carries once the rigid one's would have to pull
+    normal              (samples, leg) N, normal forces of the contact model
+    mechanical          (samples,) J, kinetic and potential energy of the contact model
     """
 
     rigid: AdamsStart
     walk: ContactWalkResult
     airborne_from: float | None
-    carried_later: float | None
+    later_normal_force: float | None
     normal: NDArray[np.float64]
     mechanical: NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
         rigid=rigid,
         walk=result,
         airborne_from=float(airborne[0]) if airborne.size else None,
-        carried_later=float(later.max()) if later.size else None,
+        later_normal_force=float(later.max()) if later.size else None,
         normal=normal,
         mechanical=mechanical,
     )

@@ -235,7 +235,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         kinetic_J=kinetic,
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,
-        book_mechanical_J=total,
+        total_energy_J=total,
         dissipated_damping_J=lost[:, 0],
         dissipated_friction_J=lost[:, 1],
         lost_at_edges_J=lost[:, 2],

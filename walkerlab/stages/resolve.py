@@ -19,7 +19,7 @@ SUFFIX = ".h5"
 
 
 @dataclass(frozen=True)
-class Asked:
+class ResolvedRun:
     """A config, ready to be varied, and its run folder."""
 
     loaded: LoadedConfig
@@ -32,7 +32,7 @@ def resolve(
     strides: int | None = None,
     runs: Path = Path("runs"),
     name: str | None = None,
-) -> Asked:
+) -> ResolvedRun:
     """What `--config` names: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
 
     text     looked for in that order; None is the built-in paper config
@@ -55,7 +55,7 @@ def resolve(
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
-    return Asked(read, RunFolder(runs, read.run_name, source))
+    return ResolvedRun(read, RunFolder(runs, read.run_name, source))
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:

@@ -62,13 +62,13 @@ OVER_TIME: Final = {
     "kinetic_J": Label("J", "kinetic energy"),
     "potential_J": Label("J", "potential energy, zero at the step's foothold"),
     "mechanical_J": Label("J", "kinetic, potential (zero at the step's foothold) and elastic energy"),
-    "book_mechanical_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
+    "total_energy_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
     "dissipated_damping_J": Label("J", "dissipated in normal direction so far"),
     "dissipated_friction_J": Label("J", "dissipated in friction so far"),
     "lost_at_edges_J": Label("J", "elastic energy lost at pads' edges so far"),
     "push_off_J": Label("J", "given by the push-off so far"),
     "hip_J": Label("J", "given by torque and damper of the hip so far"),
-    "residual_J": Label("J", "book energy plus what was lost less what was given, less the start's"),
+    "residual_J": Label("J", "total energy plus what was lost less what was given, less the start's"),
 }
 OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
 """What the numbers of outcomes on a map mean."""

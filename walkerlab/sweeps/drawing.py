@@ -20,7 +20,7 @@ from walkerlab.report.words import words
 from walkerlab.store.content import Group
 from walkerlab.store.files import make_folder, write_atomically
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.question import Question
+from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.sweep import Swept
 
 PAGE = "sweep.html"
@@ -124,7 +124,7 @@ def spoken(values: Sequence[object]) -> str:
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
-def rows(group: Group, question: Question, shown: Sequence[str]) -> list[tuple[Any, ...]]:
+def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple[Any, ...]]:
     """The first points: parameters, numbers, outcome, and the reason where there is no answer."""
     count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]

@@ -51,7 +51,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Question:
+class SweptStage:
     """A stage over parameters.
 
     names   of the parameters in results: the last part of the key, with more parts where two would be the same
@@ -120,7 +120,7 @@ def asked(
     zip: bool = False,
     sample: str = "",
     seed: int = 1,
-) -> Question:
+) -> SweptStage:
     """The question of command-line options or of a `sweep` block.
 
     over    for each parameter its key, its values (a list, or FROM:TO:N), and where that stands
@@ -134,14 +134,14 @@ def asked(
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
         raise refused(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
-        return Question(stage, sampled(axes, sample, seed), "list")
+        return SweptStage(stage, sampled(axes, sample, seed), "list")
     for one in axes:
         if not one.values:
             raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
     if zip and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refused(None, f"--zip: the parameters have different numbers of values: {lengths}")
-    question = Question(stage, axes, "list" if zip else "grid")
+    question = SweptStage(stage, axes, "list" if zip else "grid")
     if len(question) > MAX_POINTS:
         raise refused(None, f"sweep: {len(question)} points", f"up to {MAX_POINTS} in one sweep")
     return question

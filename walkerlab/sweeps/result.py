@@ -16,7 +16,7 @@ from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.sweeps.chunk import Chunk
 from walkerlab.sweeps.columns import Columns
-from walkerlab.sweeps.question import Question, described
+from walkerlab.sweeps.question import SweptStage, described
 
 CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
@@ -52,7 +52,7 @@ class Merge:
         assert texts is not None, "a sweep has results"
         return texts[inverse]
 
-    def content(self, question: Question, config: Config, inverse: NDArray[np.int64]) -> InTurn:
+    def content(self, question: SweptStage, config: Config, inverse: NDArray[np.int64]) -> InTurn:
         """What is stored of the sweep; to be asked for once.
 
         config   the one that is varied
@@ -76,7 +76,7 @@ class Merge:
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
         return InTurn(summary, attrs, scales, self._variables(question, parameters, inverse), self.columns.size_bytes)
 
-    def endings(self, question: Question, config: Config, inverse: NDArray[np.int64]) -> list[dict[str, Any]]:
+    def endings(self, question: SweptStage, config: Config, inverse: NDArray[np.int64]) -> list[dict[str, Any]]:
         """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
         outcomes = self.of("outcome", inverse)
         pads, pitch = None, self.columns.of("pitch_m")
@@ -90,7 +90,7 @@ class Merge:
         return endings(counted(outcomes), config, question.stage == CONTACT, pads)
 
     def _variables(
-        self, question: Question, parameters: Mapping[str, Variable], inverse: NDArray[np.int64]
+        self, question: SweptStage, parameters: Mapping[str, Variable], inverse: NDArray[np.int64]
     ) -> Iterator[tuple[str, Variable]]:
         """Every variable by name; a number that is a parameter as well is its coordinate."""
         shape, dims = question.shape, question.dims
@@ -131,7 +131,7 @@ def numerical_error(columns: Columns, inverse: NDArray[np.int64]) -> dict[str, A
     return {"numerical_error": told}
 
 
-def coordinates(question: Question, config: Any) -> Iterable[tuple[str, Variable]]:
+def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variable]]:
     """The parameters as variables."""
     for name, axis in zip(question.names, question.axes, strict=True):
         unit, text = described(config, axis.key)
@@ -148,7 +148,7 @@ def counted(texts: NDArray[Any]) -> dict[str, int]:
     return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
 
 
-def as_csv(content: Content, question: Question, every: bool = False) -> str:
+def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     """A table with a row for each point: its parameters, how it ended, and the stage's headline numbers.
 
     every  all numbers and texts instead; lists take columns

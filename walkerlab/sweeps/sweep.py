@@ -29,7 +29,7 @@ from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.chunk import Chunk, PointResult, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.fan_out import FanOut
-from walkerlab.sweeps.question import Question
+from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.result import Merge
 
 PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
@@ -68,7 +68,7 @@ class Swept:
     bugs     tracebacks of bugs that stopped points
     """
 
-    question: Question
+    question: SweptStage
     path: Path
     summary: Mapping[str, Any]
     reused: int
@@ -129,7 +129,7 @@ class Foreseen:
 class SweepRun:
     """One question, its points checked."""
 
-    def __init__(self, question: Question, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
+    def __init__(self, question: SweptStage, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
         """Check every point by the schema.
 
         Raises ConfigError for points that are no configs and for a stage that has no result without files.

@@ -224,11 +224,11 @@ def painleve_growth_rate() -> float:
     rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
     rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
     run = run_until(rod, state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
-    picked = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
-    picked = picked[0] + (picked[1] - picked[0]) * np.arange(4)
-    picked = picked[picked < run.times.size]
-    tau = float(run.times[picked[1]] - run.times[picked[0]])
-    first, middle, last = np.diff([-one_foot_motion(rod.whole, 0, run.states[index]).height for index in picked])
+    samples = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
+    samples = samples[0] + (samples[1] - samples[0]) * np.arange(4)
+    samples = samples[samples < run.times.size]
+    tau = float(run.times[samples[1]] - run.times[samples[0]])
+    first, middle, last = np.diff([-one_foot_motion(rod.whole, 0, run.states[index]).height for index in samples])
     return math.acosh(0.5 * (last + first) / middle) / tau
 
 

@@ -112,13 +112,13 @@ class RuleFollower:
         happened = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1)
         happened = happened or not (left0 <= y0 < right0 and left1 <= y1 < right1)
         if happened:
-            self._let_happen(time_s, before, now, q, v)
+            self._apply_events(time_s, before, now, q, v)
         self._feet, self.time_s = now, time_s
         self._judge(now, q, v)
         return happened
 
-    def _let_happen(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
-        """Let everything happen that lies between two states."""
+    def _apply_events(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
+        """Apply every event between two states."""
         walk_state, terrain, form = self.walk_state, self.scene.ground.terrain, self.scene.ours.whole
         for foot in range(2) if terrain.has_pads else ():
             cell = cell_at(terrain, foot, now[foot].along)
