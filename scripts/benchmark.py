@@ -44,13 +44,13 @@ from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import Cycle, gait_near
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.runner import Options, execute
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
 from walkerlab.stages.accuracy import OFF_THE_GAIT
 from walkerlab.stages.continuation import FamilyQuestion, search_of
-from walkerlab.stages.progress import Silent
-from walkerlab.stages.runner import Options, execute
 from walkerlab.stages.tune import MAP_RTOL
 from walkerlab.store.runfolder import RunFolder
 

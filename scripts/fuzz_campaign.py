@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.errors import WalkerlabError
-from walkerlab.stages.runner import Options, execute
+from walkerlab.pipeline.runner import Options, execute
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 

@@ -20,10 +20,10 @@ from statistics import median
 
 from walkerlab.config import loader
 from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
 from walkerlab.store.key import Identity
 from walkerlab.store.provenance import Provenance, begin
@@ -119,7 +119,7 @@ def outputs(*names: str) -> str:
 def reductions() -> list[Reduction]:
     """Every reduction there is, and one that there is not."""
     whole, none = contact(), contact(outputs())
-    import_stage = "import walkerlab.stages.{}, walkerlab.stages.runner"
+    import_stage = "import walkerlab.stages.{}, walkerlab.pipeline.runner"
     walking, drawing = import_stage.format("simulate"), import_stage.format("plot")
     return [
         Reduction(

@@ -31,8 +31,8 @@ from typing import Any
 
 from walkerlab.config.loader import load
 from walkerlab.config.reference import as_text
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.runner import execute
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.runner import execute
 from walkerlab.store.runfolder import RunFolder
 
 ROOT = Path(__file__).parent.parent

@@ -18,6 +18,7 @@ LAYERS = (
     "explorer",
     "sweeps",
     "stages",
+    "pipeline",
     "report",
     "figures",
     "store",

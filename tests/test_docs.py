@@ -20,7 +20,7 @@ import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
 from walkerlab.figures import illustration
-from walkerlab.stages.graph import PIPELINE, Stage, results_of
+from walkerlab.pipeline.graph import PIPELINE, Stage, results_of
 from walkerlab.store.content import Content, Group, Variable
 
 ROOT = Path(__file__).parent.parent

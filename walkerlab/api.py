@@ -21,11 +21,11 @@ from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import on_the_slope, typed
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.in_memory import InMemory, Keys
-from walkerlab.stages.resolve import resolve
-from walkerlab.stages.runner import Options, execute
-from walkerlab.stages.runs import config_of, headline_values, result_in, run_named
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged
 from walkerlab.store.content import Content, Group

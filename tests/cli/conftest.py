@@ -13,7 +13,7 @@ from forks import forks
 
 import walkerlab
 
-TOY = Path(__file__).parent.parent / "stages" / "toy"
+TOY = Path(__file__).parent.parent / "pipeline" / "toy"
 ROOT = Path(walkerlab.__file__).parent.parent
 
 

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import walkerlab
 from walkerlab.cli.main import program
-from walkerlab.stages.graph import STAGES
+from walkerlab.pipeline.graph import STAGES
 
 HEAVY = (
     "numpy",

@@ -69,7 +69,7 @@ def test_the_report_has_its_shares_and_attractors():
 
 @pytest.mark.parametrize("stage", ["plot", "report"])
 def test_drawings_take_it_in_once_it_is_there(stage):
-    from walkerlab.stages.graph import PIPELINE
+    from walkerlab.pipeline.graph import PIPELINE
 
     assert "basin" in PIPELINE[stage].if_current
 

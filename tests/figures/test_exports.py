@@ -21,10 +21,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.figures import illustration
 from walkerlab.figures.style import WIDTH
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.report.tables import in_tex
 from walkerlab.stages import plot
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin

@@ -15,9 +15,9 @@ from walkerlab.orbits.contact_gait import find_gait_from
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.scaled_starts import scaled_starts
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.contact import start_state
 from walkerlab.stages import contact_sim
-from walkerlab.stages.progress import Silent
 
 # m, rad, m/s, rad/s: the stance leg upright and the swing leg beside it, somewhere near the gait
 FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])

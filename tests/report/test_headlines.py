@@ -3,9 +3,9 @@
 import pytest
 
 import walkerlab
+from walkerlab.pipeline.graph import STAGES
+from walkerlab.pipeline.runs import headline_values
 from walkerlab.report.headlines import HEADLINES, MOST, headlines
-from walkerlab.stages.graph import STAGES
-from walkerlab.stages.runs import headline_values
 
 
 @pytest.mark.parametrize(

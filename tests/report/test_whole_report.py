@@ -12,11 +12,11 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.figures import illustration
 from walkerlab.figures.style import WIDTH
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.runner import execute
 from walkerlab.report.registry import SECTIONS
 from walkerlab.report.results import Results
 from walkerlab.stages import known_problems, stability
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.verification.catalogue import shipped

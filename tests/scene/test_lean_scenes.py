@@ -16,13 +16,13 @@ from walkerlab.ground.friction import Coulomb, Frictionless, switching_count
 from walkerlab.ground.walker import FootMotion, feet_motion, foot_force, on_ground
 from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
 from walkerlab.mechanics.parts import Assembly, Body, Particle
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.runner import Options, execute
 from walkerlab.scene import left_out
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import contact_sim, simulate
-from walkerlab.stages.progress import Silent
-from walkerlab.stages.runner import Options, execute
 from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.6, -0.86)

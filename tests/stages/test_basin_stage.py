@@ -10,10 +10,10 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import basin
 from walkerlab.stages.basin import RigidQuestion
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content
 from walkerlab.store.parts import Parts
 

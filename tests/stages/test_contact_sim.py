@@ -12,9 +12,9 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import contact_sim, simulate
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.stages.walk import numbers_of, of_steps
 from walkerlab.store import artifact
 from walkerlab.store.content import Content

@@ -18,12 +18,12 @@ from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
 from walkerlab.stages.continuation import FamilyQuestion, attractor_summary, ending_rows, first_doubling, sample_again
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 
 
 def config(*sets):

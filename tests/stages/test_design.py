@@ -11,10 +11,10 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits.design import Aim, Point, optima, searched
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages import design, fixedpoint
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 
 # design contract, section 4
 FIXED_KEYS = {

@@ -7,9 +7,9 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import contact_sim, fixedpoint, simulate
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 
 MODULES = {"fixedpoint": fixedpoint, "simulate": simulate, "contact-sim": contact_sim}
 ARC_FOOTED = (

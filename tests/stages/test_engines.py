@@ -12,11 +12,11 @@ from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import engines
 from walkerlab.stages.engines import closest, ratios, three_digits
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.identity import Identities
-from walkerlab.stages.progress import Silent
 from walkerlab.store.key import differences
 
 ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")

@@ -8,9 +8,9 @@ import pytest
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import fixedpoint
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 
 # design contract, section 4
 FIXED_KEYS = {

@@ -8,11 +8,11 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import SolverSettings
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid import recorded_walk
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import contact_sim, simulate
-from walkerlab.stages.graph import PIPELINE
 from walkerlab.stages.numerical_error import LEAST_RTOL, change, tightened
-from walkerlab.stages.progress import Silent
 from walkerlab.store.content import Content
 
 # corrected equations, 0.0174 rad (fixed point of the paper's walker)

@@ -12,9 +12,9 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid import recorded_walk
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import fixedpoint, simulate
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 
 # design contract, section 4
 FIXED_KEYS = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.stages.progress import Silent
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thinned
 
 

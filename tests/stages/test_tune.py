@@ -11,13 +11,13 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
 from walkerlab.orbits.rigid_limit import ALL, NORMAL, ContactFactors, Distance, Extrapolation
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
 from walkerlab.report.words import words
 from walkerlab.stages import fixedpoint, tune
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.stages.tune_limit import LimitFindings, causes
 
 

@@ -13,11 +13,11 @@ import xarray as xr
 from walkerlab.benchmarks.engines import registry
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.in_memory import InMemory, Keys
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.runner import execute
 from walkerlab.stages.numerical_error import SAMPLE
-from walkerlab.stages.plan import Planner
-from walkerlab.stages.runner import execute
 from walkerlab.store import artifact
 from walkerlab.store.content import untimed
 from walkerlab.store.files import refused

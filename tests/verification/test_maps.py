@@ -6,9 +6,9 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import stability_maps
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Silent
 from walkerlab.store.parts import Parts
 from walkerlab.verification.maps import (
     NONE,

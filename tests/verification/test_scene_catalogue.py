@@ -10,10 +10,10 @@ from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import STANCE, kinetic_energy
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Identities
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.identity import Identities
 from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.judge import CaseCell

@@ -13,11 +13,11 @@ from walkerlab.config.problems import nearest
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.report.numbers import listed
 from walkerlab.report.tables import Table, as_csv, as_tex, csv_text, of_records
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import Planner
-from walkerlab.stages.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.store.artifact import Stored
 from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder

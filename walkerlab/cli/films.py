@@ -11,8 +11,8 @@ from typing import Any
 from walkerlab.cli.console import Console
 from walkerlab.cli.exports import STORED_WITH, Target, put
 from walkerlab.errors import ConfigError, StaleError, StorageError
+from walkerlab.pipeline.runs import result_in
 from walkerlab.report.outcomes import MODELS
-from walkerlab.stages.runs import result_in
 from walkerlab.store.runfolder import RunFolder
 
 KINDS = ("gif", "mp4")

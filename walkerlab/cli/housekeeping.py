@@ -7,7 +7,7 @@ import typer
 
 from walkerlab.cli.failures import exit_on_failure, print_json
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
-from walkerlab.stages.graph import Graph
+from walkerlab.pipeline.graph import Graph
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
@@ -46,7 +46,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter("one run at a time", param_hint="RUN")
         with exit_on_failure(stage, replace(request, config=runs[0]) if runs else request) as asked:
             from walkerlab.cli.show import print_stored
-            from walkerlab.stages.runs import run_named
+            from walkerlab.pipeline.runs import run_named
 
             of_run = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
             print_stored(of_run, graph, stage)

@@ -7,7 +7,7 @@ import typer
 
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_TALK, Request, command
-from walkerlab.stages.graph import Graph
+from walkerlab.pipeline.graph import Graph
 
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
@@ -52,7 +52,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Show a run's page in the browser."""
         with exit_on_failure("open", request):
             from walkerlab.errors import StaleError
-            from walkerlab.stages.runs import run_named
+            from walkerlab.pipeline.runs import run_named
 
             folder = run_named(run, request.runs)
             page = (folder.path / "report.html").resolve()
@@ -93,7 +93,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("export", request):
             from walkerlab.cli.exports import COLUMNS, Target, export_from
             from walkerlab.cli.films import walk_in
-            from walkerlab.stages.runs import run_named
+            from walkerlab.pipeline.runs import run_named
 
             folder, points = run_named(run, request.runs), width or COLUMNS[columns]
             whose = walk_in(folder, model)
@@ -151,7 +151,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         with exit_on_failure("animate", request):
             from walkerlab.cli.exports import Target
             from walkerlab.cli.films import Film, walk_in, write_film
-            from walkerlab.stages.runs import run_named
+            from walkerlab.pipeline.runs import run_named
 
             folder = run_named(run, request.runs)
             film = Film(walk_in(folder, model), steps, rate, slower)

@@ -15,7 +15,7 @@ from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
-from walkerlab.stages.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from walkerlab.cli.console import Console
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
-    from walkerlab.stages.resolve import ResolvedRun
+    from walkerlab.pipeline.resolve import ResolvedRun
     from walkerlab.store.runfolder import RunFolder
 
 F = TypeVar("F", bound=Callable[..., None])
@@ -128,7 +128,7 @@ class Request:
     @cached_property
     def asked(self) -> "ResolvedRun":
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
-        from walkerlab.stages.resolve import resolve
+        from walkerlab.pipeline.resolve import resolve
 
         found = resolve(self.config, self.sets or (), self.strides, self.runs, self.name)
         loaded = found.loaded

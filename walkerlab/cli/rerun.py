@@ -8,8 +8,8 @@ from walkerlab.cli.request import Request
 from walkerlab.config.files import ConfigFile
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.stages.graph import Graph
-from walkerlab.stages.runner import execute
+from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.runner import execute
 from walkerlab.store.artifact import Damaged, read
 from walkerlab.store.runfolder import RunFolder
 

@@ -10,10 +10,10 @@ import typer
 
 from walkerlab.cli.failures import exit_on_failure, print_json
 from walkerlab.cli.request import Request, command
-from walkerlab.stages.graph import Graph
+from walkerlab.pipeline.graph import Graph
 
 if TYPE_CHECKING:
-    from walkerlab.stages.runs import Pair, RunDifference
+    from walkerlab.pipeline.runs import Pair, RunDifference
     from walkerlab.store.runfolder import RunFolder
 
 SAME = 1e-12
@@ -38,7 +38,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Say how two runs differ: configs, headline numbers with relative change, walks over one another."""
         with exit_on_failure("diff", request):
             from walkerlab.errors import StaleError
-            from walkerlab.stages.runs import config_of, difference, results_in, run_named
+            from walkerlab.pipeline.runs import config_of, difference, results_in, run_named
 
             folders = (run_named(first, request.runs), run_named(second, request.runs))
             names = [stage.name for stage in graph.stages]

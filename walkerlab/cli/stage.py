@@ -17,9 +17,9 @@ from walkerlab.config.layers import setting_of
 from walkerlab.config.loader import load
 from walkerlab.config.writer import extending
 from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.runner import Options, StageReport, execute, told_once
 from walkerlab.report.tables import aligned
-from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.runner import Options, StageReport, execute, told_once
 from walkerlab.store.files import storing
 
 SEARCHING = ("fixedpoint", "report")

@@ -8,10 +8,10 @@ import typer
 from walkerlab.cli.failures import described, print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.errors import StaleError
+from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.plan import UP_TO_DATE, Step, survey
+from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
 from walkerlab.report.tables import aligned
-from walkerlab.stages.graph import Graph
-from walkerlab.stages.plan import UP_TO_DATE, Step, survey
-from walkerlab.stages.runs import RunSummary, config_of, run_named, runs_in
 from walkerlab.store.artifact import NOT_THERE
 
 NOT_CURRENT = ("stale", "missing", "damaged")

@@ -14,7 +14,7 @@ import typer
 from walkerlab.cli.failures import described, exit_on_failure, print_json, say
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
 from walkerlab.cli.text import paragraph
-from walkerlab.stages.graph import PIPELINE, Graph
+from walkerlab.pipeline.graph import PIPELINE, Graph
 
 if TYPE_CHECKING:
     from collections.abc import Collection

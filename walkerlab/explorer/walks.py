@@ -14,10 +14,10 @@ from walkerlab.config.schema import Config
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
+from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.resolve import resolve
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
-from walkerlab.stages.in_memory import InMemory, Keys
-from walkerlab.stages.resolve import resolve
 from walkerlab.store.content import Content, Group
 
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}

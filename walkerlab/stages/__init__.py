@@ -1,1 +1,1 @@
-"""The pipeline: what the stages are, in which order they run, and one module for each."""
+"""The stages, one module for each: its question, its answer, and what is stored of it."""

@@ -13,8 +13,8 @@ from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.hybrid.recorded_walk import as_state, with_scaled_rates
 from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content

@@ -36,13 +36,13 @@ from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.pieces import Piece, complete
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
-from walkerlab.stages.pieces import Piece, complete
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts

@@ -31,10 +31,10 @@ from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.rows import NumberVerdict, paper_rows
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.tables import table_1, table_2, table_3
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
 from walkerlab.scene.rigid import compass
 from walkerlab.stages.compared_releases import LEFT_OUT, compare_releases
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import LEG, STEP, TIME, legs, over_time
 from walkerlab.store.columns import numbered, rows_group
 from walkerlab.store.content import Content, Group, Variable

@@ -17,6 +17,7 @@ from walkerlab.hybrid.contact_run import ContactSamples, ContactWalkResult, by_c
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
 from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import (
     ContactScene,
     contact_gait,
@@ -30,7 +31,6 @@ from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, rigid_start, steps_of
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable

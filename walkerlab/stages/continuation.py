@@ -21,13 +21,13 @@ from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import outcome_of
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.endings import causes, without_pads
 from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.family_groups import groups
 from walkerlab.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
-from walkerlab.stages.progress import Progress
 from walkerlab.store.content import Content
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]

@@ -22,9 +22,9 @@ from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.robustness import Scales, Standpoint
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import gait_near, multipliers_of
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.robustness import Subject, contact_subject, section_coordinates
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content

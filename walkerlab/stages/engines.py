@@ -20,8 +20,8 @@ from walkerlab.config.drives import drives_of
 from walkerlab.config.reads import SceneConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress
 from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content

@@ -10,8 +10,8 @@ from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
-from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import printed, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 

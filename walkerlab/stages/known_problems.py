@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from walkerlab.labels import labels_of
-from walkerlab.stages.progress import Progress
+from walkerlab.pipeline.progress import Progress
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 from walkerlab.verification.known import PROBLEMS, Known

@@ -6,9 +6,9 @@ from pathlib import Path
 from walkerlab.config.reads import NamedConfig
 from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.progress import Progress
 from walkerlab.store import artifact, index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

@@ -5,6 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan import STILL_COMPUTED, why_unsuited
+from walkerlab.pipeline.progress import Progress
 from walkerlab.report.blocks import MAIN
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import pictures
@@ -13,9 +16,6 @@ from walkerlab.report.results import Results
 from walkerlab.report.sections.closing import TITLES
 from walkerlab.report.tables import Table
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.stages.graph import PIPELINE
-from walkerlab.stages.plan import STILL_COMPUTED, why_unsuited
-from walkerlab.stages.progress import Progress
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

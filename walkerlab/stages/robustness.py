@@ -35,12 +35,12 @@ from walkerlab.orbits.robustness import (
 from walkerlab.orbits.shooting import EXACT, QUICK, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
+from walkerlab.pipeline.pieces import Piece, complete
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene_on, rigid_walker
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages.pieces import Piece, complete
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import groups as groups_of_walk
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group, Variable

@@ -10,10 +10,10 @@ from walkerlab.config.reads import SimulateConfig
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
 from walkerlab.mechanics.standing import STANCE, energy_at_touch
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import (
     COORDINATE,
     content_of_walk,

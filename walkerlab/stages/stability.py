@@ -8,9 +8,9 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksCo
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_the_papers
 from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.left_out import of_verification
 from walkerlab.stages.contact_sim import scene_on_pads
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content

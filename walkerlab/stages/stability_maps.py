@@ -7,8 +7,8 @@ import numpy as np
 
 from walkerlab.config.reads import MapsConfig
 from walkerlab.outcome import Outcome
-from walkerlab.stages.pieces import complete
-from walkerlab.stages.progress import Progress
+from walkerlab.pipeline.pieces import complete
+from walkerlab.pipeline.progress import Progress
 from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts

@@ -23,6 +23,7 @@ from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
 from walkerlab.paper.printed import TABLE_2
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.left_out import of_adjustment
@@ -31,7 +32,6 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME, scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import numerical_error
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.stages.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.stages.walk import OUTCOMES, TIME, counted, legs, numbers_of, of_steps, over_time, rigid_start

@@ -26,11 +26,11 @@ from walkerlab.orbits.rigid_limit import (
 )
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.paper.printed import ANGLE_ERROR
+from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_drives
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
-from walkerlab.stages.progress import Progress
 from walkerlab.stages.simulate import leg_variables
 from walkerlab.store.columns import columns, printed, rows_group
 from walkerlab.store.content import Group

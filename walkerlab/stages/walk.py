@@ -17,10 +17,10 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import WalkRecord
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
+from walkerlab.pipeline.progress import Progress
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.numerical_error import numerical_error
-from walkerlab.stages.progress import Progress
 from walkerlab.store.columns import labelled, numbered
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.footholds import UNEVEN

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.labels import Label, labels_of
-from walkerlab.stages.graph import Graph
+from walkerlab.pipeline.graph import Graph
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.columns import rows_group
@@ -100,7 +100,7 @@ def compute(task: ChunkTask) -> Chunk:
 @cache
 def worker_at(where: str) -> Any:
     """This process's memory of what points need, kept from chunk to chunk; `where` as in `ChunkTask`."""
-    from walkerlab.stages.in_memory import InMemory
+    from walkerlab.pipeline.in_memory import InMemory
 
     module, _, name = where.partition(":")
     return InMemory(getattr(importlib.import_module(module), name))

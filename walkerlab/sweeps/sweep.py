@@ -15,11 +15,11 @@ from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.problems import SHOWN_PROBLEMS
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
-from walkerlab.stages.graph import PIPELINE, Graph
-from walkerlab.stages.in_memory import Keys
+from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.in_memory import Keys
+from walkerlab.pipeline.progress import Progress, Reporter, Silent
+from walkerlab.pipeline.runs import claim, refuse_another_config
 from walkerlab.stages.numerical_error import SAMPLE, evenly_spread
-from walkerlab.stages.progress import Progress, Reporter, Silent
-from walkerlab.stages.runs import claim, refuse_another_config
 from walkerlab.store import artifact, provenance
 from walkerlab.store.content import Content, Group
 from walkerlab.store.files import make_folder
@@ -32,7 +32,7 @@ from walkerlab.sweeps.fan_out import FanOut
 from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.result import Merge
 
-PIPELINE_AT = "walkerlab.stages.graph:PIPELINE"
+PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
 
 
 @dataclass(frozen=True)

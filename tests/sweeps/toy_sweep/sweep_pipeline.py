@@ -1,6 +1,6 @@
 """The graph."""
 
-from walkerlab.stages.graph import Graph, Stage, results_of
+from walkerlab.pipeline.graph import Graph, Stage, results_of
 
 
 def keys(*names):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from process_table import workers_below
 
-from walkerlab.stages.graph import Graph
-from walkerlab.stages.plan import STILL_COMPUTED
-from walkerlab.stages.runner import Options, any_side_by_side, execute
+from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.plan import STILL_COMPUTED
+from walkerlab.pipeline.runner import Options, any_side_by_side, execute
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerDiedError
 

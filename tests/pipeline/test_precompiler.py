@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.stages import runner
-from walkerlab.stages.graph import PIPELINE, Graph
-from walkerlab.stages.precompiler import Precompiler
+from walkerlab.pipeline import runner
+from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.precompiler import Precompiler
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerPool
 
@@ -19,7 +19,7 @@ import sys
 from walkerlab.config.loader import load
 from walkerlab.hybrid import contact_run
 from walkerlab.stages import contact_sim
-from walkerlab.stages.progress import Silent
+from walkerlab.pipeline.progress import Silent
 from walkerlab.store.content import Content
 
 def compiled():

@@ -11,8 +11,8 @@ from functools import partial
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
-from walkerlab.stages.graph import Stage
-from walkerlab.stages.task import nothing_compiled_yet
+from walkerlab.pipeline.graph import Stage
+from walkerlab.pipeline.task import nothing_compiled_yet
 from walkerlab.workers import WorkerPool
 
 

@@ -13,10 +13,10 @@ from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import typed
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.plan import survey
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.report.numbers import listed
-from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.plan import survey
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, OtherLayout, Stored
 from walkerlab.store.key import differences

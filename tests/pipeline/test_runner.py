@@ -7,9 +7,9 @@ import pytest
 
 from walkerlab.config.reads import StartConfig
 from walkerlab.errors import ConfigError, LockedError, StorageError
-from walkerlab.stages.graph import Graph, Stage
-from walkerlab.stages.plan import survey
-from walkerlab.stages.runner import execute
+from walkerlab.pipeline.graph import Graph, Stage
+from walkerlab.pipeline.plan import survey
+from walkerlab.pipeline.runner import execute
 from walkerlab.store.artifact import read
 
 EXPLICIT = "start=[0.1, 0.2, 0.3, 0.4]"
@@ -277,8 +277,8 @@ import json, sys
 from pathlib import Path
 from toy.pipeline import GRAPH
 from walkerlab.config.loader import load
-from walkerlab.stages.progress import Silent
-from walkerlab.stages.runner import execute
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.runner import execute
 from walkerlab.store.runfolder import RunFolder
 class Notes(Silent):
     def note(self, text):

@@ -14,8 +14,8 @@ from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_keys, only
 from walkerlab.config.schema import Config
-from walkerlab.stages.graph import PIPELINE, STAGES, Graph, Stage, results_of
-from walkerlab.stages.identity import Identities
+from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
+from walkerlab.pipeline.identity import Identities
 from walkerlab.store.key import differences
 
 NAMES = [stage.name for stage in STAGES]
@@ -116,6 +116,6 @@ def test_results_of_names_them_whatever_the_config():
 
 def test_the_table_is_read_without_loading_config_or_arrays():
     heavy = "'numpy', 'h5py', 'scipy', 'numba', 'pydantic', 'ruamel'"
-    code = f"import sys, walkerlab.stages.graph; print([name for name in ({heavy}) if name in sys.modules])"
+    code = f"import sys, walkerlab.pipeline.graph; print([name for name in ({heavy}) if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr

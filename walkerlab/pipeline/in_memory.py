@@ -4,11 +4,11 @@ from collections import OrderedDict
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.identity import Identities
-from walkerlab.stages.plan import refuse_unsuited
-from walkerlab.stages.progress import Progress, Silent
-from walkerlab.stages.task import StageAnswer, task_of
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.plan import refuse_unsuited
+from walkerlab.pipeline.progress import Progress, Silent
+from walkerlab.pipeline.task import StageAnswer, task_of
 from walkerlab.store.content import Content
 from walkerlab.store.parts import Parts
 

@@ -6,8 +6,8 @@ from typing import Any
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import over_paper
 from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import Stage
 from walkerlab.sources import Sources
-from walkerlab.stages.graph import Stage
 from walkerlab.store.key import Identity
 
 

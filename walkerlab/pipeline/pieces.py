@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from walkerlab.stages.progress import Progress
+from walkerlab.pipeline.progress import Progress
 from walkerlab.store.parts import Numbers, Parts
 from walkerlab.workers import in_order
 

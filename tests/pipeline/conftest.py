@@ -10,8 +10,8 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.stages.plan import Planner
-from walkerlab.stages.runner import Options, execute
+from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.runner import Options, execute
 from walkerlab.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent

@@ -6,7 +6,7 @@ import pytest
 
 from walkerlab.config.files import builtin
 from walkerlab.errors import ConfigError
-from walkerlab.stages.resolve import resolve
+from walkerlab.pipeline.resolve import resolve
 
 
 @pytest.mark.parametrize(

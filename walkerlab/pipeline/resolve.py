@@ -10,7 +10,7 @@ from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.problems import refused
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
-from walkerlab.stages.runs import config_text, find_run, read_all, stored_in
+from walkerlab.pipeline.runs import config_text, find_run, read_all, stored_in
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged
 from walkerlab.store.runfolder import RunFolder

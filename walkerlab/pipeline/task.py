@@ -11,8 +11,8 @@ from walkerlab import kernel_cache
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.stages.graph import Stage
-from walkerlab.stages.progress import Progress
+from walkerlab.pipeline.graph import Stage
+from walkerlab.pipeline.progress import Progress
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
 from walkerlab.workers import tell

@@ -3,7 +3,7 @@
 import pytest
 
 from walkerlab.cli.status import state_of
-from walkerlab.stages.plan import survey
+from walkerlab.pipeline.plan import survey
 from walkerlab.store.artifact import read
 
 

@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.identity import Identities
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.stages.graph import PIPELINE, Graph, Stage
-from walkerlab.stages.identity import Identities
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
 from walkerlab.store.elsewhere import Elsewhere, find_elsewhere
