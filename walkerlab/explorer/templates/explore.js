@@ -60,13 +60,17 @@ async function walk() {
     next = false;
     document.body.dataset.state = "asking";
     const asked = structuredClone(question({ models: models() }));
-    const late = setTimeout(() => say(`Computing ${changes(asked.set) || asked.config} …`), 400);
+    const began = performance.now();
+    const late = setInterval(() => {
+      const once = shown ? "" : " The kernels are loaded; where they have to be compiled first, that takes some twenty seconds, once.";
+      say(`Computing ${changes(asked.set) || asked.config}: ${Math.round((performance.now() - began) / 1000)} s.${once}`);
+    }, 500);
     try {
       const [status, answer] = await ask("/api/walk", asked);
-      clearTimeout(late);
+      clearInterval(late);
       if (!next) show(status, answer, asked);
     } catch {
-      clearTimeout(late);
+      clearInterval(late);
       document.body.dataset.state = "failed";
       say("The server does not answer. Start `walkerlab explore` again; this page goes on asking.", "bad");
       await new Promise((resolve) => setTimeout(resolve, 1000));
