@@ -21,7 +21,7 @@ from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.step_map import Cycle, StepMap
 from walkerlab.outcome import Outcome
 
-LONGEST_PERIOD = 48  # steps; what repeats itself later is called aperiodic
+LONGEST_PERIOD = 48  # steps; a gait of more steps is told as aperiodic
 REPEATS = 1e-5  # distance of points that are called the same
 NEARLY, CLOSER = 1e-3, 0.8  # distance of points that still come closer, and how much so from first to last third
 ASIDE = 1e-2  # of a start from the unstable gait that it is to leave, as a share of the largest coordinate
