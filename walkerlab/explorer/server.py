@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import secrets
 import threading
 from collections.abc import Callable, Mapping
@@ -23,6 +24,7 @@ from walkerlab.explorer.walks import Answered, ExploredConfig
 from walkerlab.workers import Worker, WorkerDiedError
 
 LONGEST_BODY = 100_000
+NICE = 15
 SUPERSEDED = "a newer question was asked meanwhile"
 COOKIE = "walkerlab-explore"
 
@@ -44,9 +46,11 @@ class Desk:
         self.worker = self._hired()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
 
-    @staticmethod
-    def _hired() -> Worker:
-        return Worker(("walkerlab.explorer.walks",))
+    def _hired(self) -> Worker:
+        worker = Worker(("walkerlab.explorer.walks",))
+        if self.drops:  # nobody waits for it
+            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
+        return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
         """What the call returns there, once the worker is free; status 409 if a newer question came meanwhile."""
