@@ -4,6 +4,8 @@
     python scripts/contact_campaign.py --walks 6 --seed 3
     python scripts/contact_campaign.py --walker kneed  # every third of the 200 is
     python scripts/contact_campaign.py --walker light  # feet that bounce: 0.02 to 0.4 times critical damping
+    python scripts/contact_campaign.py --walker driven  # spring, damper, torque, push-offs
+    python scripts/contact_campaign.py --walker uneven  # footholds of drawn heights; every other is driven
 
 Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a hinged (`pinned`) first
 stance; ground into which the weight sinks by 1 um to 1 mm, with exponents from 1 to 3 and 0.05 to 3 times critical
@@ -28,7 +30,7 @@ import random
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -83,6 +85,7 @@ class Drawn:
     base: str
     sets: tuple[str, ...]
     start: tuple[float, ...]
+    heights_m: tuple[float, ...] = (0.0,)  # of footholds, the start's first
 
     @property
     def ground(self) -> str:
@@ -213,18 +216,27 @@ def light(seed: int) -> Drawn:
 
 
 def driven(seed: int) -> Drawn:
-    """The same with a spring, a damper and a torque between the legs, for the walker's weight."""
+    """The same with a spring, a damper and a torque between the legs, as the weight is; every other pushes off."""
     one, die = both(seed), random.Random(seed)
     weight = 1.0 if one.base == "paper" else 0.08
     keys = {"spring_N_m_per_rad": (0.0, 20.0), "damping_N_m_s_per_rad": (0.0, 0.5), "torque_N_m": (-1.0, 2.0)}
     hip = tuple(f"walker.hip.{key}={weight * die.uniform(*ends):.4f}" for key, ends in keys.items())
-    return Drawn(one.base, (*one.sets, *hip), one.start)
+    impulse = weight * die.uniform(0.1, 2.0) if seed % 2 else 0.0
+    push = (f"push_off.impulse_N_s={impulse:.4f}", f"push_off.duration_s={die.choice((0.002, 0.01, 0.05, 0.2))}")
+    return Drawn(one.base, (*one.sets, *hip, *push), one.start)
 
 
-WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven}
+def uneven(seed: int) -> Drawn:
+    """The same, every other driven, over footholds of drawn heights: from a tenth to ten thousandths of a leg."""
+    one, die = (driven if seed % 2 else both)(seed), random.Random(seed)
+    share = die.choice((1e-1, 1e-2, 1e-3, 1e-3, 1e-4))
+    return replace(one, heights_m=(0.0, *(die.gauss(0.0, share) for _ in range(4))))
 
 
-def plain_scene(config: Config, pitch_m: float) -> plain_walk.Plain:
+WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven, "uneven": uneven}
+
+
+def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) -> plain_walk.Plain:
     """The same walker and ground for the plain integration."""
     walker, contact = config.walker, config.contact
     assert contact is not None, "drawn with one"
@@ -235,6 +247,7 @@ def plain_scene(config: Config, pitch_m: float) -> plain_walk.Plain:
         si.exponent, si.damping_N_s_m, si.full_damping_penetration_m, 0.0 if smooth else si.static_friction,
         0.0 if smooth else si.dynamic_friction, si.stiction_velocity_m_s, si.friction_velocity_m_s,
         TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
+        config.push_off.impulse_N_s, config.push_off.duration_s, np.array(heights_m),
     )  # fmt: skip
 
 
@@ -269,15 +282,17 @@ def plainly(scene: plain_walk.Plain, start: Any, hinged: bool, steps: int, step_
 def of_plain(plain: plain_walk.Plain, walk: plain_walk.Walked) -> Quantities:
     """What is compared of the plain walk."""
     times = np.concatenate((walk.times, walk.locks[: walk.times.size], [walk.end_s]))
-    energy = plain_walk.energy(plain, walk.end, walk.ground)
+    energy = plain_walk.energy(plain, walk.ground, walk.levels, walk.end)
     return dict(zip(UNITS, (times, walk.places, walk.slips, walk.rolled, walk.lost, np.array([energy])), strict=True))
 
 
-def of_ours(plain: plain_walk.Plain, ground: Any, walk: ContactWalkResult) -> Quantities:
-    """What is compared of ours; the energy is the plain formula's."""
+def of_ours(plain: plain_walk.Plain, plainly: plain_walk.Walked, walk: ContactWalkResult) -> Quantities:
+    """What is compared of ours; the energy is the plain formula's, on the ground of the plain walk's end."""
     times = np.concatenate((walk.touch_time_s, walk.knee_strikes_s, [walk.end_time_s]))
     lost = walk.dissipated_J[: len(plain_walk.CHANNELS)]
-    energy = plain_walk.energy(plain, plain_walk.of_centre(plain, np.array(walk.end_state)), ground)
+    energy = plain_walk.energy(
+        plain, plainly.ground, plainly.levels, plain_walk.of_centre(plain, np.array(walk.end_state))
+    )
     found = (times, walk.touch_along_m, walk.slip_m, walk.rolling_m, lost, np.array([energy]))
     return dict(zip(UNITS, found, strict=True))
 
@@ -301,11 +316,12 @@ def scene_of(drawn: Drawn) -> tuple[Config, ContactScene]:
     return config, contact_scene(config, PLANE_MEASURE_M if isinstance(pitch, str) else pitch)
 
 
-def ours_at(scene: ContactScene, config: Config, start: Any, steps: int, tighter: float) -> ContactWalkResult:
+def ours_at(scene: ContactScene, config: Config, drawn: Drawn, steps: int, tighter: float) -> ContactWalkResult:
     """Our walk with the config's tolerances, or tighter ones."""
     settings = config.solver.contact
     tolerances = Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, BUDGET)
-    return scene.walk(start_state(scene, start), steps, tolerances)
+    heights = np.array(drawn.heights_m) if len(drawn.heights_m) > 1 else None
+    return scene.walk(start_state(scene, drawn.start), steps, tolerances, heights=heights)
 
 
 def compare(drawn: Drawn, steps: int) -> Compared:
@@ -321,13 +337,13 @@ def compare(drawn: Drawn, steps: int) -> Compared:
 def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
     """Walk a drawn walk both ways, plainly with steps of step_s at most and of half of it."""
     (config, scene), start = scene_of(drawn), drawn.start
-    plain, hinged = plain_scene(config, scene.pitch_m), scene.pinned
+    plain, hinged = plain_scene(config, scene.pitch_m, drawn.heights_m), scene.pinned
     coarse, fine = (plainly(plain, start, hinged, steps, h) for h in (step_s, 0.5 * step_s))
     expected = of_plain(plain, fine)
     plain_error = apart(of_plain(plain, coarse), expected)
     floor = rounding(plain, fine.rounds)
-    walks = [ours_at(scene, config, start, steps, tighter) for tighter in TIGHTER]
-    found = [of_ours(plain, fine.ground, walk) for walk in walks]
+    walks = [ours_at(scene, config, drawn, steps, tighter) for tighter in TIGHTER]
+    found = [of_ours(plain, fine, walk) for walk in walks]
     first, *others = (apart(one, other) for one, other in combinations(found, 2))
     settled = {name: min(first[name], *(other[name] for other in others)) for name in UNITS}
     judged = []

@@ -30,7 +30,7 @@ LEAST = 1e-11  # s or m: below it both are rounding, or the last digits of an ev
 def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
     """Summaries of the walk from the default to the tightest tolerance, and their right-hand sides."""
     config, scene = scene_of(drawn)
-    walks = [ours_at(scene, config, drawn.start, steps, tighter) for tighter in TIGHTER]
+    walks = [ours_at(scene, config, drawn, steps, tighter) for tighter in TIGHTER]
     return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 njit = partial(numba.njit, cache=True)  # all in one file, by whose time and size numba knows what is stale
 
 CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
-WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE = 0, 1, 2, 3, 4, 5, 9
+WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE, STUBBED = 0, 1, 2, 3, 4, 5, 9, 10
 # rows of events: two feet of (height, left edge, right edge), feet passing, hip, slide, two knees, sinking
 PASSING, FALL, SLIDE, KNEES, SINKING, EVENTS = 6, 7, 8, 9, 11, 12
 ARMED = 0.01  # rad of flexion from which on a knee locks
@@ -51,9 +51,22 @@ class Plain(NamedTuple):
     terrain: int
     pitch: float
     release_at_touch: bool
-    hip: np.ndarray = np.zeros(
-        3
-    )  # N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
+    # N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
+    hip: np.ndarray = np.zeros(3)
+    push_off: float = 0.0  # N s
+    push_off_duration: float = 1.0  # s
+    heights: np.ndarray = np.zeros(1)  # (footholds,) m over the slope, the start's first; those beyond lie at the last
+
+
+class Now(NamedTuple):
+    """What holds the walker and pushes it."""
+
+    stance: int
+    hinged: int  # foot, or -1
+    locked: np.ndarray  # (knees,)
+    has_ground: np.ndarray  # (2,)
+    levels: np.ndarray  # (2,) m, height of the ground for each foot
+    pushed_at: float  # s, when a push-off began
 
 
 class Walked(NamedTuple):
@@ -68,6 +81,7 @@ class Walked(NamedTuple):
     end_s: float
     end: np.ndarray
     ground: np.ndarray  # (2,) whether each foot had ground there
+    levels: np.ndarray  # (2,) m, how high
     lost: np.ndarray  # (4,) J
     rounds: int  # steps of the method
 
@@ -156,9 +170,10 @@ def solve(A, b):
 
 
 @njit
-def matrices(walker, y, hinged, locked):
+def matrices(walker, now, y):
     """Mass matrix with the rows of what is held, and the forces of weight and turning; room for multipliers."""
     n, knees = walker.inertias.size, walker.knees.shape[0]
+    hinged, locked = now.hinged, now.locked
     size = 2 + n + (2 if hinged >= 0 else 0) + locked.sum()
     A, b = np.zeros((size, size)), np.zeros(size)
     weight_x, weight_h = walker.gravity * np.sin(walker.slope), -walker.gravity * np.cos(walker.slope)
@@ -196,19 +211,44 @@ def matrices(walker, y, hinged, locked):
 
 
 @njit
-def rate(walker, y, hinged, locked, has_ground, stance):
+def push(walker, foot, y, b, along, upward):
+    """Let a force (N) at a foot's contact point act."""
+    b[0] += along
+    b[1] += upward
+    for k in range(walker.inertias.size):
+        rx, rh = turned(walker, walker.foot_levers[foot], y, k)
+        b[2 + k] += rx * upward - rh * along
+    b[2 + walker.foot_bodies[foot]] += walker.radius * along
+
+
+@njit
+def push_off(walker, now, t, y, b):
+    """The trailing leg's pulse, along the line from where its foot touches to the hip."""
+    u, foot = (t - now.pushed_at) / walker.push_off_duration, 1 - now.stance
+    if not 0.0 < u < 1.0 or walker.push_off == 0.0:
+        return
+    x, h = foot_at(walker, foot, y)[:2]
+    force = 30.0 * (u * (1.0 - u)) ** 2 * walker.push_off / walker.push_off_duration
+    force /= np.hypot(y[0] - x, y[1] - h)
+    push(walker, foot, y, b, force * (y[0] - x), force * (y[1] - h))
+
+
+@njit
+def rate(walker, now, t, y):
     """dy/dt."""
     n = walker.inertias.size
-    A, b = matrices(walker, y, hinged, locked)
+    A, b = matrices(walker, now, y)
     dy = np.zeros_like(y)
-    swing = 1 - stance
+    stance, swing = now.stance, 1 - now.stance
     ahead, faster = y[2 + swing] - y[2 + stance], y[4 + n + swing] - y[4 + n + stance]
     torque = walker.hip[2] - walker.hip[0] * ahead - walker.hip[1] * faster
     b[2 + swing] += torque
     b[2 + stance] -= torque
+    push_off(walker, now, t, y, b)
     for foot in range(2):
         _, h, slip, vertical_velocity, _ = foot_at(walker, foot, y)
-        if h < 0.0 and has_ground[foot] and foot != hinged:
+        h -= now.levels[foot]
+        if h < 0.0 and now.has_ground[foot] and foot != now.hinged:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
             spring = walker.stiffness * (-h) ** walker.exponent
             normal = max(0.0, spring - c * vertical_velocity)
@@ -216,30 +256,25 @@ def rate(walker, y, hinged, locked, has_ground, stance):
                 mu = -cubic(slip, -walker.stiction, -walker.static, walker.stiction, walker.static)
             else:
                 mu = -np.sign(slip) * cubic(abs(slip), walker.stiction, walker.static, walker.sliding, walker.dynamic)
-            push = mu * normal
-            b[0] += push
-            b[1] += normal
-            for k in range(n):
-                rx, rh = turned(walker, walker.foot_levers[foot], y, k)
-                b[2 + k] += rx * normal - rh * push
-            b[2 + walker.foot_bodies[foot]] += walker.radius * push
+            push(walker, foot, y, b, mu * normal, normal)
             dy[4 + 2 * n + DAMPING] += (spring - normal) * vertical_velocity
-            dy[4 + 2 * n + FRICTION] -= push * slip
+            dy[4 + 2 * n + FRICTION] -= mu * normal * slip
     dy[: 2 + n] = y[2 + n : 4 + 2 * n]
     dy[2 + n : 4 + 2 * n] = solve(A, b)[: 2 + n]
     return dy
 
 
 @njit
-def reaction(walker, y, hinged, locked, has_ground):
+def reaction(walker, now, y):
     """How fast (1/s) the ground reacts to a foot's velocity, and a foot crosses the depth where damping sets in."""
     n, fastest = walker.inertias.size, 0.0
     for foot in range(2):
         _, h, _, vertical_velocity, _ = foot_at(walker, foot, y)
-        if h < 0.0 and has_ground[foot] and foot != hinged:
+        h -= now.levels[foot]
+        if h < 0.0 and now.has_ground[foot] and foot != now.hinged:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
             normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * vertical_velocity)
-            gives, (A, J) = np.zeros(2), matrices(walker, y, hinged, locked)
+            gives, (A, J) = np.zeros(2), matrices(walker, now, y)
             for axis in range(2):
                 J[:] = 0.0
                 J[axis] = 1.0
@@ -255,20 +290,20 @@ def reaction(walker, y, hinged, locked, has_ground):
 
 
 @njit
-def runge_kutta(walker, y, h, hinged, locked, has_ground, stance):
+def runge_kutta(walker, now, t, y, h):
     """One step of the classical method."""
-    k1 = rate(walker, y, hinged, locked, has_ground, stance)
-    k2 = rate(walker, y + 0.5 * h * k1, hinged, locked, has_ground, stance)
-    k3 = rate(walker, y + 0.5 * h * k2, hinged, locked, has_ground, stance)
-    k4 = rate(walker, y + h * k3, hinged, locked, has_ground, stance)
+    k1 = rate(walker, now, t, y)
+    k2 = rate(walker, now, t + 0.5 * h, y + 0.5 * h * k1)
+    k3 = rate(walker, now, t + 0.5 * h, y + 0.5 * h * k2)
+    k4 = rate(walker, now, t + h, y + h * k3)
     return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
 @njit
-def struck(walker, y, hinged, locked):
+def struck(walker, now, y):
     """The state after a plastic impact: nothing but the hinge and what is locked takes an impulse."""
     n = walker.inertias.size
-    A, b = matrices(walker, y, hinged, locked)
+    A, b = matrices(walker, now, y)
     b[:] = 0.0
     b[: 2 + n] = np.ascontiguousarray(A[: 2 + n, : 2 + n]) @ y[2 + n : 4 + 2 * n]
     after = y.copy()
@@ -277,14 +312,14 @@ def struck(walker, y, hinged, locked):
 
 
 @njit
-def stored(walker, foot, y):
-    """Energy (J) in the ground under a foot."""
-    depth = max(0.0, -foot_at(walker, foot, y)[1])
+def stored(walker, foot, level, y):
+    """Energy (J) in the ground under a foot, whose surface is at a level (m)."""
+    depth = max(0.0, level - foot_at(walker, foot, y)[1])
     return walker.stiffness * depth ** (walker.exponent + 1.0) / (walker.exponent + 1.0)
 
 
 @njit
-def energy(walker, y, has_ground):
+def energy(walker, has_ground, levels, y):
     """Energy (J) of motion, of weight over the slope's first foothold, and in the ground."""
     n = walker.inertias.size
     total = 0.0
@@ -299,7 +334,7 @@ def energy(walker, y, has_ground):
         total += 0.5 * walker.inertias[k] * y[4 + n + k] ** 2
     for foot in range(2):
         if has_ground[foot]:
-            total += stored(walker, foot, y)
+            total += stored(walker, foot, levels[foot], y)
     return total + 0.5 * walker.hip[0] * (y[2] - y[3]) ** 2
 
 
@@ -316,24 +351,36 @@ def lane(walker, foot):
 
 
 @njit
-def event_values(walker, y, cells, stance, touched):
+def event_values(walker, now, y, cells, touched):
     """Every event function."""
     g = np.ones(EVENTS)
     x = np.zeros(2)
     for foot in range(2):
-        x[foot], g[3 * foot], _, vertical_velocity, _ = foot_at(walker, foot, y)
-        if foot == stance:
+        x[foot], height, _, vertical_velocity, _ = foot_at(walker, foot, y)
+        g[3 * foot] = height - now.levels[foot]
+        if foot == now.stance:
             g[SINKING] = vertical_velocity
         if walker.terrain == CHECKERBOARD:
             centre = lane(walker, foot) + cells[foot] * walker.pitch
             g[3 * foot + 1] = x[foot] - centre + 0.5 * walker.pitch
             g[3 * foot + 2] = centre + 0.5 * walker.pitch - x[foot]
     g[PASSING] = x[1] - x[0]
-    g[FALL] = y[1] - 0.5 * walker.leg
-    g[SLIDE] = 0.25 * walker.pitch - abs(material(walker, stance, y) - touched[stance])
+    g[FALL] = y[1] - now.levels[now.stance] - 0.5 * walker.leg
+    g[SLIDE] = 0.25 * walker.pitch - abs(material(walker, now.stance, y) - touched[now.stance])
     for knee in range(walker.knees.shape[0]):
         g[KNEES + knee] = y[2 + walker.knees[knee, 1]] - y[2 + walker.knees[knee, 0]]
     return g
+
+
+@njit
+def set_level(walker, levels, side, foot, level, y):
+    """The ground for a foot lies elsewhere now: the foot may find itself in it; returns what its spring held (J)."""
+    held = stored(walker, foot, levels[foot], y) if side[3 * foot] < 0.0 else 0.0
+    if level == levels[foot]:
+        return 0.0
+    levels[foot] = level
+    side[3 * foot] = 1.0 if foot_at(walker, foot, y)[1] > level else -1.0
+    return held
 
 
 @njit
@@ -341,14 +388,15 @@ def take_steps(walker, y, h, hinged, diary):
     """Walk from y, foot 1 standing, `hinged` or not (-1), until the diary is full or the walk ends.
 
     Then walk on until the last step's foot lifts, if it does: a slip is from touch to lift. Returns outcome, time and
-    state at the end, and whether each foot had ground there.
+    state at the end, and whether each foot had ground there and at which level.
     """
     knees = walker.knees.shape[0]
     tau = np.sqrt(walker.leg / walker.gravity)
     times, places, slips, rolled, locks, counts, lost = diary
     steps = times.size
-    outcome, end_s, end, ground = WALKED, 0.0, y, np.ones(2, np.bool_)
-    stance, done, t, last, grounded_at, releasing = 1, 0, 0.0, 0.0, 0.0, False
+    outcome, end_s, end, ground, end_levels = WALKED, 0.0, y, np.ones(2, np.bool_), np.zeros(2)
+    stance, done, t, last, grounded_at, releasing, owed = 1, 0, 0.0, 0.0, 0.0, False, False
+    levels, uneven, pushed_at = np.zeros(2), walker.heights.size > 1, np.inf
     cells, left, has_ground = np.zeros(2, np.int64), np.zeros(2, np.int64), np.ones(2, np.bool_)
     foothold, touched = np.zeros(2), np.zeros(2)
     stood, leaving, armed = np.zeros((2, 2)), np.zeros(2, np.bool_), np.zeros(max(knees, 1), np.bool_)
@@ -371,9 +419,16 @@ def take_steps(walker, y, h, hinged, diary):
     while done < steps or leaving[0] or leaving[1]:
         counts[ROUNDS] += 1
         deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
-        dt = min(h / (1.0 + REACTION * reaction(walker, y, hinged, locked, has_ground)), deadline)
-        new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
-        g = event_values(walker, new, cells, stance, touched)
+        now = Now(stance, hinged, locked, has_ground, levels, pushed_at)
+        left_of_push = pushed_at + walker.push_off_duration - t
+        pushes = walker.push_off != 0.0 and ROUNDING < left_of_push < np.inf
+        if pushes:
+            deadline = min(deadline, left_of_push)
+        elif owed:
+            owed, locked[1 - stance], armed[1 - stance] = False, False, False
+        dt = min(h / (1.0 + REACTION * reaction(walker, now, y)), deadline)
+        new = runge_kutta(walker, now, t, y, dt)
+        g = event_values(walker, now, new, cells, touched)
         low, high, event = 0.0, dt, -1
         for _ in range(HALVINGS):
             found = -1
@@ -397,11 +452,11 @@ def take_steps(walker, y, h, hinged, diary):
             if high - low < 1e-15:
                 break
             dt = 0.5 * (low + high)
-            new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
-            g = event_values(walker, new, cells, stance, touched)
+            new = runge_kutta(walker, now, t, y, dt)
+            g = event_values(walker, now, new, cells, touched)
         if event >= 0:
             dt = high
-            new = runge_kutta(walker, y, dt, hinged, locked, has_ground, stance)
+            new = runge_kutta(walker, now, t, y, dt)
         y = new
         t += dt
         for knee in range(knees):
@@ -428,14 +483,18 @@ def take_steps(walker, y, h, hinged, diary):
             outcome = SLID
             break
         if event == SINKING:
-            releasing, locked[1 - stance], armed[1 - stance] = False, False, False
+            releasing = False
+            if pushes and dt < left_of_push - ROUNDING:
+                owed = True
+            else:
+                locked[1 - stance], armed[1 - stance] = False, False
             continue
         if event == KNEES or event == KNEES + 1:
             locked[event - KNEES] = True
-            before = energy(walker, y, has_ground)
-            y = struck(walker, y, hinged, locked)
+            before = energy(walker, has_ground, levels, y)
+            y = struck(walker, now, y)
             if done < steps:
-                lost[KNEE_STRIKES] += before - energy(walker, y, has_ground)
+                lost[KNEE_STRIKES] += before - energy(walker, has_ground, levels, y)
                 locks[counts[LOCKS]] = t
                 counts[LOCKS] += 1
             continue
@@ -443,8 +502,20 @@ def take_steps(walker, y, h, hinged, diary):
         along = np.array([x0, x1])
         if event == PASSING:
             side[PASSING] = -side[PASSING]
+            swing = 1 - stance
+            if uneven and walker.terrain != CHECKERBOARD and (side[PASSING] > 0.0) == (swing == 1):
+                level = walker.heights[min(done + 1, walker.heights.size - 1)]
+                held = set_level(walker, levels, side, swing, level, y)
+                if has_ground[swing] and done < steps:
+                    lost[EDGES] += held
+                has_ground[swing] = side[3 * swing] > 0.0
+                if not has_ground[swing] and walker.terrain == PLANE:
+                    outcome = STUBBED
+                    break
+                continue
             for foot in range(2):
                 _, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
+                height -= levels[foot]
                 # equal legs of a hinged step pass each other on the ground: rounding neither lifts a foot nor holds one
                 above = height > ROUNDING or (height > -ROUNDING and vertical_velocity > 0.0)
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
@@ -456,9 +527,13 @@ def take_steps(walker, y, h, hinged, diary):
             cells[foot] += 1 if kind == 2 else -1
             if cells[foot] % 2 != 0:
                 if has_ground[foot] and done < steps:
-                    lost[EDGES] += stored(walker, foot, y)
+                    lost[EDGES] += stored(walker, foot, levels[foot], y)
                 has_ground[foot] = False
-            elif side[3 * foot] > 0.0:
+                continue
+            if uneven:
+                pad = cells[foot] - (0 if foot == 1 else 1)
+                set_level(walker, levels, side, foot, walker.heights[max(0, min(pad, walker.heights.size - 1))], y)
+            if side[3 * foot] > 0.0:
                 has_ground[foot] = True
             else:
                 outcome = OFF_PAD
@@ -503,32 +578,34 @@ def take_steps(walker, y, h, hinged, diary):
             slips[done], rolled[done] = stood[other]
             counts[SLIPS] = done + 1
         foothold[foot], touched[foot], left[foot] = along[foot], material(walker, foot, y), cells[foot]
-        stance, last, done = foot, t, done + 1
+        stance, last, done, pushed_at = foot, t, done + 1, t
         counts[STEPS] = done
         if done == steps:
-            end_s, end, ground = t, y.copy(), has_ground.copy()
+            end_s, end, ground, end_levels = t, y.copy(), has_ground.copy(), levels.copy()
         if walker.terrain == AFTER_MID_SWING and side[3 * other] > 0.0:
             has_ground[other] = (side[PASSING] > 0.0) == (other == 1)
         if knees:
-            if walker.release_at_touch:
+            if walker.release_at_touch and walker.push_off != 0.0:
+                owed = True
+            elif walker.release_at_touch:
                 locked[other], armed[other] = False, False
             else:
                 releasing = True
     if done < steps:
-        return outcome, t, y, has_ground
-    return WALKED, end_s, end, ground
+        return outcome, t, y, has_ground, levels
+    return WALKED, end_s, end, ground, end_levels
 
 
 def walk(walker, y, steps, h, hinged=-1):
     """Walk up to `steps` steps from y in steps of the method of h (s) at most, foot `hinged` hinged until the first."""
     locks, counts = np.zeros(2 * steps + 2), np.zeros(4, np.int64)
     diary = Diary(*np.zeros((4, steps)), locks, counts, np.zeros(4))
-    outcome, end_s, end, ground = take_steps(walker, y, h, hinged, diary)
+    outcome, end_s, end, ground, levels = take_steps(walker, y, h, hinged, diary)
     done, known = counts[STEPS], counts[SLIPS]
     diary.lost[[DAMPING, FRICTION]] = end[-2:]
     return Walked(
         outcome, diary.times[:done], diary.places[:done], diary.slips[:known], diary.rolled[:known],
-        locks[: counts[LOCKS]], end_s, end, ground, diary.lost, int(counts[ROUNDS]),
+        locks[: counts[LOCKS]], end_s, end, ground, levels, diary.lost, int(counts[ROUNDS]),
     )  # fmt: skip
 
 

@@ -28,11 +28,19 @@ def test_a_drawn_walk_differs_from_the_plain_integration_by_no_more_than_their_e
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-5
 
 
-@pytest.mark.parametrize("seed", [1, 7, 38, 44])
+@pytest.mark.parametrize("seed", [1, 4, 5, 7, 11])
 def test_so_does_a_driven_one(campaign, seed):
+    """By a torque between the legs, and by push-offs, of which one lasts until the knee that it holds is released."""
     one = campaign.compare(campaign.driven(seed), steps=2)
     assert one.wrong == []
     assert one.steps == 2  # the torque has changed legs
+    assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
+
+
+@pytest.mark.parametrize("seed", [0, 4, 7, 8, 11, 12])
+def test_so_does_one_over_footholds_of_drawn_heights(campaign, seed):
+    one = campaign.compare(campaign.uneven(seed), steps=2)
+    assert one.wrong == []
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.ground.pulse import add_pulse, pulse_force
-from walkerlab.ground.walker import OF_BODIES, on_ground
+from walkerlab.ground.walker import LOCKED, OF_BODIES, on_ground
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.outcome import Outcome
@@ -121,6 +121,49 @@ def test_the_energy_of_a_pushed_walk_balances():
         walk, _ = walked(name, steps=4)
         assert walk.energy_balance_residual_J < walk.explained_residual_J
         assert walk.driven.push_off > 0.0
+
+
+def at(name, times, *changes, steps=2):
+    """A walk whose samples are at the times."""
+    _, scene, gait = scene_of(name, *changes)
+    start = start_state(scene, gait.state)
+    first = scene.walk(start, 1, WALK).touch_time_s[0]
+    return scene.walk(start, steps, WALK, first + np.asarray(times))
+
+
+def test_a_push_does_its_work_within_its_duration():
+    walk = at("level", [-1e-3, 0.0, 1e-4, 2.5e-3, 5e-3, 0.1], "push_off.duration_s=0.005")
+    done = walk.samples.driven_J[:, 0]
+    assert done[0] == done[1] == 0.0
+    assert 0.0 < done[2] < 0.02 * done[3] < 0.02 * done[4]
+    assert done[5] == done[4]
+
+
+def test_a_trailing_knee_is_released_as_its_push_ends():
+    changes = ("push_off.duration_s=0.02", "walker.knee.release=touch")
+    walk = at("kneed-level", [-1e-3, 1e-3, 0.0199, 0.0201], *changes)
+    trailing = 1
+    assert (walk.samples.knees[1:3, trailing] == LOCKED).all()
+    assert walk.samples.knees[3, trailing] != LOCKED
+
+
+def test_a_hinged_foot_pushes_off_once_its_hinge_is_gone():
+    walk = at("level", [-1e-3, 1e-5, 6e-3], "contact.stance=pinned")
+    before, _, after = walk.samples.driven_J[:, 0]
+    assert before == 0.0
+    assert after > 0.0
+
+
+def test_a_touch_while_a_pulse_lasts_ends_it_and_begins_the_next():
+    _, scene, gait = scene_of("level", "push_off.impulse_N_s=0.5", "push_off.duration_s=2", "slope_deg=3")
+    walk = scene.walk(start_state(scene, gait.state), 3, WALK, 1e-3)
+    assert walk.outcome is Outcome.WALKED
+    assert walk.energy_balance_residual_J < walk.explained_residual_J
+    times, done = walk.samples.time_s, walk.samples.driven_J[:, 0]
+    second = walk.touch_time_s[1]
+    power = np.gradient(done, times)
+    just_before, just_after = (np.searchsorted(times, second + late) for late in (-0.01, 0.01))
+    assert abs(power[just_after]) < 1e-2 * abs(power[just_before])
 
 
 def test_pulses_shorter_than_the_grounds_own_time_come_to_the_rigid_impulse_as_the_ground_stiffens():

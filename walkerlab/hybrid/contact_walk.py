@@ -214,12 +214,10 @@ def jumps_at_touch(system: OnGround) -> bool:
 @inlined
 def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
     """When the walk ends if nothing happens before: too long a step, or too long a flight (s); or when a pulse does."""
-    left = pulse_left(system, t)
-    if left > EVENT_TIME:
-        return t + left
     by_step = walk_state.times[LAST_TOUCH] + LONGEST_STEP * frame.pendulum_time
     by_flight = walk_state.times[AIRBORNE_SINCE] + LONGEST_FLIGHT * frame.pendulum_time
-    return min(by_step, by_flight)
+    left = pulse_left(system, t)
+    return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 
 
 @inlined
